@@ -1,0 +1,1 @@
+"""The application: plans, runs, records, reports and the command line."""

@@ -1,0 +1,1 @@
+"""Devices, and files of points, to batches of points in millimetres."""

@@ -1,0 +1,1 @@
+"""Fake devices that speak the wire protocols, each a program of its own."""
