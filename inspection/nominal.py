@@ -1,0 +1,189 @@
+"""Algorithm 1: a curve, discretised finely enough for its Voronoi diagram to follow the medial axis.
+
+The curve is cut at its corners into smooth pieces; every piece is sampled up to and including both its ends, so a
+corner is two samples at one place, each with the tangent of its own piece.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from inspection.curve import NurbsCurve, left_of
+from inspection.errors import NominalError
+from inspection.voronoi import SitePoles, site_poles
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Material = Literal["left", "right"]
+
+_MOST_SAMPLES = 400_000  # a refinement beyond this is a step limit set too small, not a profile
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NominalProfile:
+    """The nominal profile: the exact curve and n samples of it with their poles.
+
+    curve, material : the curve, and on which side of its direction of travel the material lies
+    parameter       : (n,) curve parameter of each sample, rising within a piece
+    points_mm       : (n, 2)
+    tangent, normal : (n, 2) unit vectors; the normal is the tangent turned left
+    curvature       : (n,) 1/mm, positive where the curve turns left
+    station_mm      : (n,) arc length from the start of the curve
+    next_site, previous_site : (n,) neighbours within the piece (around the seam where that is smooth), -1 at its ends
+    twin            : (n,) the sample of the adjoining piece at the same corner, -1 elsewhere
+    is_open_end     : (n,) the two ends of an open curve
+    poles           : left and right poles of every sample
+    unmet           : samples, other than ends and corners, whose pole angle stays below the limit at the smallest step
+    """
+
+    curve: NurbsCurve
+    material: Material
+    parameter: Array
+    points_mm: Array
+    tangent: Array
+    normal: Array
+    curvature: Array
+    station_mm: Array
+    next_site: Index
+    previous_site: Index
+    twin: Index
+    is_open_end: NDArray[np.bool_]
+    poles: SitePoles
+    unmet: int
+    tree: cKDTree
+
+    def __post_init__(self) -> None:
+        for name in self.__slots__:
+            value = getattr(self, name)
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+
+    def __len__(self) -> int:
+        return len(self.parameter)
+
+    @property
+    def outward(self) -> float:
+        """+1 when the normal (left) points out of the material, -1 when it points into it."""
+        return -1.0 if self.material == "left" else 1.0
+
+    @property
+    def length_mm(self) -> float:
+        """Arc length of the curve."""
+        return self.curve.length_mm
+
+    @property
+    def smallest_concave_radius_mm(self) -> float:
+        """Radius of the tightest hollow a probe has to enter; infinite when the profile is convex throughout."""
+        hollow = float((self.curvature * self.outward).max())
+        return 1.0 / hollow if hollow > 0 else float("inf")
+
+
+def discretize(
+    curve: NurbsCurve, samples: int = 10_000, pole_angle_min_deg: float = 178.0, step_min: float = 1e-4, material: Material = "left"
+) -> NominalProfile:
+    """Algorithm 1 of Hari Ganesh & Samuel (2022): sample, build the Voronoi diagram, refine where a pole angle is too small.
+
+    samples            : starting samples, even in the parameter (the paper's P, at least 8); corners are added to them
+    pole_angle_min_deg : refine next to samples whose two poles are seen under a smaller angle (the paper: 178)
+    step_min           : never split a step of less than twice this fraction of the parameter range (the paper: 1e-4)
+    material           : the side of the curve, seen along its direction, on which the material lies
+
+    The pole angle alone bounds no error; with the defaults it is the even starting step that does. Raises NominalError.
+    """
+    if samples < 8 or not 0 < pole_angle_min_deg < 180 or not 0 < step_min < 1 or material not in ("left", "right"):
+        raise NominalError(
+            f"need samples >= 8, 0 < pole_angle_min_deg < 180, 0 < step_min < 1, material left or right; "
+            f"got {samples}, {pole_angle_min_deg}, {step_min}, {material}"
+        )
+    pieces = _even_parameters(curve, samples)
+    smallest = step_min * (curve.domain[1] - curve.domain[0])
+    while True:
+        profile = _profile(curve, material, pieces)
+        below = (profile.poles.angle_deg < pole_angle_min_deg) & (profile.next_site >= 0) & (profile.previous_site >= 0)
+        refined = _refine(pieces, below, smallest)
+        if sum(map(len, refined)) == sum(map(len, pieces)):
+            return replace(profile, unmet=int(below.sum()))
+        if sum(map(len, refined)) > _MOST_SAMPLES:
+            raise NominalError(f"more than {_MOST_SAMPLES} samples needed; choose a larger step_min than {step_min:g}")
+        pieces = refined
+
+
+def _even_parameters(curve: NurbsCurve, samples: int) -> list[Array]:
+    """Rising parameters of every smooth piece. A piece across the seam runs past the end of the domain."""
+    start, end = curve.domain
+    if curve.closed and not curve.corners.size:
+        return [np.linspace(start, end, samples + 1)]
+    borders = np.append(curve.corners, curve.corners[:1] + end - start) if curve.closed else np.concatenate([[start], curve.corners, [end]])
+    step = (end - start) / samples
+    return [np.linspace(low, high, max(2, round((high - low) / step)) + 1) for low, high in pairwise(borders)]
+
+
+def _refine(pieces: list[Array], below: NDArray[np.bool_], smallest: float) -> list[Array]:
+    """Halve the steps on both sides of every failing sample, unless the halves would be shorter than `smallest`."""
+    refined, first = [], 0
+    for piece in pieces:
+        smooth_loop = len(pieces) == 1 and len(piece) == len(below) + 1
+        failing = np.append(below, below[0]) if smooth_loop else below[first : first + len(piece)]
+        first += len(piece)
+        split = (failing[:-1] | failing[1:]) & (np.diff(piece) / 2 >= smallest)
+        refined.append(np.sort(np.concatenate([piece, (piece[:-1] + piece[1:])[split] / 2])))
+    return refined
+
+
+def _profile(curve: NurbsCurve, material: Material, pieces: list[Array]) -> NominalProfile:
+    """Evaluate the curve at the parameters and take the poles from the Voronoi diagram of the samples."""
+    smooth_loop = curve.closed and not curve.corners.size
+    u = pieces[0][:-1] if smooth_loop else np.concatenate([np.append(piece[:-1], _last_of(piece, curve)) for piece in pieces])
+    following, previous, twin, is_open_end = _neighbours([len(u)] if smooth_loop else [len(piece) for piece in pieces], curve.closed, smooth_loop)
+    point, first, second = curve.derivatives(u, 2)
+    speed = np.hypot(first[:, 0], first[:, 1])
+    if np.any(speed == 0):
+        raise NominalError(f"the curve stands still at parameter {u[np.argmin(speed)]:g}: remove the repeated control point or knot")
+    tangent = first / speed[:, None]
+    normal = np.column_stack([-tangent[:, 1], tangent[:, 0]])
+    at_end = (following < 0) | (previous < 0)
+    return NominalProfile(
+        curve=curve,
+        material=material,
+        parameter=u,
+        points_mm=point,
+        tangent=tangent,
+        normal=normal,
+        curvature=(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / speed**3,
+        station_mm=curve.station_mm(u),
+        next_site=following,
+        previous_site=previous,
+        twin=twin,
+        is_open_end=is_open_end,
+        poles=site_poles(point, normal, following, at_end),
+        unmet=0,
+        tree=cKDTree(point),
+    )
+
+
+def _last_of(piece: Array, curve: NurbsCurve) -> Array:
+    """The parameter of a piece's end, on the side of the piece; wrapped into the domain."""
+    start, end = curve.domain
+    return left_of(np.asarray(piece[-1] if piece[-1] <= end else piece[-1] - (end - start)), curve)
+
+
+def _neighbours(lengths: list[int], closed: bool, smooth_loop: bool) -> tuple[Index, Index, Index, NDArray[np.bool_]]:
+    """Next and previous sample within the piece, the twin across a corner, and which samples are ends of an open curve."""
+    n = sum(lengths)
+    following, previous, twin = np.arange(1, n + 1), np.arange(-1, n - 1), np.full(n, -1)
+    is_open_end = np.zeros(n, dtype=bool)
+    if smooth_loop:
+        following[-1], previous[0] = 0, n - 1
+        return following, previous, twin, is_open_end
+    last = np.cumsum(lengths) - 1
+    first = last + 1 - np.array(lengths)
+    following[last], previous[first] = -1, -1
+    twin[last], twin[np.roll(first, -1)] = np.roll(first, -1), last
+    if not closed:
+        twin[[0, n - 1]] = -1
+        is_open_end[[0, n - 1]] = True
+    return following, previous, twin, is_open_end

@@ -1,0 +1,60 @@
+"""The tolerance zone, and the three-state verdict of ISO 14253-1 on a point and on a profile."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+class Verdict(IntEnum):
+    """Ordered so that the verdict on a profile is the maximum over its points."""
+
+    CONFORM = 0
+    UNCERTAIN = 1
+    NONCONFORM = 2
+
+    @property
+    def word(self) -> str:
+        """The verdict as results spell it: conform, uncertain, nonconform."""
+        return self.name.lower()
+
+
+@dataclass(frozen=True, slots=True)
+class ToleranceZone:
+    """Deviations allowed: from `lower_mm` to `upper_mm`, positive out of material.
+
+    uncertainty_mm is the expanded uncertainty U of one deviation (95 %). By ISO 14253-1 it counts against whoever has to
+    prove: conformity is proven inside [lower + U, upper - U], nonconformity outside [lower - U, upper + U].
+    """
+
+    lower_mm: float
+    upper_mm: float
+    uncertainty_mm: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.lower_mm) and np.isfinite(self.upper_mm) and self.lower_mm < self.upper_mm):
+            raise ValueError(f"the lower limit must be below the upper one, got {self.lower_mm:g} .. {self.upper_mm:g} mm")
+        if not (np.isfinite(self.uncertainty_mm) and self.uncertainty_mm >= 0):
+            raise ValueError(f"the uncertainty must be zero or more, got {self.uncertainty_mm:g} mm")
+        if 2 * self.uncertainty_mm >= self.upper_mm - self.lower_mm:
+            raise ValueError(
+                f"an uncertainty of {self.uncertainty_mm:g} mm leaves nothing provable of a zone {self.upper_mm - self.lower_mm:g} mm wide"
+            )
+
+    @property
+    def middle_mm(self) -> float:
+        """Deviation in the middle of the zone."""
+        return (self.lower_mm + self.upper_mm) / 2
+
+    def verdicts(self, deviation_mm: ArrayLike) -> NDArray[np.int8]:
+        """Verdict (m,) of each deviation (m,), as the codes of `Verdict`; a limit itself belongs to the zone."""
+        deviation = np.asarray(deviation_mm, dtype=np.float64)
+        beyond = np.maximum(self.lower_mm - deviation, deviation - self.upper_mm)  # how far outside the zone, negative inside
+        proven = np.where(beyond <= -self.uncertainty_mm, Verdict.CONFORM, Verdict.UNCERTAIN)
+        return np.where(beyond > self.uncertainty_mm, Verdict.NONCONFORM, proven).astype(np.int8)
+
+    def verdict(self, deviation_mm: ArrayLike) -> Verdict:
+        """Verdict on the profile: its worst point. A profile without a judged point is not proven."""
+        verdicts = self.verdicts(np.atleast_1d(np.asarray(deviation_mm, dtype=np.float64)))
+        return Verdict(int(verdicts.max())) if verdicts.size else Verdict.UNCERTAIN
