@@ -33,6 +33,7 @@ class NominalProfile:
     tangent, normal : (n, 2) unit vectors; the normal is the tangent turned left
     curvature       : (n,) 1/mm, positive where the curve turns left
     station_mm      : (n,) arc length from the start of the curve
+    speed           : (n,) mm of arc length per unit of the parameter
     next_site, previous_site : (n,) neighbours within the piece (around the seam where that is smooth), -1 at its ends
     twin            : (n,) the sample of the adjoining piece at the same corner, -1 elsewhere
     is_open_end     : (n,) the two ends of an open curve
@@ -48,6 +49,7 @@ class NominalProfile:
     normal: Array
     curvature: Array
     station_mm: Array
+    speed: Array
     next_site: Index
     previous_site: Index
     twin: Index
@@ -155,6 +157,7 @@ def _profile(curve: NurbsCurve, material: Material, pieces: list[Array]) -> Nomi
         normal=normal,
         curvature=(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / speed**3,
         station_mm=curve.station_mm(u),
+        speed=speed,
         next_site=following,
         previous_site=previous,
         twin=twin,
