@@ -130,7 +130,9 @@ class NurbsCurve:
         if self.degree < 1:
             raise NominalError(f"degree must be at least 1, not {self.degree}")
         if self.control_points_mm.shape != (k, 2) or k < self.degree + 1:
-            raise NominalError(f"degree {self.degree} needs at least {self.degree + 1} control points (k, 2), got {self.control_points_mm.shape}")
+            raise NominalError(
+                f"degree {self.degree} needs at least {self.degree + 1} control points (k, 2), got {self.control_points_mm.shape}"
+            )
         if self.knots.shape != (k + self.degree + 1,):
             raise NominalError(f"{k} control points of degree {self.degree} need {k + self.degree + 1} knots, got {self.knots.size}")
         assert self.weights is not None
@@ -162,10 +164,14 @@ def _distinct_neighbours(points: Array, degree: int, closed: bool) -> Array:
         points = np.vstack([points, points[:1]])
     needed = degree + 2 if closed else degree + 1
     if len(points) < needed:
-        raise NominalError(f"a curve of degree {degree} needs at least {degree + 1} distinct points, got {len(points) - int(closed and len(points) > 0)}")
+        raise NominalError(
+            f"a curve of degree {degree} needs at least {degree + 1} distinct points, got {len(points) - int(closed and len(points) > 0)}"
+        )
     alike = np.flatnonzero(np.all(points[1:] == points[:-1], axis=1))
     if alike.size:
-        raise NominalError(f"points {alike[0] + 1} and {alike[0] + 2} coincide at ({points[alike[0], 0]:g}, {points[alike[0], 1]:g}); remove one")
+        raise NominalError(
+            f"points {alike[0] + 1} and {alike[0] + 2} coincide at ({points[alike[0], 0]:g}, {points[alike[0], 1]:g}); remove one"
+        )
     return points
 
 

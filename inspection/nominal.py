@@ -140,7 +140,9 @@ def _profile(curve: NurbsCurve, material: Material, pieces: list[Array]) -> Nomi
     """Evaluate the curve at the parameters and take the poles from the Voronoi diagram of the samples."""
     smooth_loop = curve.closed and not curve.corners.size
     u = pieces[0][:-1] if smooth_loop else np.concatenate([np.append(piece[:-1], _last_of(piece, curve)) for piece in pieces])
-    following, previous, twin, is_open_end = _neighbours([len(u)] if smooth_loop else [len(piece) for piece in pieces], curve.closed, smooth_loop)
+    following, previous, twin, is_open_end = _neighbours(
+        [len(u)] if smooth_loop else [len(piece) for piece in pieces], curve.closed, smooth_loop
+    )
     point, first, second = curve.derivatives(u, 2)
     speed = np.hypot(first[:, 0], first[:, 1])
     if np.any(speed == 0):

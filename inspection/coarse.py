@@ -1,0 +1,177 @@
+"""Algorithm 3 of Hari Ganesh & Samuel (2022), and what a partial scan needs beyond it.
+
+Published: the oriented bounding boxes are brought together, the flip chosen by their diagonal points, and the result is tuned
+on dominant points. Added: arc-length weights, so that the axes do not depend on how densely points lie; and for scans that
+cover only a part of the profile, the turning angle as a function of arc length slid along that of the nominal
+(Arkin et al. 1991; Wolfson 1990), in both scan directions.
+"""
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import ArrayLike, NDArray
+
+from inspection.errors import RegistrationError
+from inspection.frame import Frame, arc_length_weights, dominant_points, principal_frame
+from inspection.nominal import NominalProfile
+from inspection.profile_error import checked_points
+from inspection.registration import Registration
+from inspection.rigid import RigidTransform, best_motion, rotated
+
+Array = NDArray[np.float64]
+
+FEWEST_POINTS = 8  # three unknowns, and something left to judge
+_SIGNATURE_STEPS = 400  # of the nominal's length; a chord of the signature spans four of them
+_CHORD_STEPS = 4
+_SIGNATURE_POSES = 4  # best shifts kept for each scan direction
+_MOST_POINTS = 4000  # more are thinned: a coarse pose does not need them
+_SCORED_POINTS = 500
+
+
+def register_coarse(points_mm: ArrayLike, nominal: NominalProfile) -> Registration:
+    """The best of all coarse poses of points (m, 2), by the trimmed mean square distance to the nearest samples.
+
+    Raises RegistrationError for fewer than 8 points or points all in one place.
+    """
+    points = registrable(points_mm)
+    poses = coarse_poses(points, nominal)
+    scores = [trimmed_mean_square(points, pose, nominal) for pose in poses]
+    best = int(np.argmin(scores))
+    return Registration(
+        poses[best], float(np.sqrt(scores[best])), 0, False, np.zeros((3, 3)), np.zeros(2), (), np.zeros(len(points), dtype=bool)
+    )
+
+
+def registrable(points_mm: ArrayLike) -> Array:
+    """Points (m, 2), checked to be enough and not all in one place."""
+    points = checked_points(points_mm)
+    if len(points) < FEWEST_POINTS:
+        raise RegistrationError(f"{len(points)} points: a registration needs at least {FEWEST_POINTS}")
+    if not np.ptp(points, axis=0).max() > 0:
+        raise RegistrationError(f"all {len(points)} points coincide at ({points[0, 0]:g}, {points[0, 1]:g})")
+    return points
+
+
+def coarse_poses(points_mm: Array, nominal: NominalProfile) -> list[RigidTransform]:
+    """Candidate poses, the published one first: boxes both ways round, then the best shifts of the turning angle."""
+    points = points_mm[:: max(1, len(points_mm) // _MOST_POINTS)]
+    scanned = in_scan_order(points)
+    weights = arc_length_weights(points, nominal.curve.closed) if scanned else None
+    nominal_frame = principal_frame(nominal.points_mm, arc_length_weights(nominal.points_mm, nominal.curve.closed))
+    poses = list(align_boxes(principal_frame(points, weights), nominal_frame))
+    poses[0] = tuned_on_dominant_points(points, poses[0], nominal)
+    return poses + (_signature_poses(points, nominal) if scanned else [])
+
+
+def in_scan_order(points_mm: Array) -> bool:
+    """Whether neighbours in the sequence are neighbours in space, as on a scan: a shuffled set has no arc length."""
+    steps = np.hypot(*np.diff(points_mm, axis=0).T)
+    return bool(np.median(steps) < 0.1 * np.hypot(*np.ptp(points_mm, axis=0)))
+
+
+def align_boxes(measured: Frame, nominal: Frame) -> tuple[RigidTransform, RigidTransform]:
+    """The two motions that bring the measured box onto the nominal one, box centre to box centre; the likelier one first.
+
+    Of the two proper rotations the diagonal points decide: the extents of the boxes about their means, compared directly
+    and turned by half a turn.
+    """
+    extents, reference = measured.diagonal_points_mm, nominal.diagonal_points_mm
+    turned = -np.roll(extents, 2)
+    poses = []
+    for sign in (1.0, -1.0):
+        rotation = sign * nominal.axes @ measured.axes.T
+        shift = nominal.box_centre_mm - rotation @ measured.box_centre_mm
+        poses.append(RigidTransform(float(np.arctan2(rotation[1, 0], rotation[0, 0])), shift))
+    straight = np.abs(reference - extents).sum() <= np.abs(reference - turned).sum()
+    return (poses[0], poses[1]) if straight else (poses[1], poses[0])
+
+
+def tuned_on_dominant_points(points_mm: Array, pose: RigidTransform, nominal: NominalProfile) -> RigidTransform:
+    """Best motion of the points nearest to the nominal's dominant points, taken only where it lowers the mean square distance."""
+    dominant = nominal.points_mm[dominant_points(nominal.points_mm, nominal.curve.closed)]
+    moved = pose.apply(points_mm)
+    if len(dominant) < 2:
+        return pose
+    gaps = ((moved[None] - dominant[:, None]) ** 2).sum(axis=2)  # (dominant, m)
+    tuned = best_motion(moved[gaps.argmin(axis=1)], dominant).after(pose)
+    return min(pose, tuned, key=lambda candidate: mean_square(points_mm, candidate, nominal))
+
+
+def mean_square(points_mm: Array, pose: RigidTransform, nominal: NominalProfile) -> float:
+    """Mean square distance to the nearest samples, mm^2 (the paper's MSD)."""
+    return float((nominal.tree.query(pose.apply(points_mm))[0] ** 2).mean())
+
+
+def trimmed_mean_square(points_mm: Array, pose: RigidTransform, nominal: NominalProfile) -> float:
+    """Mean square distance of the nearer 80 % of at most 500 points, so that outliers do not choose the pose."""
+    few = points_mm[:: max(1, len(points_mm) // _SCORED_POINTS)]
+    distance = np.sort(nominal.tree.query(pose.apply(few))[0])
+    return float((distance[: max(1, int(0.8 * len(distance)))] ** 2).mean())
+
+
+def _signature_poses(points_mm: Array, nominal: NominalProfile) -> list[RigidTransform]:
+    """Poses at the best matches of the scan's turning angle with the nominal's, forwards and backwards."""
+    step = nominal.length_mm / _SIGNATURE_STEPS
+    clean = _without_spikes(points_mm)
+    poses: list[RigidTransform] = []
+    for scan in (clean, clean[::-1]):
+        even = _even_walk(scan, step)
+        if len(even) > 2 * _CHORD_STEPS:
+            poses += _best_shifts(even[: _SIGNATURE_STEPS + 1], nominal, step)
+    return poses
+
+
+def _best_shifts(scan: Array, nominal: NominalProfile, step: float) -> list[RigidTransform]:
+    """Poses at the lowest variances of the difference in direction, over all shifts of the scan along the nominal."""
+    reference = _even_nominal(nominal, step, len(scan))
+    along_nominal, along_scan = _chord_directions(reference), _chord_directions(scan)
+    if len(along_scan) > len(along_nominal):
+        scan = scan[: len(reference)]
+        along_scan = along_scan[: len(along_nominal)]
+    difference = sliding_window_view(along_nominal, len(along_scan)) - along_scan  # (shifts, chords)
+    variance = difference.var(axis=1)
+    padded = np.concatenate([[np.inf], variance, [np.inf]])
+    lowest = np.flatnonzero((variance <= padded[:-2]) & (variance <= padded[2:]))
+    chosen = lowest[np.argsort(variance[lowest])[:_SIGNATURE_POSES]]
+    poses = []
+    for shift in chosen:
+        angle = float(difference[shift].mean())
+        target = reference[shift : shift + len(scan)]
+        poses.append(RigidTransform(angle, target.mean(axis=0) - rotated(scan, angle).mean(axis=0)))
+    return poses
+
+
+def _even_nominal(nominal: NominalProfile, step: float, window: int) -> Array:
+    """Nominal points every `step` of arc length; a closed profile is continued by one window."""
+    station = np.arange(_SIGNATURE_STEPS + (window if nominal.curve.closed else 1)) * step
+    known = np.append(nominal.station_mm, nominal.length_mm) if nominal.curve.closed else nominal.station_mm
+    points = np.vstack([nominal.points_mm, nominal.points_mm[:1]]) if nominal.curve.closed else nominal.points_mm
+    order = np.argsort(known, kind="stable")
+    wanted = np.mod(station, nominal.length_mm) if nominal.curve.closed else station
+    return np.column_stack([np.interp(wanted, known[order], points[order, axis]) for axis in (0, 1)])
+
+
+def _chord_directions(points_mm: Array) -> Array:
+    chords = points_mm[_CHORD_STEPS:] - points_mm[:-_CHORD_STEPS]
+    return np.unwrap(np.arctan2(chords[:, 1], chords[:, 0]))
+
+
+def _without_spikes(points_mm: Array) -> Array:
+    """Points that stay near the median of their seven neighbours in scan order; single spikes would bend the turning angle."""
+    if len(points_mm) < 2 * FEWEST_POINTS:
+        return points_mm
+    padded = np.vstack([np.repeat(points_mm[:1], 3, axis=0), points_mm, np.repeat(points_mm[-1:], 3, axis=0)])
+    off = np.hypot(*(points_mm - np.median(sliding_window_view(padded, 7, axis=0), axis=2)).T)
+    return points_mm[off <= 6 * np.median(off) + 1e-12]
+
+
+def _even_walk(points_mm: Array, step: float) -> Array:
+    """Points (k, 2) about one `step` apart along the scan; noise between them does not lengthen the walk."""
+    picked = [0]
+    for index in range(1, len(points_mm)):
+        dx, dy = points_mm[index] - points_mm[picked[-1]]
+        if dx * dx + dy * dy >= step * step:
+            picked.append(index)
+    corners = points_mm[picked]
+    travelled = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
+    even = np.arange(0.0, travelled[-1], step)
+    return np.column_stack([np.interp(even, travelled, corners[:, axis]) for axis in (0, 1)])

@@ -1,0 +1,383 @@
+"""Points in, registration state and verdicts out, while the scan runs: the one stateful part of the inspection.
+
+Without a datum the pose is sought on the growing prefix of the scan. Once one pose fits the prefix clearly better than any
+other, verdicts are given provisionally; every further point refines the pose at constant cost (accumulated normal
+equations), and the whole is fitted anew when the number of points has doubled. `finish` registers all points together and
+judges every one at that settled pose.
+
+State moves only at fixed point numbers, never at the edges of batches: the same points in any batches give the same result.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from inspection.deviations import Deviations, Method
+from inspection.errors import InspectionError, RegistrationError
+from inspection.fine import ranked_poses, register, register_fine
+from inspection.minimum_zone import fit_minimum_zone
+from inspection.nominal import NominalProfile
+from inspection.profile_error import check_tip_radius, deviations
+from inspection.registration import Registration, given_pose
+from inspection.result import NOT_JUDGED, InspectionResult, Rejection, coverage, stretches
+from inspection.rigid import RigidTransform, about
+from inspection.section import SectionPlane
+from inspection.tolerance import ToleranceZone, Verdict
+
+Array = NDArray[np.float64]
+Fit = Literal["best-fit", "minimum-zone", "none"]
+State = Literal["seeking", "provisional", "settled"]
+
+__all__ = ["InspectionResult", "LiveInspection", "LiveUpdate", "Rejection"]
+
+_BLOCK = 64  # points between two moves of the state
+_SEEK_GROWTH = 1.3  # a further search once the prefix has grown by this factor
+_REFIT_GROWTH = 2.0
+_CLEARLY_BETTER = 0.5  # of the next best pose's rms
+_CORRELATION = 0.05  # share of the length over which form error is taken as one independent value
+_MISFIT = 0.02  # rms above this share of the nominal's size is no registration of the same part
+_MIRROR_HINT = 0.2  # a mirrored fit must be better by this factor to be named as the cause
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LiveUpdate:
+    """What one batch changed. Arrays cover the received points first .. stop - 1; rejected points carry NaN and NOT_JUDGED.
+
+    state       : seeking (no verdicts yet), provisional (the pose still moves), settled (a datum: final at once)
+    can_move_mm : by how much a provisional deviation can still move (95 %); NaN while seeking, 0 when settled
+    """
+
+    state: State
+    first: int
+    stop: int
+    actual_mm: Array
+    foot_mm: Array
+    station_mm: Array
+    deviation_mm: Array
+    verdicts: NDArray[np.int8]
+    can_move_mm: float
+    registration: Registration | None
+
+
+class LiveInspection:
+    """Inspection of one scan of one section.
+
+    nominal, zone   : what the points are held against
+    datum           : pose known beforehand; verdicts are then final at once. Without it `fit` finds the pose.
+    fit             : "best-fit" (least squares), "minimum-zone" (Chebyshev), or "none" (points are in nominal coordinates)
+    method          : projection that gives the deviations
+    tip_radius_mm   : points are centres of a ball of this radius
+    section         : plane for points in space (m, 3); off_section_max_mm rejects points farther from it
+    coverage_min    : share of the nominal's length below which conformity is not proven
+    reject_outliers : find gross outliers in the final registration and reject them
+    """
+
+    def __init__(
+        self,
+        nominal: NominalProfile,
+        zone: ToleranceZone,
+        *,
+        datum: RigidTransform | None = None,
+        fit: Fit = "best-fit",
+        method: Method = "exact",
+        tip_radius_mm: float = 0.0,
+        section: SectionPlane | None = None,
+        off_section_max_mm: float | None = None,
+        coverage_min: float = 0.0,
+        reject_outliers: bool = False,
+    ) -> None:
+        check_tip_radius(tip_radius_mm, nominal)
+        if fit not in ("best-fit", "minimum-zone", "none"):
+            raise ValueError(f"fit must be best-fit, minimum-zone or none, not {fit!r}")
+        self._nominal, self._zone, self._fit, self._method, self._tip = nominal, zone, fit, method, tip_radius_mm
+        self._section, self._off_section_max, self._coverage_min = section, off_section_max_mm, coverage_min
+        self._reject_outliers = reject_outliers
+        self._datum = RigidTransform.identity() if datum is None and fit == "none" else datum
+        self._rows = _Rows()
+        self._next_search = _BLOCK
+        self._track: _PoseTrack | None = None
+
+    @property
+    def state(self) -> State:
+        """Where the registration stands."""
+        if self._datum is not None:
+            return "settled"
+        return "seeking" if self._track is None else "provisional"
+
+    @property
+    def received(self) -> int:
+        """Points taken in so far."""
+        return self._rows.count
+
+    def add(self, points_mm: ArrayLike) -> LiveUpdate:
+        """Take in section points (m, 2) or machine points (m, 3), in scan order."""
+        points, rejection = self._to_section(np.asarray(points_mm, dtype=np.float64))
+        first = self._rows.count
+        changed_from, done = first, 0
+        while done < len(points):
+            take = min(len(points) - done, _BLOCK - self._rows.count % _BLOCK)
+            self._rows.append(points[done : done + take], rejection[done : done + take])
+            done += take
+            self._judge(self._rows.count - take, self._rows.count)
+            if self._rows.count % _BLOCK == 0 and self._datum is None and self._advance():
+                changed_from = 0
+        return self._update(changed_from)
+
+    def snapshot(self) -> LiveUpdate:
+        """Every point received so far, judged at the pose of this moment."""
+        self._judge(0, self._rows.count)
+        return self._update(0)
+
+    def finish(self, complete: bool = True) -> InspectionResult:
+        """Register all points together and judge every one at that pose; `complete` is False when the scan was cut short.
+
+        Raises RegistrationError when the points cannot be brought onto the nominal.
+        """
+        rows = self._rows
+        usable = rows.rejection[: rows.count] == Rejection.NONE
+        points = rows.points[: rows.count][usable]
+        registration = given_pose(self._datum, len(points)) if self._datum is not None else self._registered(points)
+        moved = registration.nominal_from_section.apply(points)
+        d = deviations(moved, self._nominal, self._method, self._tip)
+        rejection = rows.rejection[: rows.count].copy()
+        rejection[usable] = np.where(registration.outliers, Rejection.OUTLIER, np.where(d.beyond_end, Rejection.BEYOND_END, Rejection.NONE))
+        return self._result(d, np.flatnonzero(usable), rejection, registration, complete)
+
+    def _to_section(self, points: Array) -> tuple[Array, NDArray[np.int8]]:
+        """Section points (m, 2) and why any of them cannot be used (m,)."""
+        if points.ndim != 2 or points.shape[1] not in (2, 3):
+            raise ValueError(f"points must have shape (m, 2) or (m, 3), got {points.shape}")
+        rejection = np.where(np.isfinite(points).all(axis=1), Rejection.NONE, Rejection.NOT_FINITE).astype(np.int8)
+        if points.shape[1] == 3:
+            plane = self._section or SectionPlane(np.zeros(3), np.array([1.0, 0, 0]), np.array([0, 0, 1.0]))
+            points, height = plane.to_section(points)
+            if self._off_section_max is not None:
+                rejection[np.abs(height) > self._off_section_max] = Rejection.OFF_SECTION
+        return points, rejection
+
+    def _judge(self, first: int, stop: int) -> None:
+        """Deviations and verdicts of rows first .. stop - 1 at the pose of this moment."""
+        pose = self._datum if self._datum is not None else self._track.pose if self._track is not None else None
+        if pose is None or first == stop:
+            return
+        rows = first + np.flatnonzero(np.isin(self._rows.rejection[first:stop], (Rejection.NONE, Rejection.BEYOND_END)))
+        d = deviations(pose.apply(self._rows.points[rows]), self._nominal, self._method, self._tip)
+        self._rows.put(rows, d, self._zone)
+
+    def _advance(self) -> bool:
+        """Move the state at a block's end; True when every verdict given so far is replaced."""
+        count = self._rows.count
+        usable = self._rows.rejection[:count] != Rejection.NOT_FINITE
+        usable &= self._rows.rejection[:count] != Rejection.OFF_SECTION
+        if self._track is None:
+            if count < self._next_search:
+                return False
+            self._next_search = int(count * _SEEK_GROWTH)
+            self._track = self._sought(self._rows.points[:count][usable])
+        elif count >= _REFIT_GROWTH * self._track.fitted:
+            fitted = register_fine(self._rows.points[:count][usable], self._nominal, self._track.pose, tip_radius_mm=self._tip)
+            self._track = self._fresh_track(fitted, self._rows.points[:count][usable])
+        else:
+            self._track.refine(self._rows, count - _BLOCK, count)
+            return False
+        if self._track is not None:
+            self._judge(0, count)
+        return self._track is not None
+
+    def _sought(self, points: Array) -> "_PoseTrack | None":
+        """A track from the one pose that fits clearly better than any other, if there is one."""
+        try:
+            poses = ranked_poses(points, self._nominal, self._tip)
+        except RegistrationError:
+            return None
+        size = _size(self._nominal)
+        scores = [score for score, _ in poses]
+        clear = len(poses) == 1 or scores[0] < _CLEARLY_BETTER * scores[1]
+        if not clear or scores[0] > _MISFIT * size:
+            return None
+        track = self._fresh_track(register_fine(points, self._nominal, poses[0][1], tip_radius_mm=self._tip), points)
+        return track if track.can_move_mm() < _MISFIT * size else None
+
+    def _fresh_track(self, registration: Registration, points: Array) -> "_PoseTrack":
+        return _PoseTrack(registration, points, self._nominal, self._tip)
+
+    def _update(self, first: int) -> LiveUpdate:
+        rows, stop = self._rows, self._rows.count
+        moves = 0.0 if self._datum is not None else float("nan") if self._track is None else self._track.can_move_mm()
+        return LiveUpdate(
+            self.state,
+            first,
+            stop,
+            rows.actual[first:stop].copy(),
+            rows.foot[first:stop].copy(),
+            rows.station[first:stop].copy(),
+            rows.deviation[first:stop].copy(),
+            rows.verdicts[first:stop].copy(),
+            moves,
+            self._track.registration if self._track is not None else None,
+        )
+
+    def _registered(self, points: Array) -> Registration:
+        registration = register(points, self._nominal, tip_radius_mm=self._tip)
+        self._check_fit(points, registration)
+        if self._fit == "minimum-zone":
+            zone = fit_minimum_zone(points, self._nominal, registration, self._method, self._tip, self._zone.middle_mm)
+            return replace(registration, nominal_from_section=zone.nominal_from_section, iterations=zone.programs, converged=zone.converged)
+        return registration
+
+    def _check_fit(self, points: Array, registration: Registration) -> None:
+        """Refuse points that are not of this part, naming the likely cause."""
+        size = _size(self._nominal)
+        spread = float(np.abs(self._zone.upper_mm) + np.abs(self._zone.lower_mm))
+        if registration.rms_mm <= min(_MISFIT * size, 3 * spread):
+            return
+        mirrored = register(points[:, ::-1], self._nominal, tip_radius_mm=self._tip)
+        if mirrored.rms_mm < _MIRROR_HINT * registration.rms_mm:
+            raise RegistrationError(
+                f"the points fit the nominal only mirrored (rms {mirrored.rms_mm:.4g} mm instead of {registration.rms_mm:.4g} mm): "
+                "are the x and y columns swapped, or does the section's normal point the other way?"
+            )
+        if registration.rms_mm > _MISFIT * size:
+            raise RegistrationError(
+                f"the points do not fit the nominal: rms {registration.rms_mm:.4g} mm after the best registration; they span "
+                f"{np.hypot(*np.ptp(points, axis=0)):.4g} mm, the nominal {size:.4g} mm. Check the unit, the scale and the nominal"
+            )
+
+    def _result(
+        self, d: Deviations, usable: NDArray[np.int64], rejection: NDArray[np.int8], registration: Registration, complete: bool
+    ) -> InspectionResult:
+        rows = _Rows(len(rejection))
+        rows.append(self._rows.points[: len(rejection)], rejection)
+        rows.put(usable, d, self._zone)
+        rows.clear(np.flatnonzero(rejection != Rejection.NONE))
+        judged = rows.verdicts != NOT_JUDGED
+        station, deviation, verdicts = rows.station[judged], rows.deviation[judged], rows.verdicts[judged]
+        covered = coverage(station, self._nominal)
+        verdict = self._zone.verdict(deviation)
+        proven = complete and covered >= self._coverage_min
+        return InspectionResult(
+            rows.actual,
+            rows.foot,
+            rows.station,
+            rows.deviation,
+            rows.verdicts,
+            rejection,
+            verdict if proven else max(verdict, Verdict.UNCERTAIN),
+            covered,
+            complete,
+            self._zone,
+            registration,
+            "datum" if self._datum is not None and self._fit != "none" else self._fit,
+            self._method,
+            stretches(station, deviation, verdicts, self._zone, self._nominal.curve.closed),
+        )
+
+
+class _Rows:
+    """Growing arrays, a row for every received point."""
+
+    def __init__(self, capacity: int = 4096) -> None:
+        self.count = 0
+        self.points, self.actual, self.foot = (np.full((capacity, 2), np.nan) for _ in range(3))
+        self.station, self.deviation = np.full(capacity, np.nan), np.full(capacity, np.nan)
+        self.verdicts = np.full(capacity, NOT_JUDGED, dtype=np.int8)
+        self.rejection = np.zeros(capacity, dtype=np.int8)
+
+    def append(self, points: Array, rejection: NDArray[np.int8]) -> None:
+        stop = self.count + len(points)
+        if stop > len(self.verdicts):
+            self._grow(max(stop, 2 * len(self.verdicts)))
+        self.points[self.count : stop] = points
+        self.rejection[self.count : stop] = rejection
+        self.count = stop
+
+    def put(self, rows: NDArray[np.int64], d: Deviations, zone: ToleranceZone) -> None:
+        """Enter deviations of these rows; points beyond an open end are rejected."""
+        self.actual[rows] = d.foot_mm + d.deviation_mm[:, None] * d.normal
+        self.foot[rows] = d.foot_mm
+        self.station[rows] = d.station_mm
+        self.deviation[rows] = d.deviation_mm
+        self.verdicts[rows] = zone.verdicts(d.deviation_mm)
+        self.rejection[rows] = np.where(d.beyond_end, Rejection.BEYOND_END, Rejection.NONE)
+        self.clear(rows[d.beyond_end])
+
+    def clear(self, rows: NDArray[np.int64]) -> None:
+        """Take back what was said about these rows."""
+        for array in (self.actual, self.foot, self.station, self.deviation):
+            array[rows] = np.nan
+        self.verdicts[rows] = NOT_JUDGED
+
+    def _grow(self, capacity: int) -> None:
+        old, self_count = dict(vars(self)), self.count
+        self.__init__(capacity)  # type: ignore[misc]
+        for name, value in old.items():
+            if isinstance(value, np.ndarray):
+                getattr(self, name)[:self_count] = value[:self_count]
+        self.count = self_count
+
+
+class _PoseTrack:
+    """The provisional pose: accumulated normal equations about a fitted pose, one constant-cost update a block.
+
+    With p the small motion about `centre` since the fit, each block adds J'J and J'(e - J p_then): the minimum moves on
+    without touching earlier points again.
+    """
+
+    def __init__(self, registration: Registration, points: Array, nominal: NominalProfile, tip_radius_mm: float) -> None:
+        self.registration = registration
+        self.pose = registration.nominal_from_section
+        self.fitted = len(points)
+        self._start, self._centre, self._nominal = self.pose, registration.centre_mm, nominal
+        self._motion = np.zeros(3)
+        d = deviations(self.pose.apply(points), nominal, tip_radius_mm=tip_radius_mm)
+        J = self._gradients(self.pose.apply(points), d.normal)[~d.beyond_end]
+        e = d.deviation_mm[~d.beyond_end]
+        self._normal, self._right = J.T @ J, J.T @ e
+        self._sum_square, self._count = float(e @ e), len(e)
+        self._stations = np.zeros(64, dtype=bool)
+        self._reach = float(np.hypot(*(nominal.points_mm - self._centre).T).max())
+        self._mark(d.station_mm)
+
+    def refine(self, rows: _Rows, first: int, stop: int) -> None:
+        """Take in a block of rows judged at this track's pose."""
+        judged = first + np.flatnonzero(rows.verdicts[first:stop] != NOT_JUDGED)
+        foot, e = rows.foot[judged], rows.deviation[judged]
+        off = rows.actual[judged] - foot
+        size = np.hypot(off[:, 0], off[:, 1])
+        kept = size > 0
+        normal = (off / np.where(kept, size, 1.0)[:, None]) * np.sign(e)[:, None]
+        J = self._gradients(foot, normal)[kept]
+        self._normal += J.T @ J
+        self._right += J.T @ (e[kept] - J @ self._motion)
+        self._sum_square += float(e @ e)
+        self._count += len(e)
+        self._mark(rows.station[judged])
+        self._motion = -np.linalg.lstsq(self._normal, self._right, rcond=1e-12)[0]
+        self.pose = about(self._centre, self._motion[2], self._motion[:2]).after(self._start)
+        self.registration = replace(self.registration, nominal_from_section=self.pose)
+
+    def can_move_mm(self) -> float:
+        """Largest 95 % shift of a deviation anywhere on the profile by what the pose is still uncertain.
+
+        Form error is taken as independent only over 5 % of the length, so that a scan of a few patches is not trusted more
+        than its patches.
+        """
+        patches = max(self._stations.mean() / _CORRELATION, 1.0)
+        scatter = self._sum_square / max(self._count, 1)
+        covariance = np.linalg.pinv(self._normal, hermitian=True) * scatter * self._count / patches
+        J = self._gradients(self._nominal.points_mm[::16], self._nominal.outward * self._nominal.normal[::16])
+        return 2.0 * float(np.sqrt(np.maximum(((J @ covariance) * J).sum(axis=1), 0.0).max()))
+
+    def _gradients(self, points: Array, normal: Array) -> Array:
+        arm = points - self._centre
+        return np.column_stack([normal, arm[:, 0] * normal[:, 1] - arm[:, 1] * normal[:, 0]])
+
+    def _mark(self, station_mm: Array) -> None:
+        share = station_mm / self._nominal.length_mm * len(self._stations)
+        self._stations[np.clip(share.astype(np.int64), 0, len(self._stations) - 1)] = True
+
+
+def _size(nominal: NominalProfile) -> float:
+    return float(np.hypot(*np.ptp(nominal.points_mm, axis=0)))

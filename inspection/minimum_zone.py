@@ -1,0 +1,118 @@
+"""The minimum zone: the pose with the smallest largest deviation (Chebyshev), with its certificate.
+
+ISO 1101 judges form by the minimum zone, not by least squares. At each step the deviations are linearised in the three
+unknowns of the pose and the smallest zone of the linear problem is found by linear programming within a trust region; at
+most four active points and their multipliers prove the last one optimal (the linearisation, hence the optimum, is local).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import linprog
+
+from inspection.coarse import registrable
+from inspection.deviations import Deviations, Method
+from inspection.fine import register
+from inspection.nominal import NominalProfile
+from inspection.profile_error import deviations
+from inspection.registration import Registration
+from inspection.rigid import RigidTransform, about
+
+Array = NDArray[np.float64]
+
+_MOST_PROGRAMS = 50
+_WORKING_SHARE = 0.3  # points below this share of the largest deviation cannot become active in one step (checked after it)
+_STANDSTILL_MM = 1e-10
+_MULTIPLIER = 1e-9
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MinimumZone:
+    """The smallest zone, and why no smaller one exists nearby.
+
+    nominal_from_section : pose of the fit
+    zone_mm              : its width, 2 * max |deviation - middle_mm|
+    active               : (a,) indices of the points that hold it; their multipliers (a,) are positive and sum to 1, and the
+                           gradients of their deviations, weighted by multiplier and sign, add up to zero
+    programs             : linear programs solved
+    converged            : the last step moved no point by more than 1e-10 mm
+    """
+
+    nominal_from_section: RigidTransform
+    zone_mm: float
+    middle_mm: float
+    active: NDArray[np.int64]
+    multipliers: Array
+    programs: int
+    converged: bool
+
+
+def fit_minimum_zone(
+    points_mm: ArrayLike,
+    nominal: NominalProfile,
+    start: Registration | RigidTransform | None = None,
+    method: Method = "exact",
+    tip_radius_mm: float = 0.0,
+    middle_mm: float = 0.0,
+) -> MinimumZone:
+    """Minimum zone of section points (m, 2), begun at `start` or at their best fit. Points beyond open ends take no part.
+
+    middle_mm : middle of the tolerance zone the deviations are held against; zero for an equally disposed zone
+    """
+    points = registrable(points_mm)
+    begin = register(points, nominal, method, tip_radius_mm=tip_radius_mm) if start is None else start
+    pose = begin.nominal_from_section if isinstance(begin, Registration) else begin
+    moved = pose.apply(points)
+    d = deviations(moved, nominal, method, tip_radius_mm)
+    trust = 1.0 * float(np.abs(d.deviation_mm[~d.beyond_end] - middle_mm).max(initial=0.0))
+    active, multipliers = np.empty(0, dtype=np.int64), np.empty(0)
+    programs, converged = 0, False
+    while programs < _MOST_PROGRAMS and not converged:
+        centre, step, promised, active, multipliers = _linear_step(moved, d, middle_mm, trust)
+        programs += 1
+        reach = np.hypot(*(moved - centre).T).max()
+        moves = float(np.hypot(step[0], step[1]) + abs(step[2]) * reach)
+        trial = about(centre, step[2], step[:2]).after(pose)
+        trial_moved = trial.apply(points)
+        trial_d = deviations(trial_moved, nominal, method, tip_radius_mm)
+        now, then = _half_zone(d, middle_mm), _half_zone(trial_d, middle_mm)
+        converged = moves <= _STANDSTILL_MM or now - promised <= 1e-12 * now
+        if then < now:
+            pose, moved, d = trial, trial_moved, trial_d
+            trust *= 2.0 if now - then > 0.5 * (now - promised) else 0.5
+        elif not converged:
+            trust = min(trust, moves) / 4
+            converged = trust <= _STANDSTILL_MM
+    return MinimumZone(pose, 2 * _half_zone(d, middle_mm), middle_mm, active, multipliers, programs, converged)
+
+
+def _half_zone(d: Deviations, middle_mm: float) -> float:
+    return float(np.abs(d.deviation_mm[~d.beyond_end] - middle_mm).max(initial=0.0))
+
+
+def _linear_step(points: Array, d: Deviations, middle_mm: float, trust_mm: float) -> tuple[Array, Array, float, NDArray[np.int64], Array]:
+    """Solve min t with |e + J p| <= t over points that may become active, adding those the solution violates.
+
+    Returns centre, step (3,), promised half zone, active points and their multipliers.
+    """
+    rows_all = np.flatnonzero(~d.beyond_end)
+    x, g, e = points[rows_all], d.normal[rows_all], d.deviation_mm[rows_all] - middle_mm
+    centre = x.mean(axis=0)
+    arm = x - centre
+    reach = float(np.hypot(*arm.T).max())
+    J = np.column_stack([g, (arm[:, 0] * g[:, 1] - arm[:, 1] * g[:, 0]) / reach])  # rotation in mm at the farthest point
+    working = np.flatnonzero(np.abs(e) >= _WORKING_SHARE * np.abs(e).max())
+    while True:
+        A = np.vstack([np.column_stack([J[working], -np.ones(len(working))]), np.column_stack([-J[working], -np.ones(len(working))])])
+        b = np.concatenate([-e[working], e[working]])
+        result = linprog([0, 0, 0, 1], A_ub=A, b_ub=b, bounds=[(-trust_mm, trust_mm)] * 3 + [(0, None)], method="highs")
+        step, promised = result.x[:3], float(result.x[3])
+        violated = np.flatnonzero(np.abs(e + J @ step) > promised + 1e-12 * (1 + promised))
+        new = np.setdiff1d(violated, working, assume_unique=True)
+        if not new.size:
+            break
+        working = np.union1d(working, new)
+    multipliers = -result.ineqlin.marginals.reshape(2, -1).sum(axis=0)
+    held = np.flatnonzero(multipliers > _MULTIPLIER)
+    return centre, np.array([step[0], step[1], step[2] / reach]), promised, rows_all[working[held]], multipliers[held]

@@ -1,0 +1,44 @@
+"""The result of bringing measured points onto the nominal."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inspection.rigid import RigidTransform
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Registration:
+    """Pose of a section on the nominal, and how it was reached.
+
+    nominal_from_section : the motion to apply to section points
+    rms_mm               : root mean square deviation at that pose, over the points the fit used
+    iterations           : steps taken by the fine registration; 0 for a coarse or given pose
+    converged            : the last step moved no point by more than the stated limit
+    covariance           : (3, 3) of the pose (x, y in mm, rotation in rad about `centre_mm`) from the scatter of the
+                           deviations; zero for a given pose
+    centre_mm            : (2,) in nominal coordinates
+    rivals               : other poses that fit as well, on symmetric parts: the points cannot tell which one is true
+    outliers             : (m,) points left out of the fit as outliers, all False unless a robust fit was asked for
+    """
+
+    nominal_from_section: RigidTransform
+    rms_mm: float
+    iterations: int
+    converged: bool
+    covariance: Array
+    centre_mm: Array
+    rivals: tuple[RigidTransform, ...]
+    outliers: NDArray[np.bool_]
+
+    def __post_init__(self) -> None:
+        for array in (self.covariance, self.centre_mm, self.outliers):
+            array.setflags(write=False)
+
+
+def given_pose(nominal_from_section: RigidTransform, points: int) -> Registration:
+    """A pose known beforehand (a datum), for a set of that many points."""
+    return Registration(nominal_from_section, float("nan"), 0, True, np.zeros((3, 3)), np.zeros(2), (), np.zeros(points, dtype=bool))

@@ -1,0 +1,170 @@
+"""What an inspection found: one row for every received point, and what they say about the profile as a whole."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inspection.deviations import Method
+from inspection.nominal import NominalProfile
+from inspection.registration import Registration
+from inspection.tolerance import ToleranceZone, Verdict
+
+Array = NDArray[np.float64]
+
+NOT_JUDGED = -1  # in place of a verdict where a point was rejected, or is not judged yet
+_GAP = 3.0  # a gap of more than this many median spacings is not measured
+_FINEST_GAP = 0.005  # share of the length; gaps below it always count as measured
+
+
+class Rejection(IntEnum):
+    """Why a received point was not judged."""
+
+    NONE = 0
+    NOT_FINITE = 1
+    OFF_SECTION = 2
+    BEYOND_END = 3
+    OUTLIER = 4
+
+    @property
+    def words(self) -> str:
+        """The reason as results spell it."""
+        return self.name.lower().replace("_", " ")
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """A contiguous part of the profile out of tolerance; `from_mm` is above `to_mm` where it crosses the seam."""
+
+    from_mm: float
+    to_mm: float
+    worst_mm: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class InspectionResult:
+    """The judged profile.
+
+    Arrays have a row for every received point; those of rejected points are NaN, their verdict NOT_JUDGED.
+
+    actual_mm    : (m, 2) actual surface points in nominal coordinates (ball centres are already compensated)
+    foot_mm      : (m, 2) the nominal points they are compared with
+    station_mm   : (m,)
+    deviation_mm : (m,) positive out of material
+    verdicts     : (m,) codes of `Verdict`
+    rejection    : (m,) codes of `Rejection`
+    verdict      : on the profile; not better than uncertain where the scan was incomplete
+    coverage     : share of the nominal's length that has points
+    complete     : the scan came to its end
+    """
+
+    actual_mm: Array
+    foot_mm: Array
+    station_mm: Array
+    deviation_mm: Array
+    verdicts: NDArray[np.int8]
+    rejection: NDArray[np.int8]
+    verdict: Verdict
+    coverage: float
+    complete: bool
+    zone: ToleranceZone
+    registration: Registration
+    fit: str
+    method: Method
+    stretches: tuple[Stretch, ...]
+
+    def __post_init__(self) -> None:
+        for name in self.__slots__:
+            value = getattr(self, name)
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+
+    @property
+    def received(self) -> int:
+        """Points received; always judged + rejected."""
+        return len(self.verdicts)
+
+    @property
+    def judged(self) -> int:
+        """Points with a verdict."""
+        return int(np.count_nonzero(self.verdicts != NOT_JUDGED))
+
+    @property
+    def rejected(self) -> int:
+        """Points without one."""
+        return self.received - self.judged
+
+    @property
+    def rejected_by_reason(self) -> dict[str, int]:
+        """Number of points for each reason that occurred."""
+        codes, counts = np.unique(self.rejection[self.rejection != Rejection.NONE], return_counts=True)
+        return {Rejection(int(code)).words: int(count) for code, count in zip(codes, counts, strict=True)}
+
+    @property
+    def out_of_tolerance(self) -> int:
+        """Points whose verdict is nonconform."""
+        return int(np.count_nonzero(self.verdicts == Verdict.NONCONFORM))
+
+    @property
+    def worst(self) -> int | None:
+        """Index of the point farthest from the middle of the zone, None when nothing was judged."""
+        if not self.judged:
+            return None
+        return int(np.nanargmax(np.abs(self.deviation_mm - self.zone.middle_mm)))
+
+    @property
+    def rms_mm(self) -> float:
+        """Root mean square deviation of the judged points; NaN when there are none."""
+        return float(np.sqrt(np.nanmean(self.deviation_mm**2))) if self.judged else float("nan")
+
+    @property
+    def max_deviation_mm(self) -> float:
+        """Largest deviation; NaN when nothing was judged."""
+        return float(np.nanmax(self.deviation_mm)) if self.judged else float("nan")
+
+    @property
+    def min_deviation_mm(self) -> float:
+        """Smallest deviation; NaN when nothing was judged."""
+        return float(np.nanmin(self.deviation_mm)) if self.judged else float("nan")
+
+    @property
+    def profile_error_mm(self) -> float:
+        """2 * max |deviation|, not the range; NaN when nothing was judged."""
+        return 2 * max(abs(self.max_deviation_mm), abs(self.min_deviation_mm)) if self.judged else float("nan")
+
+
+def coverage(station_mm: Array, nominal: NominalProfile) -> float:
+    """Share of the nominal's length that judged points at these stations (j,) cover.
+
+    The stretch between neighbours is measured as far as it is no longer than three median spacings (or 0.5 % of the length).
+    """
+    if not len(station_mm):
+        return 0.0
+    length = nominal.length_mm
+    s = np.sort(station_mm)
+    if nominal.curve.closed:
+        gaps = np.diff(np.append(s, s[0] + length))
+    else:
+        gaps = np.diff(np.concatenate([[0.0], s, [length]]))
+    limit = max(_GAP * float(np.median(gaps)), _FINEST_GAP * length)
+    return float(np.where(gaps <= limit, gaps, 0.0).sum() / length)
+
+
+def stretches(station_mm: Array, deviation_mm: Array, verdicts: NDArray[np.int8], zone: ToleranceZone, closed: bool) -> tuple[Stretch, ...]:
+    """Contiguous out-of-tolerance stretches in station order: broken by any point inside, joined across the seam."""
+    order = np.argsort(station_mm, kind="stable")
+    out = verdicts[order] == Verdict.NONCONFORM
+    if not out.any():
+        return ()
+    starts = np.flatnonzero(out & ~np.concatenate([[False], out[:-1]]))
+    ends = np.flatnonzero(out & ~np.concatenate([out[1:], [False]]))
+    runs = [order[first : last + 1] for first, last in zip(starts, ends, strict=True)]
+    if closed and len(runs) > 1 and out[0] and out[-1]:
+        runs = [np.concatenate([runs[-1], runs[0]]), *runs[1:-1]]
+    return tuple(_stretch(run, station_mm, deviation_mm, zone) for run in runs)
+
+
+def _stretch(run: NDArray[np.int64], station_mm: Array, deviation_mm: Array, zone: ToleranceZone) -> Stretch:
+    worst = run[np.argmax(np.abs(deviation_mm[run] - zone.middle_mm))]
+    return Stretch(float(station_mm[run[0]]), float(station_mm[run[-1]]), float(deviation_mm[worst]))

@@ -1,0 +1,67 @@
+"""Rigid motions of the plane, and the best one between paired points."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RigidTransform:
+    """A rotation about the origin followed by a translation, named target_from_source where it is held.
+
+    rotation_rad   : anticlockwise
+    translation_mm : (2,)
+    """
+
+    rotation_rad: float
+    translation_mm: Array
+
+    def __post_init__(self) -> None:
+        translation = np.array(self.translation_mm, dtype=np.float64)
+        if translation.shape != (2,) or not (np.isfinite(translation).all() and np.isfinite(self.rotation_rad)):
+            raise ValueError(f"need a finite angle and a translation (2,), got {self.rotation_rad} and {self.translation_mm}")
+        translation.setflags(write=False)
+        object.__setattr__(self, "rotation_rad", float(self.rotation_rad))
+        object.__setattr__(self, "translation_mm", translation)
+
+    @classmethod
+    def identity(cls) -> "RigidTransform":
+        """The motion that moves nothing."""
+        return cls(0.0, np.zeros(2))
+
+    def apply(self, points_mm: ArrayLike) -> Array:
+        """Moved points (m, 2). Written out by element, so that a point's result does not depend on its batch."""
+        points = np.asarray(points_mm, dtype=np.float64)
+        turned = rotated(points, self.rotation_rad)
+        return np.asarray(turned + self.translation_mm)
+
+    def inverse(self) -> "RigidTransform":
+        """The motion back."""
+        return RigidTransform(-self.rotation_rad, -rotated(self.translation_mm[None], -self.rotation_rad)[0])
+
+    def after(self, first: "RigidTransform") -> "RigidTransform":
+        """The motion that makes `first` and then this one."""
+        angle = self.rotation_rad + first.rotation_rad
+        return RigidTransform(float(np.arctan2(np.sin(angle), np.cos(angle))), self.apply(first.translation_mm[None])[0])
+
+
+def rotated(vectors: Array, angle_rad: float) -> Array:
+    """Vectors (m, 2) turned anticlockwise about the origin."""
+    c, s = np.cos(angle_rad), np.sin(angle_rad)
+    return np.column_stack([c * vectors[:, 0] - s * vectors[:, 1], s * vectors[:, 0] + c * vectors[:, 1]])
+
+
+def about(centre_mm: Array, angle_rad: float, shift_mm: Array) -> RigidTransform:
+    """Rotation about a centre (2,), then a shift (2,)."""
+    return RigidTransform(angle_rad, centre_mm + shift_mm - rotated(centre_mm[None], angle_rad)[0])
+
+
+def best_motion(source_mm: Array, target_mm: Array) -> RigidTransform:
+    """The motion that brings source (m, 2) closest to target (m, 2) in the least-squares sense (Kabsch in the plane)."""
+    from_mean, to_mean = source_mm.mean(axis=0), target_mm.mean(axis=0)
+    a, b = source_mm - from_mean, target_mm - to_mean
+    angle = float(np.arctan2((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum(), (a * b).sum()))
+    return about(from_mean, angle, to_mean - from_mean)

@@ -1,0 +1,50 @@
+"""The plane of a section: machine points in space to section points in the plane and their height above it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SectionPlane:
+    """Where the section lies in machine coordinates.
+
+    origin_mm : (3,) a point of the plane, origin of the section's coordinates
+    x_axis    : (3,) the section's x direction (its part along the plane; any length)
+    normal    : (3,) perpendicular to the plane (any length); y is normal cross x
+    """
+
+    origin_mm: Array
+    x_axis: Array
+    normal: Array
+
+    def __post_init__(self) -> None:
+        origin, x, n = (np.array(value, dtype=np.float64) for value in (self.origin_mm, self.x_axis, self.normal))
+        if any(v.shape != (3,) or not np.isfinite(v).all() for v in (origin, x, n)):
+            raise ValueError("origin, x axis and normal must be three finite numbers each")
+        if not np.linalg.norm(n) > 0:
+            raise ValueError("the section's normal must not be zero")
+        n = n / np.linalg.norm(n)
+        x = x - (x @ n) * n
+        if not np.linalg.norm(x) > 1e-9:
+            raise ValueError("the section's x axis must not be zero or parallel to its normal")
+        for name, value in (("origin_mm", origin), ("x_axis", x / np.linalg.norm(x)), ("normal", n)):
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+
+    def to_section(self, points_mm: ArrayLike) -> tuple[Array, Array]:
+        """Section points (m, 2) and heights above the plane (m,) of machine points (m, 3)."""
+        p = np.asarray(points_mm, dtype=np.float64) - self.origin_mm
+        x, n = self.x_axis, self.normal
+        y = np.cross(n, x)
+        along = [p[:, 0] * axis[0] + p[:, 1] * axis[1] + p[:, 2] * axis[2] for axis in (x, y, n)]
+        return np.column_stack(along[:2]), along[2]
+
+    def to_machine(self, points_mm: ArrayLike, height_mm: float = 0.0) -> Array:
+        """Machine points (m, 3) of section points (m, 2)."""
+        p = np.asarray(points_mm, dtype=np.float64)
+        y = np.cross(self.normal, self.x_axis)
+        return np.asarray(self.origin_mm + p[:, :1] * self.x_axis + p[:, 1:] * y + height_mm * self.normal)
