@@ -104,7 +104,7 @@ def mean_square(points_mm: Array, pose: RigidTransform, nominal: NominalProfile)
 def trimmed_mean_square(points_mm: Array, pose: RigidTransform, nominal: NominalProfile) -> float:
     """Mean square distance of the nearer 80 % of at most 500 points, so that outliers do not choose the pose."""
     few = points_mm[:: max(1, len(points_mm) // _SCORED_POINTS)]
-    distance = np.sort(nominal.tree.query(pose.apply(few))[0])
+    distance = np.sort(np.asarray(nominal.tree.query(pose.apply(few))[0]))
     return float((distance[: max(1, int(0.8 * len(distance)))] ** 2).mean())
 
 
@@ -152,7 +152,7 @@ def _even_nominal(nominal: NominalProfile, step: float, window: int) -> Array:
 
 def _chord_directions(points_mm: Array) -> Array:
     chords = points_mm[_CHORD_STEPS:] - points_mm[:-_CHORD_STEPS]
-    return np.unwrap(np.arctan2(chords[:, 1], chords[:, 0]))
+    return np.asarray(np.unwrap(np.arctan2(chords[:, 1], chords[:, 0])))
 
 
 def _without_spikes(points_mm: Array) -> Array:

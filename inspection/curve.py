@@ -86,7 +86,7 @@ class NurbsCurve:
 
     def point(self, u: ArrayLike) -> Array:
         """Points (m, 2) at the parameters u (m,)."""
-        return self.derivatives(u, 0)[0]
+        return np.asarray(self.derivatives(u, 0)[0])
 
     def derivatives(self, u: ArrayLike, order: int) -> Array:
         """Point and derivatives by u up to `order` (0 to 4): (order + 1, m, 2). At a corner the side of larger u counts."""
@@ -177,7 +177,7 @@ def _distinct_neighbours(points: Array, degree: int, closed: bool) -> Array:
 
 def _speed(curve: NurbsCurve, u: Array) -> Array:
     first = curve.derivatives(u.ravel(), 1)[1]
-    return np.hypot(first[:, 0], first[:, 1]).reshape(u.shape)
+    return np.asarray(np.hypot(first[:, 0], first[:, 1]).reshape(u.shape))
 
 
 def _arc_length(curve: NurbsCurve, start: Array, end: Array) -> Array:
@@ -232,7 +232,7 @@ def _corners(curve: NurbsCurve) -> Array:
     after = _unit(curve.derivatives(candidates, 1)[1])
     sine = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
     cosine = (before * after).sum(axis=1)
-    return candidates[(np.abs(sine) > _CORNER_SINE) | (cosine < 0)]
+    return np.asarray(candidates[(np.abs(sine) > _CORNER_SINE) | (cosine < 0)])
 
 
 def left_of(u: Array, curve: NurbsCurve) -> Array:

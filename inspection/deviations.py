@@ -44,7 +44,7 @@ class Deviations:
     @staticmethod
     def _shapes(m: int) -> dict[str, tuple[int, ...]]:
         flat = ("deviation_mm", "parameter", "station_mm", "curvature", "beyond_end", "at_vertex")
-        return {name: (m,) for name in flat} | {"foot_mm": (m, 2), "normal": (m, 2)}
+        return dict.fromkeys(flat, (m,)) | {"foot_mm": (m, 2), "normal": (m, 2)}
 
     def __len__(self) -> int:
         return len(self.deviation_mm)

@@ -22,16 +22,18 @@ def inversion(points_mm: Array, nominal: NominalProfile) -> Projection:
     start, end = curve.domain
     site, faces_none = nearest_sites(points_mm, nominal)
     u = nominal.parameter[site].copy()
+    active = np.arange(len(u))  # a point that stands still is left alone, so that its result does not depend on its batch
     for _ in range(_MOST_STEPS):
-        point, first, second = curve.derivatives(u, 2)
-        reach = point - points_mm
+        point, first, second = curve.derivatives(u[active], 2)
+        reach = point - points_mm[active]
         speed2 = dot(first, first)
         slope = speed2 + dot(second, reach)
-        step = -dot(first, reach) / np.where(slope > 0, slope, speed2)
-        stepped = u + step if curve.closed else np.clip(u + step, start, end)
-        moved = np.abs(stepped - u) * np.sqrt(speed2)
-        u = stepped
-        if not np.any(moved > _STANDSTILL_MM):
+        stepped = u[active] - dot(first, reach) / np.where(slope > 0, slope, speed2)
+        stepped = stepped if curve.closed else np.clip(stepped, start, end)
+        moved = np.abs(stepped - u[active]) * np.sqrt(speed2)
+        u[active] = stepped
+        active = active[moved > _STANDSTILL_MM]
+        if not active.size:
             break
     if curve.closed:
         u = start + np.mod(u - start, end - start)

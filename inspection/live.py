@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inspection.deviations import Deviations, Method
-from inspection.errors import InspectionError, RegistrationError
+from inspection.errors import RegistrationError
 from inspection.fine import ranked_poses, register, register_fine
 from inspection.minimum_zone import fit_minimum_zone
 from inspection.nominal import NominalProfile
 from inspection.profile_error import check_tip_radius, deviations
 from inspection.registration import Registration, given_pose
-from inspection.result import NOT_JUDGED, InspectionResult, Rejection, coverage, stretches
+from inspection.result import NOT_JUDGED, InspectionResult, Rejection, coverage, rejections_by_reason, stretches
 from inspection.rigid import RigidTransform, about
 from inspection.section import SectionPlane
 from inspection.tolerance import ToleranceZone, Verdict
@@ -110,6 +110,16 @@ class LiveInspection:
     def received(self) -> int:
         """Points taken in so far."""
         return self._rows.count
+
+    @property
+    def judged(self) -> int:
+        """Points that have a verdict at this moment."""
+        return int(np.count_nonzero(self._rows.verdicts[: self._rows.count] != NOT_JUDGED))
+
+    @property
+    def rejected_by_reason(self) -> dict[str, int]:
+        """Points rejected so far, by reason."""
+        return rejections_by_reason(self._rows.rejection[: self._rows.count])
 
     def add(self, points_mm: ArrayLike) -> LiveUpdate:
         """Take in section points (m, 2) or machine points (m, 3), in scan order."""
@@ -330,7 +340,7 @@ class _PoseTrack:
         self.pose = registration.nominal_from_section
         self.fitted = len(points)
         self._start, self._centre, self._nominal = self.pose, registration.centre_mm, nominal
-        self._motion = np.zeros(3)
+        self._motion: Array = np.zeros(3)
         d = deviations(self.pose.apply(points), nominal, tip_radius_mm=tip_radius_mm)
         J = self._gradients(self.pose.apply(points), d.normal)[~d.beyond_end]
         e = d.deviation_mm[~d.beyond_end]

@@ -107,7 +107,8 @@ def _linear_step(points: Array, d: Deviations, middle_mm: float, trust_mm: float
         A = np.vstack([np.column_stack([J[working], -np.ones(len(working))]), np.column_stack([-J[working], -np.ones(len(working))])])
         b = np.concatenate([-e[working], e[working]])
         result = linprog([0, 0, 0, 1], A_ub=A, b_ub=b, bounds=[(-trust_mm, trust_mm)] * 3 + [(0, None)], method="highs")
-        step, promised = result.x[:3], float(result.x[3])
+        solution = np.asarray(result.x)  # the program always has one: p = 0 with t = max |e|
+        step, promised = solution[:3], float(solution[3])
         violated = np.flatnonzero(np.abs(e + J @ step) > promised + 1e-12 * (1 + promised))
         new = np.setdiff1d(violated, working, assume_unique=True)
         if not new.size:

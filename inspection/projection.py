@@ -86,7 +86,7 @@ def merged(chosen: Mask, if_chosen: Projection, otherwise: Projection) -> Projec
 
     def pick(name: str) -> NDArray[np.generic]:
         a, b = getattr(if_chosen, name), getattr(otherwise, name)
-        return np.where(chosen[:, None] if a.ndim == 2 else chosen, a, b)
+        return np.asarray(np.where(chosen[:, None] if a.ndim == 2 else chosen, a, b))
 
     return Projection(*(pick(name) for name in Projection.__slots__))  # type: ignore[arg-type]
 

@@ -98,8 +98,7 @@ class InspectionResult:
     @property
     def rejected_by_reason(self) -> dict[str, int]:
         """Number of points for each reason that occurred."""
-        codes, counts = np.unique(self.rejection[self.rejection != Rejection.NONE], return_counts=True)
-        return {Rejection(int(code)).words: int(count) for code, count in zip(codes, counts, strict=True)}
+        return rejections_by_reason(self.rejection)
 
     @property
     def out_of_tolerance(self) -> int:
@@ -134,6 +133,12 @@ class InspectionResult:
         return 2 * max(abs(self.max_deviation_mm), abs(self.min_deviation_mm)) if self.judged else float("nan")
 
 
+def rejections_by_reason(rejection: NDArray[np.int8]) -> dict[str, int]:
+    """Number of points for each reason among the codes of `Rejection` (m,)."""
+    counts = np.bincount(rejection, minlength=len(Rejection))
+    return {reason.words: int(counts[reason]) for reason in Rejection if reason != Rejection.NONE and counts[reason]}
+
+
 def coverage(station_mm: Array, nominal: NominalProfile) -> float:
     """Share of the nominal's length that judged points at these stations (j,) cover.
 
@@ -143,10 +148,7 @@ def coverage(station_mm: Array, nominal: NominalProfile) -> float:
         return 0.0
     length = nominal.length_mm
     s = np.sort(station_mm)
-    if nominal.curve.closed:
-        gaps = np.diff(np.append(s, s[0] + length))
-    else:
-        gaps = np.diff(np.concatenate([[0.0], s, [length]]))
+    gaps = np.diff(np.append(s, s[0] + length)) if nominal.curve.closed else np.diff(np.concatenate([[0.0], s, [length]]))
     limit = max(_GAP * float(np.median(gaps)), _FINEST_GAP * length)
     return float(np.where(gaps <= limit, gaps, 0.0).sum() / length)
 

@@ -81,4 +81,4 @@ def parameter_at(nominal: NominalProfile, station_mm: Array) -> Array:
     for _ in range(4):
         speed = np.hypot(*curve.derivatives(u, 1)[1].T)
         u = np.clip(u - (curve.station_mm(u) - station_mm) / speed, start, end)
-    return u
+    return np.asarray(u)

@@ -54,8 +54,8 @@ def site_poles(sites_mm: Array, normal: Array, next_site: NDArray[np.int64], is_
     """
     site_of, cells = _distinct(sites_mm)  # (n,), (c, 2)
     diagram = Voronoi(np.vstack([cells, _box(cells)]))
-    ridges = np.asarray(diagram.ridge_points)  # (r, 2) pairs of cells
-    ends = np.asarray(diagram.ridge_vertices)  # (r, 2) vertices, -1 at infinity
+    ridges = np.asarray(diagram.ridge_points, dtype=np.int64)  # (r, 2) pairs of cells
+    ends = np.asarray(diagram.ridge_vertices, dtype=np.int64)  # (r, 2) vertices, -1 at infinity
     inner = np.all(ends >= 0, axis=1)
     ridges, ends = ridges[inner], ends[inner]
     left, right, left_radius, right_radius, angle = _poles(sites_mm, normal, site_of, ridges, ends, diagram.vertices)
@@ -78,7 +78,7 @@ def _distinct(sites_mm: Array) -> tuple[NDArray[np.int64], Array]:
 def _box(sites_mm: Array) -> Array:
     low, high = sites_mm.min(axis=0), sites_mm.max(axis=0)
     turn = 2 * np.pi * np.arange(_BOX_SITES) / _BOX_SITES
-    return (low + high) / 2 + BOX_SCALE * np.hypot(*(high - low)) * np.column_stack([np.cos(turn), np.sin(turn)])
+    return np.asarray((low + high) / 2 + BOX_SCALE * np.hypot(*(high - low)) * np.column_stack([np.cos(turn), np.sin(turn)]))
 
 
 def _poles(

@@ -1,0 +1,57 @@
+"""The bounded hand-over between acquisition and inspection: what does not fit waits, nothing is dropped."""
+
+import threading
+from collections import deque
+from typing import Generic, TypeVar
+
+Item = TypeVar("Item")
+
+
+class HandOver(Generic[Item]):
+    """First in, first out, between one giving and one taking thread.
+
+    capacity : what may wait, in the units of `size` (points)
+    waiting, peak, stalls : what waits now, at most so far, and how often the giver had to wait
+    """
+
+    def __init__(self, capacity: int) -> None:
+        if capacity < 1:
+            raise ValueError(f"the buffer must hold at least one point, not {capacity}")
+        self.capacity = capacity
+        self.waiting = self.peak = self.stalls = 0
+        self._items: deque[tuple[int, Item]] = deque()
+        self._changed = threading.Condition()
+        self._closed = False
+
+    def give(self, item: Item, size: int = 0) -> bool:
+        """Hand over; wait while the buffer is full (an item larger than the whole buffer passes alone). False once closed."""
+        with self._changed:
+            if self._full(size):
+                self.stalls += 1
+                self._changed.wait_for(lambda: self._closed or not self._full(size))
+            if self._closed:
+                return False
+            self._items.append((size, item))
+            self.waiting += size
+            self.peak = max(self.peak, self.waiting)
+            self._changed.notify_all()
+            return True
+
+    def take(self, timeout_s: float) -> list[Item]:
+        """All that waits, in order; empty when nothing came in time."""
+        with self._changed:
+            self._changed.wait_for(lambda: bool(self._items), timeout_s)
+            taken = [item for _, item in self._items]
+            self._items.clear()
+            self.waiting = 0
+            self._changed.notify_all()
+            return taken
+
+    def close(self) -> None:
+        """Let the giver go: what it hands over from now on is refused."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+
+    def _full(self, size: int) -> bool:
+        return self.waiting > 0 and self.waiting + size > self.capacity

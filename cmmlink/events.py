@@ -1,0 +1,82 @@
+"""What a run says while it goes on: immutable events, in the order in which things happened.
+
+`RunStarted` comes first and `RunFinished` last; between them every arrival from the source, and after points their verdicts.
+A sink is any function that takes an event; it is called in the thread of the run and may stop the run by raising.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from drivers.source import Arrival
+from inspection import InspectionResult, LiveUpdate
+
+Ending = Literal["complete", "aborted", "interrupted"]
+
+
+@dataclass(frozen=True, slots=True)
+class Counts:
+    """The four numbers of a run, and what stands behind them. received = judged + rejected + pending, pending 0 at the end.
+
+    received : points that came through the link whole
+    judged   : points with a verdict
+    rejected : points that cannot be judged, `rejected_by_reason` says why
+    pending  : points received before the registration was found
+    lost     : points missing by the device's own counters
+    damaged_bytes : bytes on the wire that were no valid frame
+    buffered, buffer_peak : points waiting for their verdict, now and at most; stalls : times a full buffer held the source up
+    """
+
+    received: int = 0
+    judged: int = 0
+    rejected: int = 0
+    pending: int = 0
+    lost: int = 0
+    damaged_bytes: int = 0
+    buffered: int = 0
+    buffer_peak: int = 0
+    stalls: int = 0
+    rejected_by_reason: Mapping[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class RunStarted:
+    """A run begins. `simulated` says that no real device is measured."""
+
+    part: str
+    serial_number: str
+    operator: str
+    device: str
+    simulated: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Arrived:
+    """Something came from the source, at `time_s` by the run's clock."""
+
+    time_s: float
+    arrival: Arrival
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Judged:
+    """Points were judged (or, while the registration is sought, taken in). `age_s` is how long the newest had waited."""
+
+    time_s: float
+    age_s: float
+    update: LiveUpdate
+    counts: Counts
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RunFinished:
+    """The run is over. Without a result, `message` says why there is none; after a failure it says what failed."""
+
+    ending: Ending
+    result: InspectionResult | None
+    counts: Counts
+    message: str
+
+
+Event = RunStarted | Arrived | Judged | RunFinished
+Sink = Callable[[Event], None]

@@ -1,0 +1,182 @@
+"""One run: source -> buffer -> inspection -> events.
+
+The source is read in a thread of its own; judging and all sinks run in the caller's. A device failure ends the run with a
+verdict on what was received; a sink that raises ends it too, and its error is passed on once acquisition has stopped.
+"""
+
+import threading
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cmmlink.buffer import HandOver
+from cmmlink.events import Arrived, Counts, Ending, Event, Judged, RunFinished, RunStarted, Sink
+from drivers.errors import DeviceError
+from drivers.source import Arrival, Damaged, Lost, PointBatch, Rejected, ScanSource
+from inspection import InspectionError, InspectionResult, LiveInspection
+
+_LOOK_S = 0.05  # how often the run looks whether it was asked to stop
+_MOST_AT_ONCE = 4096  # points judged in one go when many wait, so that the sinks hear of them
+
+
+@dataclass(frozen=True, slots=True)
+class RunOutcome:
+    """How a run ended. `failure` is the device's error, `refusal` why no result could be given."""
+
+    ending: Ending
+    result: InspectionResult | None
+    counts: Counts
+    failure: DeviceError | None
+    refusal: InspectionError | None
+
+
+@dataclass(slots=True)
+class _Tally:
+    """The numbers of a run as they grow."""
+
+    received: int = 0
+    rejected_by_driver: Counter[str] = field(default_factory=Counter)
+    lost: int = 0
+    damaged_bytes: int = 0
+
+    def add(self, arrival: Arrival) -> None:
+        if isinstance(arrival, PointBatch):
+            self.received += len(arrival)
+        elif isinstance(arrival, Rejected):
+            self.received += arrival.count
+            self.rejected_by_driver[arrival.reason] += arrival.count
+        elif isinstance(arrival, Lost):
+            self.lost += arrival.count
+        elif isinstance(arrival, Damaged):
+            self.damaged_bytes += arrival.byte_count
+
+    def counts(self, judged: int, rejected_by_reason: dict[str, int], buffer: "HandOver[tuple[float, Arrival]]") -> Counts:
+        reasons = Counter(self.rejected_by_driver)
+        reasons.update(rejected_by_reason)
+        rejected = sum(reasons.values())
+        return Counts(
+            received=self.received,
+            judged=judged,
+            rejected=rejected,
+            pending=self.received - judged - rejected,
+            lost=self.lost,
+            damaged_bytes=self.damaged_bytes,
+            buffered=buffer.waiting,
+            buffer_peak=buffer.peak,
+            stalls=buffer.stalls,
+            rejected_by_reason=dict(reasons),
+        )
+
+
+def run_inspection(
+    source: ScanSource,
+    live: LiveInspection,
+    sinks: Sequence[Sink],
+    started: RunStarted,
+    *,
+    buffer_points: int,
+    clock: Callable[[], float],
+    stop: threading.Event,
+) -> RunOutcome:
+    """Carry out one run to its end, telling every sink every event. Setting `stop` aborts it."""
+    buffer: HandOver[tuple[float, Arrival]] = HandOver(buffer_points)
+    failures: list[DeviceError] = []
+    acquired = threading.Event()
+    reader = threading.Thread(target=_acquire, args=(source, buffer, failures, acquired, clock), name="acquisition", daemon=True)
+    tally = _Tally()
+    try:
+        _tell(sinks, started)
+        reader.start()
+        _judge_all(source, live, sinks, buffer, tally, acquired, clock, stop)
+    finally:
+        source.stop()
+        buffer.close()
+        if reader.is_alive():
+            reader.join()
+    failure = failures[0] if failures else None
+    ending: Ending = "interrupted" if failure else "aborted" if stop.is_set() else "complete"
+    result, refusal = _finish(live, ending)
+    judged, reasons = (
+        (result.judged, result.rejected_by_reason) if result else (0, {"not registered": live.received} if live.received else {})
+    )
+    counts = tally.counts(judged, reasons, buffer)
+    _tell(sinks, RunFinished(ending, result, counts, str(failure or refusal or "")))
+    return RunOutcome(ending, result, counts, failure, refusal)
+
+
+def _acquire(
+    source: ScanSource,
+    buffer: "HandOver[tuple[float, Arrival]]",
+    failures: list[DeviceError],
+    acquired: threading.Event,
+    clock: Callable[[], float],
+) -> None:
+    try:
+        for arrival in source.arrivals():
+            if not buffer.give((clock(), arrival), len(arrival) if isinstance(arrival, PointBatch) else 0):
+                break
+    except DeviceError as error:
+        failures.append(error)
+    except Exception as error:  # a defect in a driver must end the run with a message, not hang it
+        failures.append(DeviceError(f"the driver failed unexpectedly: {error!r}"))
+    finally:
+        acquired.set()
+
+
+def _judge_all(
+    source: ScanSource,
+    live: LiveInspection,
+    sinks: Sequence[Sink],
+    buffer: "HandOver[tuple[float, Arrival]]",
+    tally: _Tally,
+    acquired: threading.Event,
+    clock: Callable[[], float],
+    stop: threading.Event,
+) -> None:
+    """Take what arrives and judge it until acquisition has ended and the buffer is empty."""
+    while True:
+        ended = acquired.is_set()  # looked at before the buffer: nothing is handed over after it was set
+        taken = buffer.take(0.0 if ended else _LOOK_S)
+        if stop.is_set():
+            source.stop()
+        if not taken and ended:
+            return
+        batches: list[tuple[float, PointBatch]] = []
+        for time_s, arrival in taken:
+            tally.add(arrival)
+            _tell(sinks, Arrived(time_s, arrival))
+            if isinstance(arrival, PointBatch):
+                batches.append((time_s, arrival))
+                if sum(len(batch) for _, batch in batches) >= _MOST_AT_ONCE:
+                    _judge(live, sinks, buffer, tally, batches, clock)
+                    batches = []
+        if batches:
+            _judge(live, sinks, buffer, tally, batches, clock)
+
+
+def _judge(
+    live: LiveInspection,
+    sinks: Sequence[Sink],
+    buffer: "HandOver[tuple[float, Arrival]]",
+    tally: _Tally,
+    batches: list[tuple[float, PointBatch]],
+    clock: Callable[[], float],
+) -> None:
+    update = live.add(np.concatenate([batch.points_mm for _, batch in batches]))
+    now = clock()
+    counts = tally.counts(live.judged, live.rejected_by_reason, buffer)
+    _tell(sinks, Judged(now, now - batches[-1][0], update, counts))
+
+
+def _finish(live: LiveInspection, ending: Ending) -> tuple[InspectionResult | None, InspectionError | None]:
+    try:
+        return live.finish(complete=ending == "complete"), None
+    except InspectionError as error:
+        return None, error
+
+
+def _tell(sinks: Sequence[Sink], event: Event) -> None:
+    for sink in sinks:
+        sink(event)
