@@ -5,6 +5,7 @@ exact rational curves. NACA four-digit sections are computed from their equation
 The other airfoils are read from coordinate files beside the checkout, because some may not be shipped.
 """
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -142,8 +143,8 @@ def sharp_airfoil(name: str, chord_mm: float = 100.0) -> NurbsCurve:
     return NurbsCurve.interpolate(points, 3, closed=True, corner_at_seam=True)
 
 
-SMOOTH = {"P1": p1, "P2": p2, "P3": p3}
-EVERY = {
+SMOOTH: dict[str, Callable[[], NurbsCurve]] = {"P1": p1, "P2": p2, "P3": p3}
+EVERY: dict[str, Callable[[], NurbsCurve]] = {
     **SMOOTH,
     "ellipse": lambda: ellipse(50.0, 20.0),
     "stadium": lambda: stadium(30.0, 12.0),
