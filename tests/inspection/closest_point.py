@@ -117,7 +117,8 @@ def _tangential(curve: NurbsCurve, points: Array, u: Array) -> tuple[Array, Arra
 def _choose(curve: NurbsCurve, points: Array, rows: Index, parameters: Array, is_foot: NDArray[np.bool_]) -> Closest:
     feet = np.asarray(curve.derivatives(parameters, 0)[0])
     distance = np.linalg.norm(points[rows] - feet, axis=1)
-    order = np.lexsort((distance, rows))
+    # a root beats the end of its own interval, which rounding may show as equally close
+    order = np.lexsort((distance + 1e-12 * ~is_foot, rows))
     rows, parameters, feet, distance, is_foot = rows[order], parameters[order], feet[order], distance[order], is_foot[order]
     first = np.searchsorted(rows, np.arange(len(points)))
     foot, u, nearest = feet[first], parameters[first], distance[first]

@@ -1,5 +1,7 @@
 """Poles against shapes whose medial axis is known in closed form."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -80,7 +82,7 @@ def test_inner_poles_of_an_ellipse_tend_to_its_medial_axis() -> None:
 
 def test_pole_angles_tend_to_180_degrees_as_fast_as_the_samples_close_up() -> None:
     worst = [180 - ellipse_poles(n)[2].min() for n in (500, 1000, 2000, 4000)]
-    assert all(1.7 < p / q < 2.4 for p, q in zip(worst[:-1], worst[1:], strict=True))
+    assert all(1.7 < p / q < 2.4 for p, q in pairwise(worst))
     assert worst[-1] < 0.3
 
 
