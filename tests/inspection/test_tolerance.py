@@ -1,0 +1,103 @@
+"""ISO 14253-1: conformity is proven inside the zone less U, nonconformity outside the zone plus U, the rest is not proven."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from inspection.tolerance import ToleranceZone, Verdict
+
+CONFORM, UNCERTAIN, NONCONFORM = Verdict.CONFORM, Verdict.UNCERTAIN, Verdict.NONCONFORM
+
+
+def test_verdicts_at_just_inside_and_just_outside_every_border_of_an_asymmetric_zone() -> None:
+    # powers of two, so that lower + U and the like are exact and a border means the border
+    zone = ToleranceZone(-0.5, 0.25, 0.0625)
+    cases = {
+        -0.4375: (UNCERTAIN, CONFORM, CONFORM),
+        -0.5625: (NONCONFORM, UNCERTAIN, UNCERTAIN),
+        0.1875: (CONFORM, CONFORM, UNCERTAIN),
+        0.3125: (UNCERTAIN, UNCERTAIN, NONCONFORM),
+    }
+    for border, expected in cases.items():
+        below, above = np.nextafter(border, -1.0), np.nextafter(border, 1.0)
+        assert tuple(zone.verdicts([below, border, above])) == expected, border
+    assert zone.verdicts([-0.5, 0.25, 0.0]).tolist() == [UNCERTAIN, UNCERTAIN, CONFORM]
+
+
+def test_without_uncertainty_a_limit_belongs_to_the_zone_and_nothing_is_uncertain() -> None:
+    zone = ToleranceZone(-0.02, 0.05)
+    eps = 1e-12
+    found = zone.verdicts([-0.02 - eps, -0.02, -0.02 + eps, 0.05 - eps, 0.05, 0.05 + eps])
+    assert found.tolist() == [NONCONFORM, CONFORM, CONFORM, CONFORM, CONFORM, NONCONFORM]
+
+
+def test_a_zone_of_which_nothing_could_ever_be_proven_to_conform_is_refused() -> None:
+    assert ToleranceZone(-0.5, 0.25, 0.37).verdict([-0.125]) is CONFORM
+    for uncertainty in (0.375, 0.5, 10.0):
+        with pytest.raises(ValueError, match="uncertainty"):
+            ToleranceZone(-0.5, 0.25, uncertainty)
+
+
+def test_a_zone_on_one_side_of_the_nominal() -> None:
+    zone = ToleranceZone(0.1, 0.3)
+    assert zone.middle_mm == pytest.approx(0.2)
+    assert zone.verdicts([0.0, 0.1, 0.2, 0.31]).tolist() == [NONCONFORM, CONFORM, CONFORM, NONCONFORM]
+
+
+@given(
+    lower=st.integers(-1000, 1000),
+    width=st.integers(1, 1000),
+    share=st.integers(0, 499),
+    deviation=st.lists(st.integers(-3000, 3000), min_size=1, max_size=30),
+)
+def test_verdicts_follow_the_inequalities_point_by_point(lower: int, width: int, share: int, deviation: list[int]) -> None:
+    # whole multiples of 2^-12 mm, whose sums are exact, so that the test needs no margin at a border
+    upper, uncertainty = lower + width, share * width // 1000
+    zone = ToleranceZone(lower / 4096, upper / 4096, uncertainty / 4096)
+    expected = []
+    for d in deviation:
+        if lower + uncertainty <= d <= upper - uncertainty:
+            expected.append(CONFORM)
+        elif lower - uncertainty <= d <= upper + uncertainty:
+            expected.append(UNCERTAIN)
+        else:
+            expected.append(NONCONFORM)
+    assert zone.verdicts(np.array(deviation) / 4096).tolist() == expected
+    assert zone.verdict(np.array(deviation) / 4096) is max(expected)
+
+
+def test_profile_verdict_is_that_of_its_worst_point() -> None:
+    zone = ToleranceZone(-0.1, 0.1, 0.01)
+    assert zone.verdict([0.0, 0.05]) is CONFORM
+    assert zone.verdict([0.0, 0.095]) is UNCERTAIN
+    assert zone.verdict([0.0, 0.095, -0.2]) is NONCONFORM
+    assert zone.verdict([]) is UNCERTAIN
+    assert [v.word for v in (CONFORM, UNCERTAIN, NONCONFORM)] == ["conform", "uncertain", "nonconform"]
+
+
+def test_a_deviation_that_is_not_a_number_is_never_conform() -> None:
+    zone = ToleranceZone(-0.1, 0.1)
+    try:
+        verdict = zone.verdict([0.0, float("nan")])
+    except ValueError:
+        return
+    assert verdict is not CONFORM
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "uncertainty"),
+    [
+        (0.1, -0.1, 0.0),
+        (0.1, 0.1, 0.0),
+        (-0.1, 0.1, -0.01),
+        (float("nan"), 0.1, 0.0),
+        (-0.1, float("nan"), 0.0),
+        (-0.1, 0.1, float("nan")),
+        (-0.1, float("inf"), 0.0),
+        (-0.1, 0.1, float("inf")),
+    ],
+)
+def test_a_zone_that_cannot_be_is_refused(lower: float, upper: float, uncertainty: float) -> None:
+    with pytest.raises(ValueError, match=r"\d|nan|inf"):
+        ToleranceZone(lower, upper, uncertainty)
