@@ -140,7 +140,7 @@ def read_text(path: Path) -> str:
     strange = re.search(r"[\x00-\x08\x0e-\x1f\x7f]", text)
     if strange:
         line = text.count("\n", 0, strange.start()) + 1
-        raise PointFileError(f"{path}: line {line}: not a text file (byte {ord(strange[0]):#04x}); expected columns of numbers")
+        raise PointFileError(f"{path}: line {line}: not a text file (byte {ord(strange[0]):#04x}); expected plain text")
     return text
 
 

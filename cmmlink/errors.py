@@ -1,0 +1,20 @@
+"""What can go wrong in the application itself.
+
+PlanError     an inspection plan cannot be used
+YamlError     a YAML text is not what its reader expects; it knows the line, its caller adds the file
+StoreError    the record of a run could not be kept or read
+
+A message says what, where (file, line, key), what was found and what is allowed.
+"""
+
+
+class PlanError(ValueError):
+    """An inspection plan cannot be used."""
+
+
+class YamlError(ValueError):
+    """A YAML text is not what its reader expects."""
+
+
+class StoreError(Exception):
+    """The record of a run could not be kept or read."""
