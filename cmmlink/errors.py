@@ -1,12 +1,19 @@
-"""What the application itself refuses.
+"""What can go wrong in the application itself.
 
-PlanError     a plan, or an input it names, cannot be used
-StoreError    the record could not be kept
+PlanError     an inspection plan cannot be used
+YamlError     a YAML text is not what its reader expects; it knows the line, its caller adds the file
+StoreError    the record of a run could not be kept or read
+
+A message says what, where (file, line, key), what was found and what is allowed.
 """
 
 
 class PlanError(ValueError):
-    """A plan, or an input it names, cannot be used: file, line, key, the value found and what is allowed."""
+    """An inspection plan cannot be used."""
+
+
+class YamlError(ValueError):
+    """A YAML text is not what its reader expects."""
 
 
 class StoreError(Exception):

@@ -4,6 +4,7 @@ DeviceError
   LinkError       the link could not be opened, was lost, or stays silent
   ProtocolError   what arrives is not what the plan's device sends
   DeviceRefused   the device answered, and said no
+PointFileError    a file of points cannot be used
 
 Libraries' own exceptions (pyserial, pymodbus) are translated in the one file that imports the library.
 A message says what happened, where (port or address), and what the operator can do.
@@ -24,3 +25,7 @@ class ProtocolError(DeviceError):
 
 class DeviceRefused(DeviceError):  # noqa: N818 - the name is fixed by DESIGN: it reads as the sentence it is
     """The device answered, and said no."""
+
+
+class PointFileError(ValueError):
+    """A file of points cannot be used; the message names file, line, what was found and what is expected."""

@@ -1,0 +1,247 @@
+"""The inspection plan: a YAML file, validated into an immutable model.
+
+A plan needs four keys; everything else has the default shown. Relative paths are relative to the plan's own folder.
+
+    part: {name: blade, serial_number: null}
+    operator: null
+    nominal:
+      file: blade.dat               # UIUC dat, points, or NURBS yaml
+      scale: 1.0                    # file units to mm: the chord, for airfoils in chord units
+      closed: null                  # true, false, or null: what the file shows
+      material: null                # left or right of the direction of travel; null: inside a closed profile
+    tolerance:
+      lower_mm: -0.05               # deviation, positive out of material
+      upper_mm: 0.05
+      uncertainty_mm: 0.0           # expanded uncertainty U (95 %) of one deviation, ISO 14253-1
+    device:
+      type: serial                  # ASCII lines over a serial port
+      address: COM3                 # port name, or socket://host:port
+      baud_rate: 115200
+      silence_s: 5.0                # a device silent for longer has failed
+    # device: {type: file, file: points.csv, scale: 1.0}    a file of points in place of a device
+    probe: {tip_radius_mm: 0.0}     # above 0: the points are ball centres
+    section:                        # the plane of the section in machine coordinates
+      origin_mm: [0, 0, 0]
+      x_axis: [1, 0, 0]             # direction, any length; what of it lies along the normal is dropped
+      normal: [0, 0, 1]
+      off_plane_max_mm: null        # reject points farther from the plane; null: none
+    registration:
+      fit: best-fit                 # best-fit, minimum-zone, none; none is also the default where a datum is given
+      method: exact                 # exact, circle, chord, pcp, veaw, inversion
+      datum: null                   # {rotation_deg: 0, translation_mm: [0, 0]}: known pose, nominal from section
+      coverage_min: 0.95            # fraction of the nominal's length to be measured before conform is proven
+    discretisation: {samples: 10000, pole_angle_min_deg: 178.0, step_min: 1e-4}
+    buffer_points: 500000
+    out: null                       # folder for the results; null: none written
+    records: null                   # folder of the run records; null: the user's
+
+A further device is a further model with its own `type`, added to the union `Device`.
+"""
+
+from math import hypot
+from pathlib import Path
+from typing import Annotated, Literal
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
+
+from cmmlink.errors import PlanError, YamlError
+from cmmlink.yaml_model import read_model
+from drivers.errors import PointFileError
+from drivers.point_file import read_text
+from inspection.tolerance import ToleranceZone
+
+Vector = tuple[float, float, float]
+Text = Annotated[str, Field(min_length=1)]
+Positive = Annotated[float, Field(gt=0)]
+
+_LEAST_SINE = 1e-3  # between x axis and normal: below it the direction of x in the plane is noise
+
+
+class _Settings(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, str_strip_whitespace=True)
+
+
+class Part(_Settings):
+    """What is measured."""
+
+    name: Text = Field(description="the name of the part")
+    serial_number: Text | None = None
+
+
+class Nominal(_Settings):
+    """The nominal profile, as load_nominal takes it, and the side of the material."""
+
+    file: Path = Field(description="the file of the nominal profile")
+    scale: Positive = 1.0
+    closed: bool | None = None
+    material: Literal["left", "right"] | None = None
+
+
+class Tolerance(_Settings):
+    """Limits of the deviation, positive out of material, and its expanded uncertainty."""
+
+    lower_mm: float = Field(description="the lower limit of the deviation in mm, like -0.05")
+    upper_mm: float = Field(description="the upper limit of the deviation in mm, like 0.05")
+    uncertainty_mm: float = 0.0
+
+    @field_validator("upper_mm")
+    @classmethod
+    def _above_lower(cls, upper_mm: float, info: ValidationInfo) -> float:
+        lower_mm = info.data.get("lower_mm")
+        if lower_mm is not None and upper_mm <= lower_mm:
+            raise ValueError(f"a number above lower_mm, which is {lower_mm:g}")
+        return upper_mm
+
+    @field_validator("uncertainty_mm")
+    @classmethod
+    def _provable(cls, uncertainty_mm: float, info: ValidationInfo) -> float:
+        if "lower_mm" in info.data and "upper_mm" in info.data:
+            width = info.data["upper_mm"] - info.data["lower_mm"]
+            if not 0 <= 2 * uncertainty_mm < width:
+                raise ValueError(f"zero or more, and less than half the zone of {width:g} mm: more leaves nothing provable")
+        return uncertainty_mm
+
+    @property
+    def zone(self) -> ToleranceZone:
+        """The tolerance as the inspection takes it."""
+        return ToleranceZone(self.lower_mm, self.upper_mm, self.uncertainty_mm)
+
+
+class SerialDevice(_Settings):
+    """A device that sends ASCII lines over a serial port."""
+
+    type: Literal["serial"]
+    address: Text = Field(description="a port name like COM3 or /dev/ttyUSB0, or socket://host:port")
+    baud_rate: Annotated[int, Field(gt=0)] = 115200
+    silence_s: Positive = 5.0
+
+
+class FileDevice(_Settings):
+    """A file of points in place of a device."""
+
+    type: Literal["file"]
+    file: Path = Field(description="the file of points: csv, txt, asc, xyz or npy")
+    scale: Positive = 1.0
+
+
+Device = Annotated[SerialDevice | FileDevice, Field(discriminator="type")]
+
+
+class Probe(_Settings):
+    """The tip of the probe; a radius above zero says that the points are ball centres."""
+
+    tip_radius_mm: Annotated[float, Field(ge=0)] = 0.0
+
+
+class Section(_Settings):
+    """The plane of the section in machine coordinates; directions of any length, not parallel."""
+
+    origin_mm: Vector = (0.0, 0.0, 0.0)
+    normal: Vector = (0.0, 0.0, 1.0)
+    x_axis: Annotated[Vector, Field(validate_default=True)] = (1.0, 0.0, 0.0)
+    off_plane_max_mm: Positive | None = None
+
+    @field_validator("normal", "x_axis")
+    @classmethod
+    def _some_direction(cls, direction: Vector) -> Vector:
+        if hypot(*direction) == 0:
+            raise ValueError("a direction other than [0, 0, 0]")
+        return direction
+
+    @field_validator("x_axis")
+    @classmethod
+    def _not_along_normal(cls, x_axis: Vector, info: ValidationInfo) -> Vector:
+        (a, b, c), (x, y, z) = info.data.get("normal", (0.0, 0.0, 0.0)), x_axis
+        if hypot(a, b, c) > 0 and hypot(b * z - c * y, c * x - a * z, a * y - b * x) < _LEAST_SINE * hypot(a, b, c) * hypot(x, y, z):
+            raise ValueError(f"a direction other than that of the normal, {list(info.data['normal'])}")
+        return x_axis
+
+
+class Datum(_Settings):
+    """A known pose: the motion that brings section coordinates onto the nominal."""
+
+    rotation_deg: float = 0.0
+    translation_mm: tuple[float, float] = (0.0, 0.0)
+
+
+class Registration(_Settings):
+    """How the points come onto the nominal, and how much of it they must cover."""
+
+    datum: Datum | None = None
+    fit: Annotated[Literal["best-fit", "minimum-zone", "none"], Field(validate_default=True)] = "best-fit"
+    method: Literal["exact", "circle", "chord", "pcp", "veaw", "inversion"] = "exact"
+    coverage_min: Annotated[float, Field(ge=0, le=1)] = 0.95
+
+    @model_validator(mode="before")
+    @classmethod
+    def _datum_needs_no_fit(cls, given: object) -> object:
+        return {"fit": "none", **given} if isinstance(given, dict) and given.get("datum") is not None else given
+
+    @field_validator("fit")
+    @classmethod
+    def _datum_is_kept(cls, fit: str, info: ValidationInfo) -> str:
+        if fit != "none" and info.data.get("datum") is not None:
+            raise ValueError("none, or no fit at all, beside a datum: a known pose is not fitted away")
+        return fit
+
+
+class Discretisation(_Settings):
+    """Sampling of the nominal; see inspection.discretize."""
+
+    samples: Annotated[int, Field(ge=8, le=400_000)] = 10_000
+    pole_angle_min_deg: Annotated[float, Field(gt=0, lt=180)] = 178.0
+    step_min: Annotated[float, Field(gt=0, lt=1)] = 1e-4
+
+
+class Plan(_Settings):
+    """One inspection: what, against what, with what, and where the results go."""
+
+    part: Part = Field(description="a mapping with the part's name")
+    operator: Text | None = None
+    nominal: Nominal = Field(description="a mapping with the nominal's file")
+    tolerance: Tolerance = Field(description="a mapping with lower_mm and upper_mm")
+    device: Device = Field(description="a mapping with the device's type and address")
+    probe: Probe = Probe()
+    section: Section = Section()
+    registration: Registration = Registration()
+    discretisation: Discretisation = Discretisation()
+    buffer_points: Annotated[int, Field(ge=1)] = 500_000
+    out: Path | None = None
+    records: Path | None = None
+
+    def effective_yaml(self) -> str:
+        """Spell the plan with every default filled in and every path absolute; as a plan it means the same."""
+        return yaml.safe_dump(self.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
+
+    def with_address(self, address: str) -> "Plan":
+        """Give the same plan with its device at another address."""
+        return self.model_copy(update={"device": self.device.model_copy(update={"address": address})})
+
+
+def load_plan(path: Path) -> Plan:
+    """Read and check a plan. Raises PlanError: file, line, key, the value found and what is allowed."""
+    try:
+        text = read_text(path)
+    except PointFileError as error:
+        raise PlanError(str(error)) from None
+    try:
+        plan = read_model(text, Plan)
+    except YamlError as error:
+        raise PlanError(f"{path}: {error}") from None
+    return _with_paths_from(path.resolve().parent, plan)
+
+
+def _with_paths_from(folder: Path, plan: Plan) -> Plan:
+    """Make the paths of a plan absolute, seen from its folder."""
+    device = plan.device
+    if isinstance(device, FileDevice):
+        device = device.model_copy(update={"file": folder / device.file})
+    return plan.model_copy(
+        update={
+            "nominal": plan.nominal.model_copy(update={"file": folder / plan.nominal.file}),
+            "device": device,
+            "out": folder / plan.out if plan.out else None,
+            "records": folder / plan.records if plan.records else None,
+        }
+    )

@@ -1,0 +1,218 @@
+"""YAML text to a validated pydantic model, with the line of every key at hand for the message when it is wrong.
+
+Only what a plan needs is YAML here: mappings, sequences, scalars. Tags, anchors and aliases, repeated keys and deep
+nesting are refused, so a file can neither build objects nor blow up. A scalar stays text until the model says what it is:
+a serial number 0012 keeps its zeros, 1e-4 is a number, `null`, `~` and nothing are None.
+"""
+
+import difflib
+import re
+import types
+import typing
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any, NoReturn, TypeVar
+
+import yaml
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from cmmlink.errors import YamlError
+
+Path = tuple[str | int, ...]
+_IN_OUR_WORDS = {
+    "float_parsing": "a number",
+    "float_type": "a number",
+    "int_parsing": "a whole number",
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "bool_parsing": "true or false",
+    "bool_type": "true or false",
+    "string_too_short": "some text",
+    "string_type": "text",
+    "path_type": "a path",
+    "tuple_type": "a list in brackets",
+    "list_type": "a list in brackets",
+}
+Model = TypeVar("Model", bound=BaseModel)
+
+_DEEPEST = 20
+_NULL = ("", "~", "null", "Null", "NULL")
+_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # libyaml where the wheel has it: a hundred times faster on long lists
+
+
+def read_model(text: str, model: type[Model]) -> Model:
+    """Validate a YAML text against a model. Raises YamlError: line, key, the value found, what is allowed."""
+    document = _read(text)
+    try:
+        return model.model_validate(document.value)
+    except ValidationError as failure:
+        # A misspelt key first: the same slip makes another key missing.
+        errors = sorted(failure.errors(), key=lambda error: error["type"] != "extra_forbidden")
+        problems = [_explained(error, document, model) for error in errors]
+    line, message = problems[0]
+    others = f" (and {len(problems) - 1} more after this one)" if len(problems) > 1 else ""
+    raise YamlError(f"line {line}: {message}{others}")
+
+
+@dataclass(slots=True)
+class _Document:
+    """Plain values of a YAML text, and the line of each by its path."""
+
+    value: Any = None
+    lines: dict[Path, int] = field(default_factory=dict)
+
+
+def _read(text: str) -> _Document:
+    document = _Document()
+    events = yaml.parse(text, Loader=_LOADER)
+    try:
+        for event in events:
+            if isinstance(event, yaml.DocumentStartEvent):
+                if document.lines:
+                    _refuse(event, "a second document begins; expected one")
+                document.value = _node(next(events), events, (), document)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        raise YamlError(f"line {mark.line + 1 if mark else 1}: not valid YAML: {error.problem or error.context}") from None
+    except yaml.YAMLError as error:
+        raise YamlError(f"not valid YAML: {str(error).splitlines()[0]}") from None
+    if not isinstance(document.value, dict):
+        found = "nothing" if document.value is None else _shortened(document.value)
+        raise YamlError(f"line {document.lines.get((), 1)}: found {found}; expected keys with values, like 'part: ...'")
+    return document
+
+
+def _node(event: yaml.Event, events: Iterator[yaml.Event], path: Path, document: _Document) -> Any:
+    """Value of the node that begins with this event."""
+    if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None) is not None:
+        _refuse(event, "anchors (&) and aliases (*) are not supported; write the value out")
+    if getattr(event, "tag", None) not in (None, "!"):
+        _refuse(event, f"the tag {getattr(event, 'tag', '')} is not supported; write the plain value")
+    if len(path) > _DEEPEST:
+        _refuse(event, f"nested more than {_DEEPEST} deep")
+    document.lines.setdefault(path, _line(event))
+    if isinstance(event, yaml.MappingStartEvent):
+        return _mapping(events, path, document)
+    if isinstance(event, yaml.SequenceStartEvent):
+        items: list[Any] = []
+        while not isinstance(event := next(events), yaml.SequenceEndEvent):
+            items.append(_node(event, events, (*path, len(items)), document))
+        return items
+    assert isinstance(event, yaml.ScalarEvent)
+    return None if not event.style and event.value in _NULL else event.value  # a style is a kind of quotes
+
+
+def _mapping(events: Iterator[yaml.Event], path: Path, document: _Document) -> dict[str, Any]:
+    mapping: dict[str, Any] = {}
+    while not isinstance(event := next(events), yaml.MappingEndEvent):
+        if not isinstance(event, yaml.ScalarEvent):
+            _refuse(event, "a key must be a single word")
+        key = str(event.value)
+        if key in mapping:
+            _refuse(event, f"{_dotted((*path, key))} is given twice, first on line {document.lines[(*path, key)]}")
+        document.lines[(*path, key)] = _line(event)
+        mapping[key] = _node(next(events), events, (*path, key), document)
+    return mapping
+
+
+def _line(event: yaml.Event) -> int:
+    return event.start_mark.line + 1 if event.start_mark else 1
+
+
+def _refuse(event: yaml.Event, problem: str) -> NoReturn:
+    raise YamlError(f"line {_line(event)}: {problem}")
+
+
+def _explained(error: ErrorDetails, document: _Document, model: type[BaseModel]) -> tuple[int, str]:
+    """Line and message for one complaint of pydantic's."""
+    path, owner = _place(error["loc"], document, model)
+    line = document.lines.get(path) or document.lines.get(path[:-1]) or 1
+    key, found = _dotted(path), _shortened(error["input"])
+    kind = error["type"]
+    if kind == "extra_forbidden":
+        return line, f"{key} is not a known key;{_did_you_mean(str(path[-1]), _keys(owner))}"
+    if kind == "missing":
+        return line, f"{key} is missing: expected {_meaning(owner, str(path[-1]))}"
+    if kind in ("union_tag_not_found", "union_tag_invalid"):
+        tag = error["input"].get("type") if isinstance(error["input"], dict) else None
+        problem = f"is {_shortened(tag)};" if tag else "is missing;"
+        return document.lines.get((*path, "type"), line), f"{key}.type {problem}{_did_you_mean(str(tag), _tags(owner, path))}"
+    return line, f"{key} is {found}; expected {_allowed(error, owner, path)}"
+
+
+def _allowed(error: ErrorDetails, owner: type[BaseModel] | None, path: Path) -> str:
+    """Say what the model takes at a key, in our words where pydantic speaks of Python."""
+    kind = error["type"]
+    if kind in ("model_type", "model_attributes_type"):
+        known = owner.model_fields.get(str(path[-1])) if owner else None
+        return f"a mapping with {', '.join(_keys(_models(known.annotation)[0]))}" if known else "a mapping"
+    if kind == "float_parsing" and re.fullmatch(r"\s*[+-]?\d+,\d+\s*", str(error["input"])):
+        return "a number, with a decimal point"
+    return _IN_OUR_WORDS.get(kind) or re.sub(r"^(Value error, |Input should be )", "", error["msg"])
+
+
+def _place(location: tuple[str | int, ...], document: _Document, model: type[BaseModel]) -> tuple[Path, type[BaseModel] | None]:
+    """Path in the text of a pydantic location (which also names the chosen type of a union), and the model its last key is in."""
+    path: Path = ()
+    here: Any = model
+    owner: type[BaseModel] | None = model
+    for part in location:
+        chosen = [choice for choice in _models(here) if _tag(choice) == part]
+        if (*path, part) not in document.lines and chosen:
+            here = chosen[0]
+            continue
+        owner = next(iter(_models(here)), None)
+        here = owner.model_fields[str(part)].annotation if owner and str(part) in owner.model_fields else None
+        path = (*path, part)
+    return path, owner
+
+
+def _models(annotation: Any) -> list[type[BaseModel]]:
+    """Find the models in an annotation: itself, or the members of a union."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    if typing.get_origin(annotation) in (typing.Union, types.UnionType, typing.Annotated):
+        return [model for argument in typing.get_args(annotation) for model in _models(argument)]
+    return []
+
+
+def _tag(model: type[BaseModel]) -> str | None:
+    kind = model.model_fields.get("type")
+    return typing.get_args(kind.annotation)[0] if kind else None
+
+
+def _tags(owner: type[BaseModel] | None, path: Path) -> list[str]:
+    """List the values of `type` where one of several models may stand."""
+    known = owner.model_fields.get(str(path[-1])) if owner else None
+    return [tag for model in _models(known.annotation) if (tag := _tag(model))] if known else []
+
+
+def _keys(model: type[BaseModel] | None) -> list[str]:
+    return list(model.model_fields) if model else []
+
+
+def _meaning(model: type[BaseModel] | None, key: str) -> str:
+    known = model.model_fields.get(key) if model else None
+    return known.description if known and known.description else "a value"
+
+
+def _did_you_mean(word: str, allowed: list[str]) -> str:
+    close = difflib.get_close_matches(word, allowed, n=1)
+    return (f" did you mean {close[0]}?" if close else "") + f" Allowed: {', '.join(allowed)}"
+
+
+def _dotted(path: Path) -> str:
+    """Spell a path as device.address or knots[3]."""
+    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".") or "the text"
+
+
+def _shortened(value: Any) -> str:
+    if value is None:
+        return "empty"
+    if isinstance(value, dict):
+        return "a mapping"
+    if isinstance(value, (list, tuple)):
+        return f"a list of {len(value)}"
+    text = str(value)
+    return f"'{text if len(text) <= 40 else text[:37] + '...'}'"
