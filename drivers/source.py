@@ -83,6 +83,11 @@ class Lost:
 
 
 @dataclass(frozen=True, slots=True)
+class Heartbeat:
+    """The device is alive though it has no point to send: a slow scan, not a silent device."""
+
+
+@dataclass(frozen=True, slots=True)
 class LinkDown:
     """The link was lost; the source goes on trying."""
 
@@ -103,7 +108,23 @@ class ScanClosed:
     sent: int | None
 
 
-Arrival = WireBytes | ScanOpened | PointBatch | Damaged | Rejected | Lost | LinkDown | LinkUp | ScanClosed
+Arrival = WireBytes | ScanOpened | PointBatch | Damaged | Rejected | Lost | Heartbeat | LinkDown | LinkUp | ScanClosed
+
+
+class Decoder(Protocol):
+    """A wire format, without any input or output: bytes in, arrivals out.
+
+    The points and counts do not depend on how the bytes were cut. A decoder serves one scan of one device.
+    """
+
+    def request(self) -> bytes:
+        """Return what the host sends each time the link opens; empty for devices that stream by themselves."""
+
+    def feed(self, data: bytes) -> list[Arrival]:
+        """Decode the next bytes; raise `ProtocolError` only when no point of this device could ever be used."""
+
+    def interrupted(self) -> list[Arrival]:
+        """Account for a frame that the end of the link cut off."""
 
 
 class ScanSource(Protocol):

@@ -1,0 +1,67 @@
+"""What a device's running counter says about each frame: new, behind a gap, late or repeated.
+
+Counters wrap; here they are unwrapped. Every number between the first and the last one seen is either received
+or lost, and a number counted as lost that comes late after all is taken back.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+
+GAPS_REMEMBERED = 4096  # bounds the memory; a frame later than that many gaps counts as repeated
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a frame stands. `lost` counts the frames missing before it, and is -1 for a late frame."""
+
+    sequence: int
+    lost: int
+    repeated: bool
+
+
+class SequenceCounter:
+    """Unwraps a counter of the given modulus; the first frame of a scan has number 0."""
+
+    def __init__(self, modulus: int, first: int = 0) -> None:
+        self.modulus = modulus
+        self.expected = first
+        self._gaps: deque[range] = deque(maxlen=GAPS_REMEMBERED)
+
+    def place(self, counter: int, near: int | None = None) -> Place:
+        """Unwrap `counter` to the number closest to `near` (default: the expected one) and account for it."""
+        sequence = self.unwrap(counter, near)
+        ahead = sequence - self.expected
+        if ahead >= 0:
+            self._remember(range(self.expected, sequence))
+            self.expected = sequence + 1
+            return Place(sequence, ahead, repeated=False)
+        if self._fill(sequence):
+            return Place(sequence, -1, repeated=False)
+        return Place(sequence, 0, repeated=True)
+
+    def reach(self, counter: int, near: int | None = None) -> int:
+        """Take the device's word that `counter` is the next number; return how many frames are newly lost."""
+        sequence = self.unwrap(counter, near)
+        lost = max(0, sequence - self.expected)
+        self._remember(range(self.expected, sequence))
+        self.expected = max(self.expected, sequence)
+        return lost
+
+    def unwrap(self, counter: int, near: int | None = None) -> int:
+        """Return the number congruent to `counter` that is closest to `near`."""
+        anchor = self.expected if near is None else near
+        half = self.modulus // 2
+        return anchor + (counter - anchor + half) % self.modulus - half
+
+    def _remember(self, gap: range) -> None:
+        if gap:
+            self._gaps.append(gap)
+
+    def _fill(self, sequence: int) -> bool:
+        for index, gap in enumerate(self._gaps):
+            if sequence in gap:
+                del self._gaps[index]
+                self._remember(range(gap.start, sequence))
+                self._remember(range(sequence + 1, gap.stop))
+                return True
+        return False

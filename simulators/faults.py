@@ -1,0 +1,148 @@
+"""What can go wrong with a device and its line: a catalogue of faults with names, and their injection.
+
+A fault is written `NAME[:VALUE][@POINT]`: from point number POINT on (default: from the start), with VALUE as the
+catalogue says. The same seed gives the same faults.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """One entry of the catalogue: what the value means and what it is if not given; `once` acts at its point only."""
+
+    meaning: str
+    default: float
+    once: bool = False
+
+
+CATALOGUE: Mapping[str, Kind] = MappingProxyType(
+    {
+        "flip": Kind("share of bytes in which one random bit is turned over", 1e-4),
+        "lost-bytes": Kind("share of bytes that vanish", 1e-4),
+        "inserted-bytes": Kind("share of bytes before which a random byte appears", 1e-4),
+        "burst": Kind("number of bytes replaced by random ones", 300, once=True),
+        "lost-frames": Kind("share of points whose frame is not sent", 0.01),
+        "repeated-frames": Kind("share of points whose frame is sent twice", 0.01),
+        "reordered-frames": Kind("share of points whose frame is sent after the following one", 0.01),
+        "invalid": Kind("share of points that the device marks invalid", 0.01),
+        "gap": Kind("number of frames in a row that are not sent", 50, once=True),
+        "stall": Kind("seconds without points, the device being alive", 1.0, once=True),
+        "silence": Kind("seconds without any byte", math.inf, once=True),
+        "unplug": Kind("seconds for which the line is gone", 0.5, once=True),
+        "die": Kind("exit status with which the device ends at once", 9, once=True),
+    }
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """One fault as asked for."""
+
+    name: str
+    value: float
+    at: int
+
+    @classmethod
+    def parse(cls, text: str) -> "Fault":
+        """Read `NAME[:VALUE][@POINT]`."""
+        head, _, at = text.partition("@")
+        name, _, value = head.partition(":")
+        kind = CATALOGUE.get(name)
+        if kind is None:
+            raise ValueError(f"fault {name!r} is none of {', '.join(CATALOGUE)}")
+        try:
+            return cls(name, float(value) if value else kind.default, int(at) if at else 0)
+        except ValueError:
+            raise ValueError(f"fault {text!r}: expected NAME[:VALUE][@POINT] with a number each") from None
+
+
+class Injector:
+    """Lets the faults happen to one scan, and counts what it did."""
+
+    def __init__(self, faults: Sequence[Fault], seed: int) -> None:
+        self._faults = tuple(faults)
+        self._rng = np.random.default_rng(seed)
+        self._held: bytes | None = None
+        self._index = 0
+        self._done: set[Fault] = set()
+        self.tally: Counter[str] = Counter()
+
+    def invalid(self, index: int) -> bool:
+        """Tell whether the device marks this point invalid."""
+        return self._chance("invalid", index)
+
+    def frame(self, index: int, frame: bytes) -> bytes:
+        """Return what of this point's frame, and of one held back before, goes out."""
+        self._index = index
+        if self._chance("lost-frames", index) or self._in_gap(index):
+            return b""
+        if self._held is None and self._chance("reordered-frames", index):
+            self._held = frame
+            return b""
+        return frame * (2 if self._chance("repeated-frames", index) else 1) + self.held()
+
+    def held(self) -> bytes:
+        """Return the frame held back, if any."""
+        frame, self._held = self._held or b"", None
+        return frame
+
+    def event(self, name: str, index: int) -> float | None:
+        """Return the value of a fault that strikes at this point, once."""
+        for fault in self._faults:
+            if fault.name == name and fault.at <= index and fault not in self._done:
+                self._done.add(fault)
+                self.tally[name] += 1
+                return fault.value
+        return None
+
+    def before_next_event(self, index: int, due: int) -> int:
+        """Return `due`, or the point before it at which something is to happen once."""
+        points = [fault.at for fault in self._faults if CATALOGUE[fault.name].once and index < fault.at < due]
+        return min(points, default=due)
+
+    def damage(self, data: bytes) -> bytes:
+        """Return the bytes as the line delivers them."""
+        for name in ("lost-bytes", "inserted-bytes", "flip"):
+            share = self._share(name, self._index)
+            if share and data:
+                data = self._scattered(name, share, data)
+        size = self.event("burst", self._index) if data else None
+        if size is not None:
+            length = min(int(size), len(data))
+            data = self._rng.bytes(length) + data[length:]
+        return data
+
+    def _scattered(self, name: str, share: float, data: bytes) -> bytes:
+        array = np.frombuffer(data, dtype=np.uint8)
+        struck = np.flatnonzero(self._rng.random(len(array)) < share)
+        if not len(struck):
+            return data
+        self.tally[name] += len(struck)
+        if name == "lost-bytes":
+            return np.delete(array, struck).tobytes()
+        if name == "inserted-bytes":
+            return np.insert(array, struck, self._rng.integers(0, 256, len(struck), dtype=np.uint8)).tobytes()
+        flipped = array.copy()
+        flipped[struck] ^= (1 << self._rng.integers(0, 8, len(struck))).astype(np.uint8)
+        return flipped.tobytes()
+
+    def _share(self, name: str, index: int) -> float:
+        return max((fault.value for fault in self._faults if fault.name == name and fault.at <= index), default=0.0)
+
+    def _chance(self, name: str, index: int) -> bool:
+        share = self._share(name, index)
+        struck = share > 0 and self._rng.random() < share
+        self.tally[name] += struck
+        return bool(struck)
+
+    def _in_gap(self, index: int) -> bool:
+        struck = any(fault.name == "gap" and fault.at <= index < fault.at + fault.value for fault in self._faults)
+        self.tally["gap"] += struck
+        return struck

@@ -1,0 +1,150 @@
+"""The line a simulated device is reached on: a pseudo-terminal (POSIX) or a TCP server (any system), one client at a time."""
+
+import os
+import select
+import socket
+import sys
+import time
+from typing import Protocol
+
+POLL_S = 0.02
+
+
+class Line(Protocol):
+    """Bytes to and from the client, if there is one; what is sent without a client is gone, as on a real line."""
+
+    address: str
+
+    def connected(self) -> bool:
+        """Take a new client if one is waiting, and tell whether there is one."""
+
+    def send(self, data: bytes) -> bool:
+        """Send all, waiting while the client is slow; return False if the client is gone."""
+
+    def receive(self, wait_s: float) -> bytes:
+        """Return what the client sent, at the latest after `wait_s`."""
+
+    def unplug(self) -> None:
+        """Let go of the client; it may come again."""
+
+    def close(self) -> None:
+        """Give up the address."""
+
+
+def open_line(address: str) -> Line:
+    """Open `pty` or `host:port` (port 0: any free one)."""
+    if address == "pty":
+        return PtyLine()
+    host, _, port = address.rpartition(":")
+    if not host or not port.isdigit():
+        raise ValueError(f"address {address!r}: expected pty or host:port")
+    return TcpLine(host, int(port))
+
+
+class TcpLine:
+    """A TCP server with one client."""
+
+    def __init__(self, host: str, port: int) -> None:
+        self._server = socket.create_server((host, port), backlog=1)
+        self._client: socket.socket | None = None
+        self.address = f"{host}:{self._server.getsockname()[1]}"
+
+    def connected(self) -> bool:
+        """Take a new client if one is waiting, and tell whether there is one."""
+        if self._client is None and select.select([self._server], [], [], 0)[0]:
+            self._client = self._server.accept()[0]
+            self._client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self._client.setblocking(False)
+        return self._client is not None
+
+    def send(self, data: bytes) -> bool:
+        """Send all, waiting while the client is slow; return False if the client is gone."""
+        view = memoryview(data)
+        while view and self._client is not None:
+            if not select.select([], [self._client], [], POLL_S)[1]:
+                continue
+            try:
+                view = view[self._client.send(view) :]
+            except BlockingIOError:
+                continue
+            except OSError:
+                self.unplug()
+        return self._client is not None
+
+    def receive(self, wait_s: float) -> bytes:
+        """Return what the client sent, at the latest after `wait_s`."""
+        if self._client is None:
+            select.select([self._server], [], [], wait_s)
+            return b""
+        if not select.select([self._client], [], [], wait_s)[0]:
+            return b""
+        try:
+            data = self._client.recv(4096)
+        except OSError:
+            data = b""
+        if not data:
+            self.unplug()
+        return data
+
+    def unplug(self) -> None:
+        """Let go of the client; it may come again."""
+        if self._client is not None:
+            self._client.close()
+            self._client = None
+
+    def close(self) -> None:
+        """Give up the address."""
+        self.unplug()
+        self._server.close()
+
+
+class PtyLine:
+    """A pseudo-terminal; the client opens its name like a serial port."""
+
+    def __init__(self) -> None:
+        if sys.platform == "win32":
+            raise ValueError("pseudo-terminals exist on POSIX systems only; serve host:port instead")
+        import tty  # noqa: PLC0415 - POSIX only
+
+        self._master, slave = os.openpty()
+        tty.setraw(slave)
+        self.address = os.ttyname(slave)
+        os.close(slave)  # so that the master shows whether a client holds the other end
+        os.set_blocking(self._master, False)
+
+    def connected(self) -> bool:
+        """Tell whether a client holds the other end."""
+        poll = select.poll()
+        poll.register(self._master, 0)
+        return not any(event & select.POLLHUP for _, event in poll.poll(0))
+
+    def send(self, data: bytes) -> bool:
+        """Send all, waiting while the client is slow; return False if the client is gone."""
+        view = memoryview(data)
+        while view and self.connected():
+            if not select.select([], [self._master], [], POLL_S)[1]:
+                continue
+            try:
+                view = view[os.write(self._master, view) :]
+            except BlockingIOError:
+                continue
+        return self.connected()
+
+    def receive(self, wait_s: float) -> bytes:
+        """Return what the client sent, at the latest after `wait_s`."""
+        if not self.connected():
+            time.sleep(wait_s)
+            return b""
+        if not select.select([self._master], [], [], wait_s)[0]:
+            return b""
+        try:
+            return os.read(self._master, 4096)
+        except OSError:
+            return b""
+
+    def unplug(self) -> None:
+        """Do nothing: a pseudo-terminal cannot drop its client and keep its name; the line falls silent instead."""
+
+    def close(self) -> None:
+        """Give up the address."""
+        os.close(self._master)

@@ -1,0 +1,244 @@
+"""A simulated scanner that streams lines of text over a pseudo-terminal or TCP; a program of its own.
+
+`python -m simulators.serial_scanner --address pty --path section.csv` prints the address it serves as its first line,
+waits for a client, streams one scan and ends; its last line says, as JSON, how many points it took and which faults
+struck how often.
+"""
+
+import argparse
+import json
+import math
+import sys
+import time
+from binascii import crc_hqx
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .faults import CATALOGUE, Fault, Injector
+from .line import Line, open_line
+from .motion import Motion, Walk, read_path, walk
+
+HEARTBEAT_S = 0.5
+IMPATIENCE_S = 2.0  # a client that says nothing for so long gets the scan all the same
+FAREWELL_S = 10.0  # how long the line stays up for a slow client after the scan
+TICK_S = 0.001
+BURST_POINTS = 64  # largest number of points sent at once when the scan is not paced
+
+
+@dataclass(frozen=True, slots=True)
+class SimulatorSettings:
+    """What a simulated device is told.
+
+    address    `pty` or `host:port`; port 0 takes any free one
+    path_mm    (k, 2) or (k, 3) points of the path on the part
+    paced      send points when they are due by `motion.rate_hz`; otherwise as fast as the client takes them
+    """
+
+    address: str
+    path_mm: NDArray[np.float64]
+    motion: Motion
+    faults: tuple[Fault, ...] = ()
+    paced: bool = True
+
+
+class Device(Protocol):
+    """A wire format as the device speaks it."""
+
+    def opening(self, count: int) -> bytes:
+        """Return what precedes the first point."""
+
+    def frame(self, index: int, time_s: float, point_mm: Sequence[float], invalid: bool) -> bytes:
+        """Return the frame of one point."""
+
+    def heartbeat(self, index: int, time_s: float) -> bytes:
+        """Return the sign of life before point number `index`."""
+
+    def closing(self, count: int) -> bytes:
+        """Return what follows the last point."""
+
+    def answer(self, command: bytes) -> bytes:
+        """Return the reply to bytes from the host."""
+
+    def told_to_begin(self) -> bool:
+        """Tell whether the host has started the scan."""
+
+
+class AsciiDevice:
+    """Lines of text with a checksum each: `P,seq,t_us,x,y,z,flags*CRC`."""
+
+    def __init__(self) -> None:
+        self._heard = b""
+
+    def opening(self, count: int) -> bytes:
+        """Say three times which device begins, so that one damaged line does not cost the scan."""
+        return 3 * _line(f"S,simulated scanner,SIM-0001,mm,{count}")
+
+    def frame(self, index: int, time_s: float, point_mm: Sequence[float], invalid: bool) -> bytes:
+        """Return one P line."""
+        x, y, z = point_mm
+        return _line(f"P,{index % 2**32},{round(time_s * 1e6) % 2**32},{x:.6f},{y:.6f},{z:.6f},{int(invalid)}")
+
+    def heartbeat(self, index: int, time_s: float) -> bytes:
+        """Return one H line."""
+        return _line(f"H,{index % 2**32},{round(time_s * 1e6) % 2**32}")
+
+    def closing(self, count: int) -> bytes:
+        """Say three times how many points were sent."""
+        return 3 * _line(f"E,{count}")
+
+    def answer(self, command: bytes) -> bytes:
+        """Listen for a line `G`."""
+        self._heard = (self._heard + command)[-16:]
+        return b""
+
+    def told_to_begin(self) -> bool:
+        """Tell whether the host sent `G`."""
+        return b"G" in self._heard
+
+
+def _line(text: str) -> bytes:
+    body = text.encode("ascii")
+    return b"%b*%04X\r\n" % (body, crc_hqx(body, 0xFFFF))
+
+
+def serve(settings: SimulatorSettings, announce: Callable[[str], None]) -> None:
+    """Serve one scan of the line format; `announce` gets the address, and at the end the tally as JSON."""
+    stream(settings, AsciiDevice(), announce)
+
+
+def stream(settings: SimulatorSettings, device: Device, announce: Callable[[str], None]) -> None:
+    """Serve one scan of any streaming device."""
+    scan = walk(settings.path_mm, settings.motion)
+    injector = Injector(settings.faults, settings.motion.seed)
+    line = open_line(settings.address)
+    try:
+        announce(line.address)
+        _Scan(line, device, scan, injector, settings.paced).run()
+        announce(json.dumps({"points": len(scan.time_s), **injector.tally}))
+        _wait_for_farewell(line)
+    finally:
+        line.close()
+
+
+class _Scan:
+    """One scan being streamed."""
+
+    def __init__(self, line: Line, device: Device, scan: Walk, injector: Injector, paced: bool) -> None:
+        self._line, self._device, self._scan, self._injector, self._paced = line, device, scan, injector, paced
+
+    def run(self) -> None:
+        self._wait_for_client()
+        count = len(self._scan.time_s)
+        self._send(self._device.opening(count))
+        start_s, index = time.monotonic(), 0
+        while index < count:
+            paused_s = self._trouble(index)
+            start_s += paused_s
+            due = self._due(time.monotonic() - start_s, index)
+            self._send(b"".join(map(self._frame, range(index, due))))
+            index = due
+            self._listen(TICK_S if self._paced else 0.0)
+        self._send(self._injector.held() + self._device.closing(count))
+
+    def _due(self, elapsed_s: float, index: int) -> int:
+        """Return the number of points taken by now, ending at the next point at which a fault is to strike."""
+        times = self._scan.time_s
+        due = int(np.searchsorted(times, elapsed_s, side="right")) if self._paced else index + BURST_POINTS
+        return self._injector.before_next_event(index, min(max(due, index), len(times)))
+
+    def _frame(self, index: int) -> bytes:
+        point = self._scan.points_mm[index].tolist()
+        frame = self._device.frame(index, float(self._scan.time_s[index]), point, self._injector.invalid(index))
+        return self._injector.frame(index, frame)
+
+    def _send(self, data: bytes) -> None:
+        if data:
+            self._line.connected()
+            self._line.send(self._injector.damage(data))
+
+    def _trouble(self, index: int) -> float:
+        """Let the faults of this point happen; return for how long the scan stood still."""
+        began_s = time.monotonic()
+        status = self._injector.event("die", index)
+        if status is not None:
+            sys.stdout.flush()
+            raise SystemExit(int(status))
+        stall_s = self._injector.event("stall", index)
+        if stall_s is not None:
+            self._pause(stall_s, index, alive=True)
+        silence_s = self._injector.event("silence", index)
+        if silence_s is not None:
+            self._pause(silence_s, index, alive=False)
+        away_s = self._injector.event("unplug", index)
+        if away_s is not None:
+            self._line.unplug()
+            self._pause(away_s, index, alive=False)
+        return time.monotonic() - began_s
+
+    def _pause(self, seconds: float, index: int, *, alive: bool) -> None:
+        end_s = time.monotonic() + seconds
+        next_beat_s = time.monotonic()
+        while (now_s := time.monotonic()) < end_s:
+            if alive and now_s >= next_beat_s:
+                self._send(self._device.heartbeat(index, float(self._scan.time_s[index])))
+                next_beat_s += HEARTBEAT_S
+            self._line.receive(min(0.02, end_s - now_s))
+
+    def _listen(self, wait_s: float) -> None:
+        command = self._line.receive(wait_s)
+        if command:
+            self._line.send(self._device.answer(command))
+
+    def _wait_for_client(self) -> None:
+        begin_s = math.inf
+        while not self._device.told_to_begin() and time.monotonic() < begin_s:
+            if not self._line.connected():
+                begin_s = math.inf
+            elif begin_s == math.inf:
+                begin_s = time.monotonic() + IMPATIENCE_S
+            self._listen(0.02)
+
+
+def _wait_for_farewell(line: Line) -> None:
+    """Keep the line up until the client has gone, so that the last bytes are not lost with it."""
+    end_s = time.monotonic() + FAREWELL_S
+    while line.connected() and time.monotonic() < end_s:
+        line.receive(0.02)
+
+
+def settings_from(arguments: Sequence[str]) -> SimulatorSettings:
+    """Read the settings from command-line arguments."""
+    parser = argparse.ArgumentParser(description="A simulated device; faults: " + ", ".join(CATALOGUE))
+    parser.add_argument("--address", required=True, help="pty or host:port")
+    parser.add_argument("--path", required=True, type=Path, help="points of the path on the part, mm")
+    parser.add_argument("--fault", action="append", default=[], type=Fault.parse, metavar="NAME[:VALUE][@POINT]")
+    parser.add_argument("--unpaced", action="store_true", help="as fast as the client takes the points")
+    parser.add_argument("--rate", dest="rate_hz", type=float, default=1000.0, help="points per second")
+    parser.add_argument("--speed", dest="speed_mm_s", type=float, default=50.0, help="mm per second along the path")
+    parser.add_argument("--open", dest="closed", action="store_false", help="the path is open")
+    parser.add_argument("--backward", action="store_true")
+    for name, kind in (("count", int), ("seed", int), ("form_error_mm", float), ("noise_mm", float), ("tip_radius_mm", float)):
+        parser.add_argument("--" + name.replace("_", "-"), type=kind)
+    for name in ("defect_mm", "defect_station_mm", "rotation_deg", "start_mm"):
+        parser.add_argument("--" + name.replace("_", "-"), type=float)
+    parser.add_argument("--translation-mm", type=float, nargs=3)
+    given = {name: value for name, value in vars(parser.parse_args(arguments)).items() if value is not None}
+    if "translation_mm" in given:
+        given["translation_mm"] = tuple(given["translation_mm"])
+    motion = Motion(**{field.name: given[field.name] for field in fields(Motion) if field.name in given})
+    return SimulatorSettings(given["address"], read_path(given["path"]), motion, tuple(given["fault"]), not given["unpaced"])
+
+
+def say(text: str) -> None:
+    """Write one line for the parent process to read at once."""
+    sys.stdout.write(text + "\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    serve(settings_from(sys.argv[1:]), say)
