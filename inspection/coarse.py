@@ -98,13 +98,13 @@ def tuned_on_dominant_points(points_mm: Array, pose: RigidTransform, nominal: No
 
 def mean_square(points_mm: Array, pose: RigidTransform, nominal: NominalProfile) -> float:
     """Mean square distance to the nearest samples, mm^2 (the paper's MSD)."""
-    return float((nominal.tree.query(pose.apply(points_mm))[0] ** 2).mean())
+    return float(np.mean(np.square(nominal.tree.query(pose.apply(points_mm))[0])))
 
 
 def trimmed_mean_square(points_mm: Array, pose: RigidTransform, nominal: NominalProfile) -> float:
     """Mean square distance of the nearer 80 % of at most 500 points, so that outliers do not choose the pose."""
     few = points_mm[:: max(1, len(points_mm) // _SCORED_POINTS)]
-    distance = np.sort(np.asarray(nominal.tree.query(pose.apply(few))[0]))
+    distance = np.sort(np.atleast_1d(nominal.tree.query(pose.apply(few))[0]))
     return float((distance[: max(1, int(0.8 * len(distance)))] ** 2).mean())
 
 
@@ -161,7 +161,7 @@ def _without_spikes(points_mm: Array) -> Array:
         return points_mm
     padded = np.vstack([np.repeat(points_mm[:1], 3, axis=0), points_mm, np.repeat(points_mm[-1:], 3, axis=0)])
     off = np.hypot(*(points_mm - np.median(sliding_window_view(padded, 7, axis=0), axis=2)).T)
-    return points_mm[off <= 6 * np.median(off) + 1e-12]
+    return np.asarray(points_mm[off <= 6 * np.median(off) + 1e-12])
 
 
 def _even_walk(points_mm: Array, step: float) -> Array:

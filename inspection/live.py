@@ -364,7 +364,7 @@ class _PoseTrack:
         self._sum_square += float(e @ e)
         self._count += len(e)
         self._mark(rows.station[judged])
-        self._motion = -np.linalg.lstsq(self._normal, self._right, rcond=1e-12)[0]
+        self._motion = np.asarray(-np.linalg.lstsq(self._normal, self._right, rcond=1e-12)[0], dtype=np.float64)
         self.pose = about(self._centre, self._motion[2], self._motion[:2]).after(self._start)
         self.registration = replace(self.registration, nominal_from_section=self.pose)
 
