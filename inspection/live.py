@@ -279,7 +279,7 @@ class LiveInspection:
             complete,
             self._zone,
             registration,
-            "datum" if self._datum is not None and self._fit != "none" else self._fit,
+            "none" if self._datum is not None else self._fit,
             self._method,
             stretches(station, deviation, verdicts, self._zone, self._nominal.curve.closed),
         )

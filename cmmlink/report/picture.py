@@ -1,0 +1,104 @@
+"""The picture of a judged profile: magnified deviation whiskers on the nominal, and deviation against station.
+
+State is told by place and mark as well as by colour: a triangle up is above the zone, one down below it.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from inspection import InspectionResult, NominalProfile, Verdict
+
+Array = NDArray[np.float64]
+
+_NOMINAL, _BAND, _GOOD, _ABOVE, _BELOW = "#3a3f45", "#dfe7ee", "#2a7fa5", "#c2410c", "#6d28d9"
+_WORDS = {Verdict.CONFORM: "CONFORM", Verdict.UNCERTAIN: "NOT PROVEN", Verdict.NONCONFORM: "NOT CONFORM"}
+_BAND_SHARE = 0.06  # of the part's size: how wide the magnified tolerance band is drawn
+_MOST_WHISKERS = 1500
+
+
+def write_picture(result: InspectionResult, nominal: NominalProfile, title: str, path: Path) -> None:
+    """Draw the profile and the strip of deviations to a PNG file."""
+    figure = Figure(figsize=(12, 8), dpi=110, layout="constrained")
+    profile, strip = figure.subplots(2, 1, height_ratios=[3, 2])
+    _draw_profile(profile, result, nominal)
+    _draw_strip(strip, result, nominal)
+    figure.suptitle(f"{title}    {_WORDS[result.verdict]}", fontsize=15, fontweight="bold")
+    figure.savefig(path)
+
+
+def magnification(result: InspectionResult, nominal: NominalProfile) -> float:
+    """A round factor (1, 2 or 5 times a power of ten) that draws the tolerance band about 6 % of the part wide."""
+    width = result.zone.upper_mm - result.zone.lower_mm
+    wanted = _BAND_SHARE * float(np.hypot(*np.ptp(nominal.points_mm, axis=0))) / width
+    power = 10.0 ** np.floor(np.log10(wanted))
+    return float(max(step * power for step in (1, 2, 5) if step * power <= wanted))
+
+
+def _draw_profile(axes: Axes, result: InspectionResult, nominal: NominalProfile) -> None:
+    factor = magnification(result, nominal)
+    outward = nominal.outward * nominal.normal
+    points = _loop(nominal.points_mm, nominal)
+    zone = result.zone
+    edges = [_loop(nominal.points_mm + factor * limit * outward, nominal) for limit in (zone.lower_mm, zone.upper_mm)]
+    axes.fill(*np.vstack([edges[0], edges[1][::-1]]).T, color=_BAND, lw=0)
+    axes.plot(*points.T, color=_NOMINAL, lw=1.0)
+    shown = _shown(result)
+    tips = result.foot_mm[shown] + factor * (result.actual_mm - result.foot_mm)[shown]
+    axes.add_collection(
+        LineCollection(list(np.stack([result.foot_mm[shown], tips], axis=1)), colors=_colours(result, shown), linewidths=0.7)
+    )
+    _mark_worst(axes, result, factor)
+    axes.set_aspect("equal")
+    axes.autoscale_view()
+    axes.set(xlabel="x (mm)", ylabel="y (mm)", title=f"deviations magnified {factor:g} times, tolerance band shaded")
+
+
+def _draw_strip(axes: Axes, result: InspectionResult, nominal: NominalProfile) -> None:
+    zone = result.zone
+    axes.axhspan(zone.lower_mm, zone.upper_mm, color=_BAND, lw=0)
+    if zone.uncertainty_mm > 0:
+        for limit in (zone.lower_mm + zone.uncertainty_mm, zone.upper_mm - zone.uncertainty_mm):
+            axes.axhline(limit, color=_NOMINAL, lw=0.8, ls=":")
+    axes.axhline(0, color=_NOMINAL, lw=0.8)
+    above, below = result.deviation_mm > zone.upper_mm, result.deviation_mm < zone.lower_mm
+    inside = ~above & ~below & np.isfinite(result.deviation_mm)
+    for chosen, colour, mark, size in ((inside, _GOOD, ".", 4.0), (above, _ABOVE, "^", 16.0), (below, _BELOW, "v", 16.0)):
+        axes.scatter(result.station_mm[chosen], result.deviation_mm[chosen], s=size, c=colour, marker=mark, lw=0)
+    index = result.worst
+    if index is not None:
+        text = f"worst {result.deviation_mm[index]:+.4f} mm at station {result.station_mm[index]:.2f} mm"
+        axes.annotate(text, (result.station_mm[index], result.deviation_mm[index]), (0, 8), textcoords="offset points", ha="center")
+    axes.margins(y=0.2)
+    axes.set(xlim=(0, nominal.length_mm), xlabel="station (mm)", ylabel="deviation (mm)")
+    facts = f"coverage {result.coverage:.1%}   fit {result.fit}   method {result.method}   out of tolerance {result.out_of_tolerance}"
+    axes.set_title(facts, fontsize=10)
+
+
+def _mark_worst(axes: Axes, result: InspectionResult, factor: float) -> None:
+    index = result.worst
+    if index is not None:
+        tip = result.foot_mm[index] + factor * (result.actual_mm[index] - result.foot_mm[index])
+        axes.plot(*tip, "o", ms=9, mfc="none", mec=_ABOVE, mew=1.5)
+
+
+def _shown(result: InspectionResult) -> NDArray[np.int64]:
+    """Judged points thinned to what can be told apart, those out of tolerance and the worst always among them."""
+    judged = np.flatnonzero(np.isfinite(result.deviation_mm))
+    kept = judged[:: max(1, len(judged) // _MOST_WHISKERS)]
+    out = np.flatnonzero(result.verdicts == Verdict.NONCONFORM)
+    worst = [] if result.worst is None else [result.worst]
+    return np.unique(np.concatenate([kept, out, worst]).astype(np.int64))
+
+
+def _colours(result: InspectionResult, rows: NDArray[np.int64]) -> list[str]:
+    deviation, zone = result.deviation_mm[rows], result.zone
+    return [_ABOVE if d > zone.upper_mm else _BELOW if d < zone.lower_mm else _GOOD for d in deviation]
+
+
+def _loop(points: Array, nominal: NominalProfile) -> Array:
+    return np.vstack([points, points[:1]]) if nominal.curve.closed else points

@@ -1,0 +1,86 @@
+"""The result as the JSON object of `--json` and `result.json`: stable keys, numbers or null."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from cmmlink.events import Counts
+from inspection import InspectionResult, Registration, Verdict
+
+
+def summary(result: InspectionResult | None, counts: Counts) -> dict[str, Any]:
+    """Keys as the command line promises; a run without a result has its counts, verdict uncertain and nulls."""
+    head = {"received": counts.received, "judged": counts.judged, "rejected": counts.rejected, "lost": counts.lost}
+    tail = {"rejected_by_reason": dict(counts.rejected_by_reason), "damaged_bytes": counts.damaged_bytes}
+    if result is None:
+        return {"verdict": Verdict.UNCERTAIN.word, **head, **_NOTHING, **tail}
+    return {
+        "verdict": result.verdict.word,
+        **head,
+        "out_of_tolerance": result.out_of_tolerance,
+        "max_deviation_mm": number(result.max_deviation_mm),
+        "min_deviation_mm": number(result.min_deviation_mm),
+        "rms_mm": number(result.rms_mm),
+        "profile_error_mm": number(result.profile_error_mm),
+        "worst": _worst(result),
+        "fit": result.fit,
+        "method": result.method,
+        "registration": _registration(result.registration),
+        "stretches": [{"from_mm": s.from_mm, "to_mm": s.to_mm, "worst_mm": s.worst_mm} for s in result.stretches],
+        "coverage": result.coverage,
+        "complete": result.complete,
+        "tolerance": {
+            "lower_mm": result.zone.lower_mm,
+            "upper_mm": result.zone.upper_mm,
+            "uncertainty_mm": result.zone.uncertainty_mm,
+        },
+        **tail,
+    }
+
+
+_NOTHING: Mapping[str, Any] = {
+    "out_of_tolerance": 0,
+    "max_deviation_mm": None,
+    "min_deviation_mm": None,
+    "rms_mm": None,
+    "profile_error_mm": None,
+    "worst": None,
+    "fit": None,
+    "method": None,
+    "registration": None,
+    "stretches": [],
+    "coverage": 0.0,
+    "complete": False,
+    "tolerance": None,
+}
+
+
+def number(value: float) -> float | None:
+    """A number as JSON can hold it: null for what is not finite."""
+    return float(value) if math.isfinite(value) else None
+
+
+def _worst(result: InspectionResult) -> dict[str, float] | None:
+    index = result.worst
+    if index is None:
+        return None
+    return {
+        "station_mm": float(result.station_mm[index]),
+        "x_mm": float(result.actual_mm[index, 0]),
+        "y_mm": float(result.actual_mm[index, 1]),
+        "deviation_mm": float(result.deviation_mm[index]),
+    }
+
+
+def _registration(registration: Registration) -> dict[str, Any]:
+    pose = registration.nominal_from_section
+    return {
+        "rotation_deg": math.degrees(pose.rotation_rad),
+        "translation_mm": [float(value) for value in pose.translation_mm],
+        "iterations": registration.iterations,
+        "converged": registration.converged,
+        "other_poses": [
+            {"rotation_deg": math.degrees(rival.rotation_rad), "translation_mm": [float(value) for value in rival.translation_mm]}
+            for rival in registration.rivals
+        ],
+    }
