@@ -1,0 +1,100 @@
+"""Nominal profiles from files: one file per format.
+
+A format is a module of this package with two names, found by looking through the package, so that a new format is a new
+file and nothing else:
+
+    SUFFIXES : tuple[str, ...]                                                    lower case, with the dot
+    def read(text: str, scale: float, closed: bool | None) -> NominalFile         raises NominalError, naming the line
+"""
+
+import importlib
+import pkgutil
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, Protocol, cast
+
+import numpy as np
+
+from cmmlink.errors import YamlError
+from drivers.errors import PointFileError
+from drivers.point_file import read_text
+from inspection.curve import NurbsCurve
+from inspection.errors import NominalError
+
+_ALMOST_CLOSED = 0.05  # a gap below this fraction of the length still tells inside from outside: a blunt trailing edge
+
+
+@dataclass(frozen=True, slots=True)
+class NominalFile:
+    """A nominal profile as its file was understood.
+
+    curve         : in mm
+    source_format : the name of the format, like "uiuc-selig"
+    notes         : what was assumed or left out, for the reader of the file
+    """
+
+    curve: NurbsCurve
+    source_format: str
+    notes: tuple[str, ...]
+
+
+class NominalFormat(Protocol):
+    """What a module of this package offers."""
+
+    SUFFIXES: tuple[str, ...]
+
+    def read(self, text: str, scale: float, closed: bool | None) -> NominalFile:
+        """Understand the text of a file."""
+
+
+def load_nominal(path: Path, scale: float = 1.0, closed: bool | None = None) -> NominalFile:
+    """Read a nominal profile; the suffix of the file says its format.
+
+    scale  : turns the file's unit into mm (the chord, for airfoils in chord units)
+    closed : True joins the end to the beginning, False keeps the curve open, None follows the file
+
+    Raises NominalError: file, line, what was found, what is expected.
+    """
+    if not (np.isfinite(scale) and scale > 0):
+        raise NominalError(f"the scale must be a positive number, not {scale:g}")
+    reader = _format_of(path)
+    try:
+        text = read_text(path)
+    except PointFileError as error:
+        raise NominalError(str(error)) from None
+    try:
+        return reader.read(text, scale, closed)
+    except (PointFileError, YamlError, NominalError) as error:
+        raise NominalError(f"{path}: {error}") from None
+
+
+def known_suffixes() -> list[str]:
+    """Suffixes of all formats, sorted."""
+    return sorted(suffix for reader in _formats() for suffix in reader.SUFFIXES)
+
+
+def material_side(curve: NurbsCurve) -> Literal["left", "right"] | None:
+    """Side of the direction of travel on which the inside of the profile lies; None for a curve too open to have one."""
+    start, end = curve.domain
+    points = curve.point(np.linspace(start, end, 2001))
+    gap = float(np.hypot(*(points[-1] - points[0])))
+    if not curve.closed and gap > _ALMOST_CLOSED * curve.length_mm:
+        return None
+    x, y = (points - points[0]).T
+    return "left" if float((x[:-1] * y[1:] - x[1:] * y[:-1]).sum()) > 0 else "right"
+
+
+def _formats() -> Iterator[NominalFormat]:
+    for found in pkgutil.iter_modules(__path__):
+        module = importlib.import_module(f"{__name__}.{found.name}")
+        if hasattr(module, "SUFFIXES"):
+            yield cast(NominalFormat, module)
+
+
+def _format_of(path: Path) -> NominalFormat:
+    suffix = path.suffix.lower()
+    for reader in _formats():
+        if suffix in reader.SUFFIXES:
+            return reader
+    raise NominalError(f"{path}: no nominal file is known by the suffix '{suffix}'; expected one of {', '.join(known_suffixes())}")

@@ -1,0 +1,76 @@
+"""A NURBS curve spelt out in YAML: degree, knots, control_points_mm, and perhaps weights and closed.
+
+The one format of ours that loses nothing: numbers are written so that they read back to the same bits.
+"""
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from cmmlink.nominal_files import NominalFile
+from cmmlink.yaml_model import read_model
+from inspection.curve import NurbsCurve
+from inspection.errors import NominalError
+
+SUFFIXES = (".yaml", ".yml")
+
+Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]  # mm: beyond a kilometre the unit or the scale is wrong
+
+_SAME_END = 1e-9  # of the size: the gap up to which a curve ends where it begins
+_RESOLVED = 1e-6  # of the distance from the origin: a smaller curve drowns in round-off
+
+
+class _Curve(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    degree: int = Field(ge=1, le=15, description="the degree, a whole number like 3")
+    knots: list[Annotated[float, Field(ge=-1e9, le=1e9)]] = Field(description="the list of knots: one more than control points plus degree")
+    control_points_mm: list[tuple[Coordinate, Coordinate]] = Field(min_length=2, description="the list of control points [x, y]")
+    weights: list[Annotated[float, Field(ge=1e-6, le=1e6)]] | None = None
+    closed: bool | None = None
+
+
+def read(text: str, scale: float, closed: bool | None) -> NominalFile:
+    """Take the curve as it stands. `closed` None: as the file says, else whether it ends where it begins."""
+    given = read_model(text, _Curve)
+    points = np.array(given.control_points_mm) * scale
+    _require_size(points)
+    weights = None if given.weights is None else np.array(given.weights)
+    knots = np.array(given.knots)
+    said = given.closed if closed is None else closed
+    curve = NurbsCurve(given.degree, points, knots, weights, closed=bool(said))
+    if said is None and _ends_where_it_begins(curve):
+        curve = NurbsCurve(given.degree, points, knots, weights, closed=True)
+        return NominalFile(curve, "nurbs-yaml", ("closed: the curve ends where it begins",))
+    if closed is None or given.closed in (None, closed):
+        return NominalFile(curve, "nurbs-yaml", ())
+    return NominalFile(curve, "nurbs-yaml", (f"{'closed' if closed else 'open'}, as asked, against what the file says",))
+
+
+def save_nurbs_yaml(curve: NurbsCurve, path: Path) -> None:
+    """Write a curve so that `load_nominal` gives the same curve back, bit for bit."""
+    weights = curve.weights
+    content = {
+        "degree": curve.degree,
+        "closed": curve.closed,
+        "knots": [float(knot) for knot in curve.knots],
+        "control_points_mm": [[float(x), float(y)] for x, y in curve.control_points_mm],
+        "weights": None if weights is None or np.all(weights == 1.0) else [float(weight) for weight in weights],
+    }
+    path.write_text(yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=120), encoding="utf-8", newline="\n")
+
+
+def _require_size(points: NDArray[np.float64]) -> None:
+    size, farthest = float(np.ptp(points, axis=0).max()), float(np.abs(points).max())
+    if not (size > 0 and size >= _RESOLVED * farthest and 1e-6 <= farthest <= 1e6):
+        found = f"the control points lie within {size:g} mm, up to {farthest:g} mm from the origin"
+        raise NominalError(f"{found}; expected a profile in mm: give the scale")
+
+
+def _ends_where_it_begins(curve: NurbsCurve) -> bool:
+    first, last = curve.point(np.array(curve.domain))
+    return bool(np.hypot(*(last - first)) <= _SAME_END * np.ptp(curve.control_points_mm, axis=0).max())
