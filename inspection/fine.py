@@ -26,7 +26,7 @@ _MOST_STEPS = 60
 _ICP_MOST_STEPS = 2000
 _ICP_TOLERANCE = 1e-6  # relative change of the mean square; the paper states none
 _HALVINGS = 12
-_FREE = 1e-10  # eigenvalues of the normal matrix below this share of the largest leave a motion undetermined
+_FREE = 1e-9  # a motion whose eigenvalue is below this share of the largest changes no deviation: it is undetermined
 _SCOUTS = 400  # points that rank coarse poses
 _EQUAL_RMS = 1.1  # rivals whose rms is within this factor of the best fit as well
 _SAME_POSE = 0.01  # of the part's size: poses closer than this are one
@@ -104,7 +104,7 @@ def _gauss_newton(points: Array, nominal: NominalProfile, pose: RigidTransform, 
     converged = False
     for iteration in range(1, _MOST_STEPS + 1):  # noqa: B007 - the count is part of the result
         centre, step = newton_step(moved, d, nominal, tip_radius_mm)
-        reach = np.hypot(*(moved - centre).T).max()
+        reach = _reach(moved - centre)
         best = _mean_square(d)
         for _ in range(_HALVINGS):
             motion = about(centre, step[2], step[:2])
@@ -136,7 +136,11 @@ def newton_step(points: Array, d: Deviations, nominal: NominalProfile, tip_radiu
     tangential = rows.T @ rows
     full = tangential + _second_derivative(arm, e, g, _level_curvature(d, nominal, tip_radius_mm)[used])
     positive = np.linalg.eigvalsh(full)[0] > 0.1 * np.linalg.eigvalsh(tangential)[0]
-    return centre, -_solve(full if positive else tangential, slope)
+    reach = _reach(arm)
+    values, vectors = _motions(full if positive else tangential, reach)
+    known = values > _FREE * values[-1]
+    share = np.where(known, vectors.T @ (slope / [1, 1, reach]) / np.where(known, values, 1.0), 0.0)
+    return centre, -(vectors @ share) / [1, 1, reach]
 
 
 def _second_derivative(arm: Array, e: Array, g: Array, bend: Array) -> Array:
@@ -156,12 +160,15 @@ def _level_curvature(d: Deviations, nominal: NominalProfile, tip_radius_mm: floa
     return np.where(d.at_vertex, 1.0 / np.where(np.abs(distance) > 1e-9, distance, np.inf), across)
 
 
-def _solve(matrix: Array, slope: Array) -> Array:
-    """Least-norm solution with undetermined motions left at zero, scaled so that mm and rad weigh alike."""
-    scale = np.sqrt(np.maximum(np.diag(matrix), np.finfo(float).tiny))
+def _motions(matrix: Array, reach: float) -> tuple[Array, Array]:
+    """Rising eigenvalues and eigenvectors of a normal matrix, its rotation counted in mm at the farthest point."""
+    scale = np.array([1.0, 1.0, reach])
     values, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
-    kept = values > _FREE * values[-1]
-    return np.asarray(vectors[:, kept] @ ((vectors[:, kept].T @ (slope / scale)) / values[kept]) / scale)
+    return values, vectors
+
+
+def _reach(arm: Array) -> float:
+    return max(float(np.hypot(arm[:, 0], arm[:, 1]).max(initial=0.0)), 1e-9)
 
 
 def _icp(points: Array, nominal: NominalProfile, pose: RigidTransform, method: Method, tip_radius_mm: float) -> Registration:
@@ -192,5 +199,11 @@ def _registration(pose: RigidTransform, moved: Array, d: Deviations, iterations:
     centre = x.mean(axis=0) if len(x) else np.zeros(2)
     arm = x - centre
     rows = np.column_stack([g, arm[:, 0] * g[:, 1] - arm[:, 1] * g[:, 0]])
-    covariance = np.linalg.pinv(rows.T @ rows, hermitian=True) * mean_square * len(x) / max(len(x) - 3, 1)
+    reach = _reach(arm)
+    values, vectors = _motions(rows.T @ rows, reach)
+    known = values > _FREE * values[-1]
+    scatter = mean_square * len(x) / max(len(x) - 3, 1)
+    variances = np.where(known, scatter / np.where(known, values, 1.0), reach**2)
+    spread = vectors / np.array([1, 1, reach])[:, None]
+    covariance = (spread * variances) @ spread.T
     return Registration(pose, float(np.sqrt(mean_square)), iterations, converged, covariance, centre, (), np.zeros(len(moved), dtype=bool))

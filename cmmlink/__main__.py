@@ -1,0 +1,5 @@
+"""`python -m cmmlink` is the command `cmmlink`."""
+
+from cmmlink.cli import main
+
+main()

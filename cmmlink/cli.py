@@ -1,0 +1,358 @@
+"""The commands; the one place where parts are chosen and joined, and where errors become exit codes.
+
+0 conform, 1 nonconform, 3 uncertain; 2 unusable input or plan, 4 device or link failure, 5 the record could not be kept.
+"""
+
+import json
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import click
+import typer
+from rich.console import Console
+
+from cmmlink.demo import DEMO_PLAN, actual_path
+from cmmlink.errors import PlanError, StoreError
+from cmmlink.events import RunStarted, Sink
+from cmmlink.nominal_files import NominalFile, load_nominal, material_side
+from cmmlink.parts import planned_inspection, planned_profile, profile_of
+from cmmlink.pipeline import RunOutcome, run_inspection
+from cmmlink.plan import FileDevice, Plan, load_plan
+from cmmlink.report.folder import write_results
+from cmmlink.report.summary import summary
+from cmmlink.terminal import LiveTable, print_summary
+from drivers.ascii_frames import AsciiDecoder
+from drivers.errors import DeviceError, LinkError, PointFileError
+from drivers.point_file import PointFileSource
+from drivers.serial_scanner import SerialScanner, ports
+from drivers.source import ScanSource
+from inspection import InspectionError, LiveInspection, NominalProfile, ToleranceZone, Verdict
+
+app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help="Inspect profiles while they are scanned.")
+
+_EXIT = {Verdict.CONFORM: 0, Verdict.NONCONFORM: 1, Verdict.UNCERTAIN: 3}
+_UNUSABLE, _DEVICE_FAILED, _NO_RECORD = 2, 4, 5
+_BUFFER_POINTS = 500_000
+_SIMULATOR_STARTS_S = 20.0
+_DEMO_RATE_HZ, _DEMO_POINTS = 2000, 4000
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of words.")]
+Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for deviations.csv, result.json and profile.png.")]
+Headless = Annotated[bool, typer.Option("--headless", help="No page, no live table.")]
+
+
+class Side(StrEnum):
+    """Side of the direction of travel."""
+
+    LEFT = "left"
+    RIGHT = "right"
+
+
+class FitName(StrEnum):
+    """How points come onto the nominal."""
+
+    BEST_FIT = "best-fit"
+    MINIMUM_ZONE = "minimum-zone"
+    NONE = "none"
+
+
+class MethodName(StrEnum):
+    """How deviations are found."""
+
+    EXACT = "exact"
+    CIRCLE = "circle"
+    CHORD = "chord"
+    PCP = "pcp"
+    VEAW = "veaw"
+    INVERSION = "inversion"
+
+
+@dataclass(frozen=True, slots=True)
+class Telling:
+    """How a command tells what it found."""
+
+    headless: bool
+    as_json: bool
+    out: Path | None
+
+
+def main() -> None:
+    """Run the command line; every error a user can cause ends as one message and an exit code."""
+    try:
+        code = app(standalone_mode=False)
+    except click.ClickException as error:
+        error.show()
+        code = error.exit_code
+    except click.Abort:
+        code = _fail("aborted", 130)
+    except (PlanError, InspectionError, PointFileError) as error:
+        code = _fail(str(error), _UNUSABLE)
+    except DeviceError as error:
+        code = _fail(str(error), _DEVICE_FAILED)
+    except StoreError as error:
+        code = _fail(str(error), _NO_RECORD)
+    sys.exit(code or 0)
+
+
+def _fail(message: str, code: int) -> int:
+    sys.stderr.write(f"cmmlink: {message}\n")
+    return code
+
+
+@app.command()
+def demo(
+    headless: Headless = False,
+    seed: Annotated[int, typer.Option(min=0, help="Another seed is another part.")] = 1,
+    defect: Annotated[str | None, typer.Option(metavar="MM@STATION", help="A local defect, like 0.12@40.")] = None,
+    out: Out = Path("demo-result"),
+    as_json: Json = False,
+) -> int:
+    """Run the whole chain on a simulated device, no set-up."""
+    plan = load_plan(DEMO_PLAN)
+    profile = planned_profile(plan)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "path.csv"
+        actual_path(profile, path)
+        arguments = ["--path", str(path), *_demo_motion(plan, profile, seed, defect)]
+        with _simulator("serial", arguments) as address:
+            return _run(plan.with_address(address), profile, Telling(headless, as_json, out), simulated=True)
+
+
+def _demo_motion(plan: Plan, profile: NominalProfile, seed: int, defect: str | None) -> list[str]:
+    """Arguments of the simulator: form error and noise well inside the tolerance, an arbitrary pose on the table."""
+    zone = plan.tolerance.zone
+    speed = profile.length_mm * _DEMO_RATE_HZ / _DEMO_POINTS
+    motion = {
+        "rate": _DEMO_RATE_HZ,
+        "speed": speed,
+        "count": _DEMO_POINTS,
+        "seed": seed,
+        "form-error-mm": 0.4 * zone.upper_mm,
+        "noise-mm": 0.04 * zone.upper_mm,
+        "tip-radius-mm": plan.probe.tip_radius_mm,
+        "rotation-deg": 37.0 + 11.0 * (seed % 30),
+    }
+    arguments = [text for name, value in motion.items() for text in (f"--{name}", f"{value:.17g}")]
+    arguments += ["--translation-mm", "210", "145", "60"]
+    if defect is not None:
+        height, station = _defect(defect)
+        arguments += ["--defect-mm", str(height), "--defect-station-mm", str(station)]
+    return arguments
+
+
+def _defect(text: str) -> tuple[float, float]:
+    height, _, station = text.partition("@")
+    try:
+        return float(height), float(station)
+    except ValueError:
+        raise PlanError(f"--defect {text}: expected MM@STATION, like 0.12@40 for 0.12 mm of excess at station 40 mm") from None
+
+
+@contextmanager
+def _simulator(device: str, arguments: Sequence[str]) -> Iterator[str]:
+    """A simulated device as a process of its own; gives the address it serves."""
+    address = "127.0.0.1:0" if sys.platform == "win32" else "pty"
+    command = [sys.executable, "-m", "cmmlink", "simulate", device, "--address", address, *arguments]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    assert process.stderr is not None
+    with process.stdout, process.stderr:
+        try:
+            served = process.stdout.readline().strip()
+            if not served:
+                raise LinkError(f"the simulated device did not start: {process.stderr.read().strip()}")
+            yield served
+        finally:
+            process.terminate()
+            process.wait(_SIMULATOR_STARTS_S)
+
+
+@app.command()
+def run(
+    plan_file: Annotated[Path, typer.Argument(metavar="PLAN.yaml")],
+    headless: Headless = False,
+    out: Out = None,
+    as_json: Json = False,
+) -> int:
+    """Acquire and inspect with the device of a plan."""
+    plan = load_plan(plan_file)
+    profile = planned_profile(plan)
+    return _run(plan, profile, Telling(headless, as_json, out or plan.out))
+
+
+def _run(plan: Plan, profile: NominalProfile, telling: Telling, simulated: bool = False) -> int:
+    """Carry out a plan and tell what came of it."""
+    live = planned_inspection(plan, profile)
+    source, device = _source_of(plan)
+    started = RunStarted(plan.part.name, plan.part.serial_number or "", plan.operator or "", device, simulated)
+    table = LiveTable(Console(stderr=True), plan.tolerance.zone, profile.length_mm)
+    quiet = telling.headless or telling.as_json or not sys.stderr.isatty()
+    outcome = _carry_out(source, live, started, [] if quiet else [table], plan.buffer_points)
+    return _tell(outcome, profile, telling, plan.part.name)
+
+
+def _source_of(plan: Plan) -> tuple[ScanSource, str]:
+    """The source that a plan's device is, and how to call it."""
+    device = plan.device
+    if isinstance(device, FileDevice):
+        return PointFileSource(device.file, device.scale), f"file {device.file.name}"
+    scanner = SerialScanner(device.address, AsciiDecoder(), baud_rate=device.baud_rate, silence_s=device.silence_s)
+    return scanner, f"{device.type} {device.address}"
+
+
+def _carry_out(source: ScanSource, live: LiveInspection, started: RunStarted, sinks: Sequence[Sink], buffer_points: int) -> RunOutcome:
+    """Run to the end, or to Ctrl-C."""
+    stop = threading.Event()
+    before = signal.signal(signal.SIGINT, lambda *_: stop.set())
+    try:
+        return run_inspection(source, live, sinks, started, buffer_points=buffer_points, clock=time.monotonic, stop=stop)
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _tell(outcome: RunOutcome, profile: NominalProfile, telling: Telling, title: str) -> int:
+    """Print and write the outcome; the exit code."""
+    facts = summary(outcome.result, outcome.counts)
+    if telling.out is not None:
+        write_results(telling.out, facts, outcome.result, profile, title)
+    message = str(outcome.failure or outcome.refusal or "")
+    if outcome.ending == "aborted":
+        message = message or "aborted by the operator"
+    if telling.as_json:
+        _print_json(facts)
+    else:
+        print_summary(Console(highlight=False, soft_wrap=True), outcome.result, outcome.counts, "")
+        if telling.out is not None:
+            typer.echo(f"results in {telling.out}")
+    if message:
+        sys.stderr.write(f"cmmlink: {message}\n")
+    if outcome.failure is not None:
+        return _DEVICE_FAILED
+    return _UNUSABLE if outcome.result is None else _EXIT[outcome.result.verdict]
+
+
+def _print_json(facts: dict[str, Any]) -> None:
+    typer.echo(json.dumps(facts))
+
+
+@app.command()
+def inspect(
+    points: Annotated[Path, typer.Argument(metavar="POINTS")],
+    nominal: Annotated[Path, typer.Option(metavar="FILE", help="The nominal profile.")],
+    tolerance: Annotated[tuple[float, float], typer.Option(metavar="LO HI", help="Deviations allowed, mm, positive out of material.")],
+    method: Annotated[MethodName, typer.Option(help="How deviations are found.")] = MethodName.EXACT,
+    fit: Annotated[FitName, typer.Option(help="How points come onto the nominal.")] = FitName.BEST_FIT,
+    tip_radius: Annotated[float, typer.Option(metavar="R", help="The points are centres of a ball of this radius, mm.")] = 0.0,
+    uncertainty: Annotated[float, typer.Option(metavar="U", help="Expanded uncertainty of a deviation, mm.")] = 0.0,
+    scale: Annotated[float, typer.Option(metavar="S", help="Units of the nominal file to mm (a chord, for airfoils).")] = 1.0,
+    closed: Annotated[bool | None, typer.Option("--closed/--open", help="Close the nominal, or leave it open.")] = None,
+    material: Annotated[Side | None, typer.Option(help="Side of the material, seen along the nominal.")] = None,
+    coverage_min: Annotated[float, typer.Option(min=0, max=1, help="Share of the nominal to be measured before conform is proven.")] = 0.0,
+    out: Out = None,
+    as_json: Json = False,
+) -> int:
+    """Inspect a file of points."""
+    zone = _zone(tolerance, uncertainty)
+    profile = profile_of(load_nominal(nominal, scale, closed), nominal, material.value if material else None)
+    source = PointFileSource(points)
+    try:
+        live = LiveInspection(profile, zone, fit=fit.value, method=method.value, tip_radius_mm=tip_radius, coverage_min=coverage_min)
+    except ValueError as error:
+        raise PlanError(str(error)) from None
+    outcome = _carry_out(source, live, RunStarted(points.stem, "", "", f"file {points.name}", False), [], _BUFFER_POINTS)
+    if outcome.refusal is not None:
+        raise PlanError(f"{points}: {outcome.refusal}")
+    return _tell(outcome, profile, Telling(True, as_json, out), points.stem)
+
+
+def _zone(tolerance: tuple[float, float], uncertainty: float) -> ToleranceZone:
+    try:
+        return ToleranceZone(*tolerance, uncertainty)
+    except ValueError as error:
+        raise PlanError(f"--tolerance {tolerance[0]:g} {tolerance[1]:g}: {error}") from None
+
+
+@app.command()
+def nominal(
+    file: Annotated[Path, typer.Argument(metavar="FILE")],
+    scale: Annotated[float, typer.Option(metavar="S", help="Units of the file to mm.")] = 1.0,
+    closed: Annotated[bool | None, typer.Option("--closed/--open")] = None,
+    as_json: Json = False,
+) -> int:
+    """Show what was understood of a nominal file."""
+    understood = load_nominal(file, scale, closed)
+    if as_json:
+        _print_json(_nominal_facts(understood))
+        return 0
+    curve = understood.curve
+    typer.echo(f"{file}: {understood.source_format}, degree {curve.degree}, {len(curve.control_points_mm)} control points")
+    typer.echo(f"{'closed' if curve.closed else 'open'}, length {curve.length_mm:.4f} mm, corners {len(curve.corners)}")
+    for note in understood.notes:
+        typer.echo(f"  {note}")
+    return 0
+
+
+def _nominal_facts(understood: NominalFile) -> dict[str, Any]:
+    curve = understood.curve
+    assert curve.weights is not None
+    return {
+        "degree": curve.degree,
+        "knots": curve.knots.tolist(),
+        "control_points_mm": curve.control_points_mm.tolist(),
+        "weights": curve.weights.tolist(),
+        "closed": curve.closed,
+        "length_mm": curve.length_mm,
+        "source_format": understood.source_format,
+        "corners": len(curve.corners),
+        "material": material_side(curve),
+        "notes": list(understood.notes),
+    }
+
+
+@app.command()
+def check(plan_file: Annotated[Path, typer.Argument(metavar="PLAN.yaml")]) -> int:
+    """Check a plan and everything it names, without touching the device."""
+    plan = load_plan(plan_file)
+    profile = planned_profile(plan)
+    try:
+        planned_inspection(plan, profile)
+    except ValueError as error:
+        raise PlanError(f"{plan_file}: {error}") from None
+    zone = plan.tolerance.zone
+    typer.echo(f"{plan_file} can be run: {plan.part.name}, zone {zone.lower_mm:+g} .. {zone.upper_mm:+g} mm")
+    typer.echo(f"nominal {profile.length_mm:.3f} mm long, {len(profile)} samples, material on the {profile.material}")
+    return 0
+
+
+@app.command("ports")
+def list_ports() -> int:
+    """List the serial ports of this computer."""
+    found = ports()
+    for name, description in found:
+        typer.echo(f"{name}\t{description}")
+    if not found:
+        typer.echo("no serial port was found")
+    return 0
+
+
+@app.command(context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
+def simulate(context: typer.Context, device: Annotated[str, typer.Argument(metavar="DEVICE")]) -> int:
+    """Serve a simulated device: cmmlink simulate serial --address A --path POINTS [--rate HZ] [--fault SPEC ...]."""
+    from simulators import serial_scanner  # noqa: PLC0415 - only this command knows simulators
+
+    devices = {"serial": serial_scanner}
+    if device not in devices:
+        raise PlanError(f"no simulated device is called {device}; known: {', '.join(devices)}")
+    simulator = devices[device]
+    simulator.serve(simulator.settings_from(context.args), simulator.say)
+    return 0
