@@ -41,7 +41,7 @@ _SNIFFED_LINES = 100
 _POINT_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
 _COMMENT = re.compile(r"#(?!N/A|VALUE!|DIV/0!|REF!|NUM!|NAME\?|NULL!)|%|!|//")  # a spreadsheet's error value is no comment
 _COMMENT_STARTS = ("#", "%", "!", "/")
-_AXIS_NAME = re.compile(r"([xyz])(?![a-z0-9])[^a-zµ]*(mm|cm|m|µm|um|inch|in)?(?![a-zµ])", re.IGNORECASE)
+_AXIS_NAME = re.compile(r"([xyz])(?![a-z0-9])(?:.*?(?<![a-zµ])(mm|cm|m|µm|um|inch|in)[\])]?$)?", re.IGNORECASE)
 _MM_PER_UNIT = {"m": 1000.0, "cm": 10.0, "um": 0.001, "µm": 0.001, "in": 25.4, "inch": 25.4}
 
 
@@ -150,7 +150,7 @@ def parse_columns(text: str) -> Columns:
     if not data:
         raise PointFileError("no line of numbers in the file; expected two or three columns of numbers")
     reading = _best_reading(data)
-    notes = [f"line {number} taken as a header: '{_shortened(line)}'" for number, line in header]
+    notes: list[str] = []
     data = _without_count(data, reading, notes)
     values = _values(data, reading)
     columns = values.shape[1]
@@ -158,6 +158,8 @@ def parse_columns(text: str) -> Columns:
     if reading.decimal == ",":
         notes.append("decimal commas")
     names = _names(header, comment, reading, columns)
+    understood = 1 if header and {"x", "y"} <= set(_axis_letters(names)) else 0
+    notes += [f"line {number} taken as a header: '{_shortened(line)}'" for number, line in header[: len(header) - understood]]
     return Columns(values, np.array([number for number, _ in data], dtype=np.int64), names, tuple(notes))
 
 
@@ -380,7 +382,7 @@ def _read_npy(path: Path, scale: float) -> PointFile:
     if not _read_bytes(path):
         raise PointFileError(f"{path}: the file is empty")
     try:
-        array = np.load(path, mmap_mode="r", allow_pickle=False)
+        array = np.lib.format.open_memmap(path, mode="r")
     except _NPY_ERRORS:
         raise PointFileError(f"{path}: not a readable npy file of numbers; expected an array (m, 2) or (m, 3)") from None
     if not isinstance(array, np.ndarray) or array.ndim != 2 or array.shape[1] not in (2, 3) or array.dtype.kind not in "fiu":

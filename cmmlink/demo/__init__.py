@@ -1,0 +1,40 @@
+"""The demonstration: a plan, its nominal, and the path of the part that the simulated device walks along."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inspection.curve import NurbsCurve
+
+_CHORD_ERROR_MM = 1e-5  # of the polyline to the curve: far below what any deviation is read to
+
+
+def plan_file() -> Path:
+    """Path of the demonstration's plan; its device address is filled in when the simulated device is up."""
+    return Path(__file__).with_name("plan.yaml")
+
+
+def part_path(curve: NurbsCurve, points: int = 20_000) -> NDArray[np.float64]:
+    """Points (k, 2) in mm along the curve, k at least `points`: even in arc length, denser where it bends sharply.
+
+    The part as nominal; form error, defect and probe are the simulated device's. A closed curve's last point repeats its first.
+    """
+    if points < 2:
+        raise ValueError(f"a path has at least two points, not {points}")
+    u = np.linspace(*curve.domain, 4 * points + 1)
+    station = curve.station_mm(u)
+    station[-1] = curve.length_mm  # a closed curve's end is its beginning, at station 0
+    sagging = np.sqrt(np.abs(curve.curvature(u)) / (8 * _CHORD_ERROR_MM))  # sag of a chord h: h^2 curvature / 8
+    density = np.maximum(points / curve.length_mm, sagging)
+    count = np.concatenate([[0.0], np.cumsum((density[1:] + density[:-1]) / 2 * np.diff(station))])
+    path = curve.point(np.interp(np.linspace(0.0, count[-1], int(np.ceil(count[-1])) + 1), count, u))
+    if curve.closed:
+        path[-1] = path[0]
+    return path
+
+
+def write_part_path(curve: NurbsCurve, path: Path, points: int = 20_000) -> None:
+    """Write `part_path` as csv with columns x_mm, y_mm, for a simulated device to read."""
+    rows = "".join(f"{x:.9f},{y:.9f}\n" for x, y in part_path(curve, points))
+    path.write_text("x_mm,y_mm\n" + rows, encoding="utf-8", newline="\n")
