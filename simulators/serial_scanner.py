@@ -10,7 +10,7 @@ import math
 import sys
 import time
 from binascii import crc_hqx
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -22,7 +22,7 @@ from .settings import Announce, SimulatorSettings, say, settings_from
 
 HEARTBEAT_S = 0.5
 IMPATIENCE_S = 2.0  # a client that says nothing for so long gets the scan all the same
-FAREWELL_S = 10.0  # how long the line stays up for a slow client after the scan
+FAREWELL_S = 10.0  # how long the device waits for the client with the end of the scan
 TICK_S = 0.001
 BURST_POINTS = 64  # largest number of points sent at once when the scan is not paced
 
@@ -99,9 +99,10 @@ def stream(settings: SimulatorSettings, device: Device, announce: Announce) -> N
     line = open_line(settings.address)
     try:
         announce(line.address)
-        _Scan(line, device, scan, injector, settings.paced).run()
+        streamed = _Scan(line, device, scan, injector, settings.paced)
+        streamed.run()
         announce(json.dumps({"points": len(scan.time_s), **injector.tally}))
-        _wait_for_farewell(line)
+        streamed.take_leave()
     finally:
         line.close()
 
@@ -111,6 +112,7 @@ class _Scan:
 
     def __init__(self, line: Line, device: Device, scan: Walk, injector: Injector, paced: bool) -> None:
         self._line, self._device, self._scan, self._injector, self._paced = line, device, scan, injector, paced
+        self._unplugged = False
 
     def run(self) -> None:
         self._wait_for_client()
@@ -123,8 +125,22 @@ class _Scan:
             due = self._due(time.monotonic() - start_s, index)
             self._send(b"".join(map(self._frame, range(index, due))))
             index = due
+            if self._unplugged:
+                self._line.plug()
+                self._unplugged = False
             self._listen(TICK_S if self._paced else 0.0)
-        self._send(self._injector.held() + self._device.closing(count))
+        self._send(self._injector.held())
+        self._wait_until(self._line.connected)
+        self._send(self._device.closing(count))
+
+    def take_leave(self) -> None:
+        """Keep the line up until the client has gone, so that the last bytes are not lost with it."""
+        self._wait_until(lambda: not self._line.connected())
+
+    def _wait_until(self, met: Callable[[], bool]) -> None:
+        end_s = time.monotonic() + FAREWELL_S
+        while not met() and time.monotonic() < end_s:
+            self._listen(0.02)
 
     def _due(self, elapsed_s: float, index: int) -> int:
         """Return the number of points taken by now, ending at the next point at which a fault is to strike."""
@@ -158,8 +174,9 @@ class _Scan:
         away_s = self._injector.event("unplug", index)
         if away_s is not None:
             self._line.unplug()
+            self._unplugged = True
             self._pause(away_s, index, alive=False)
-            self._line.plug()
+            return 0.0  # the device goes on measuring; nobody hears it
         return time.monotonic() - began_s
 
     def _pause(self, seconds: float, index: int, *, alive: bool) -> None:
@@ -184,13 +201,6 @@ class _Scan:
             elif begin_s == math.inf:
                 begin_s = time.monotonic() + IMPATIENCE_S
             self._listen(0.02)
-
-
-def _wait_for_farewell(line: Line) -> None:
-    """Keep the line up until the client has gone, so that the last bytes are not lost with it."""
-    end_s = time.monotonic() + FAREWELL_S
-    while line.connected() and time.monotonic() < end_s:
-        line.receive(0.02)
 
 
 DEVICES = {"serial": serve}
