@@ -8,11 +8,13 @@ import os
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import closing
 
 import serial
 from serial.tools import list_ports
 
-from .errors import LinkError
+from .errors import LinkError, ProtocolError
+from .link import kept_up
 from .source import Arrival, Damaged, Decoder, ScanClosed, WireBytes
 
 POLL_S = 0.05  # how long a read waits before it looks whether to stop
@@ -35,14 +37,16 @@ class SerialScanner:
         baud_rate: int = 115_200,
         parity: str = serial.PARITY_NONE,
         silence_s: float = 3.0,
+        reconnect_s: float = 0.0,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """`silence_s`: without a byte for so long the device counts as gone."""
+        """Without a byte for `silence_s` the link counts as lost; a lost link is tried again for `reconnect_s`."""
         self._address = serial_address(address)
         self._decoder = decoder
         self._baud_rate = baud_rate
         self._parity = parity
         self._silence_s = silence_s
+        self._reconnect_s = reconnect_s
         self._clock = clock
         self._stopped = threading.Event()
 
@@ -52,40 +56,35 @@ class SerialScanner:
 
     def arrivals(self) -> Iterator[Arrival]:
         """Open the link, yield what arrives, end after `ScanClosed`."""
-        port = self._open()
-        try:
-            yield from self._scan(port)
-        finally:
-            port.close()
+        return kept_up(lambda: closing(self._open()), self._scan, reconnect_s=self._reconnect_s, stopped=self._stopped, clock=self._clock)
 
     def _scan(self, port: serial.Serial) -> Iterator[Arrival]:
         self._write(port, self._decoder.request())
-        last_byte_s = last_sound_s = self._clock()
-        while not self._stopped.is_set():
-            try:
+        watch = _Watch(self._silence_s, self._clock())
+        try:
+            while not self._stopped.is_set():
                 data = self._read(port)
-            except LinkError:
-                yield from self._decoder.interrupted()
-                raise
-            now_s = self._clock()
-            if not data:
-                if now_s - last_byte_s > self._silence_s:
-                    yield from self._decoder.interrupted()
-                    raise LinkError(f"{self._address}: silent for {self._silence_s:g} s; is the device switched on and scanning?")
-                continue
-            last_byte_s = now_s
-            yield WireBytes(now_s, data)
-            found = self._decoder.feed(data)
-            yield from found
-            if any(isinstance(arrival, ScanClosed) for arrival in found):
-                return
-            if not all(isinstance(arrival, Damaged) for arrival in found):
-                last_sound_s = now_s
-            elif found and now_s - last_sound_s > self._silence_s:
-                raise LinkError(
-                    f"{self._address}: bytes arrive but for {self._silence_s:g} s not one valid frame; "
-                    f"check baud rate ({self._baud_rate}), parity ({self._parity}) and the format of the device"
-                )
+                found: list[Arrival] = []
+                if data:
+                    yield WireBytes(self._clock(), data)
+                    found = self._decoder.feed(data)
+                    yield from found
+                if any(isinstance(arrival, ScanClosed) for arrival in found):
+                    return
+                self._judge(watch.saw(data, found, self._clock()))
+        except LinkError:
+            yield from self._decoder.interrupted()
+            raise
+
+    def _judge(self, state: str) -> None:
+        """Raise what the watch found."""
+        if state == "silent":
+            raise LinkError(f"{self._address}: silent for {self._silence_s:g} s; is the device switched on and scanning?")
+        if state == "garbled":
+            raise ProtocolError(
+                f"{self._address}: bytes arrive but for {self._silence_s:g} s not one valid frame; "
+                f"check baud rate ({self._baud_rate}), parity ({self._parity}) and the format of the device"
+            )
 
     def _open(self) -> serial.Serial:
         options = {"exclusive": True} if os.name == "posix" else {}
@@ -118,6 +117,24 @@ class SerialScanner:
             port.write(data)
         except (serial.SerialException, OSError) as error:
             raise LinkError(f"{self._address}: the link was lost: {error}") from error
+
+
+class _Watch:
+    """Tells a device that is silent, or sends nothing sound, from one that is only slow."""
+
+    def __init__(self, patience_s: float, now_s: float) -> None:
+        self._patience_s = patience_s
+        self._last_byte_s = self._last_sound_s = now_s
+
+    def saw(self, data: bytes, found: list[Arrival], now_s: float) -> str:
+        """Take note of one read; return "silent", "garbled" or "" if all is well."""
+        if not data:
+            return "silent" if now_s - self._last_byte_s > self._patience_s else ""
+        self._last_byte_s = now_s
+        damaged = [isinstance(arrival, Damaged) for arrival in found]
+        if not all(damaged):
+            self._last_sound_s = now_s
+        return "garbled" if any(damaged) and now_s - self._last_sound_s > self._patience_s else ""
 
 
 def serial_address(text: str) -> str:

@@ -4,8 +4,12 @@ import os
 import select
 import socket
 import sys
+import tempfile
 import time
 from typing import Protocol
+
+if sys.platform != "win32":
+    import tty
 
 POLL_S = 0.02
 
@@ -25,7 +29,10 @@ class Line(Protocol):
         """Return what the client sent, at the latest after `wait_s`."""
 
     def unplug(self) -> None:
-        """Let go of the client; it may come again."""
+        """Take the line away, for the client and for everybody who knocks."""
+
+    def plug(self) -> None:
+        """Bring the line back under the same address."""
 
     def close(self) -> None:
         """Give up the address."""
@@ -47,11 +54,12 @@ class TcpLine:
     def __init__(self, host: str, port: int) -> None:
         self._server = socket.create_server((host, port), backlog=1)
         self._client: socket.socket | None = None
-        self.address = f"{host}:{self._server.getsockname()[1]}"
+        self._host_port = (host, int(self._server.getsockname()[1]))
+        self.address = f"{host}:{self._host_port[1]}"
 
     def connected(self) -> bool:
         """Take a new client if one is waiting, and tell whether there is one."""
-        if self._client is None and select.select([self._server], [], [], 0)[0]:
+        if self._client is None and self._server.fileno() >= 0 and select.select([self._server], [], [], 0)[0]:
             self._client = self._server.accept()[0]
             self._client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             self._client.setblocking(False)
@@ -68,13 +76,13 @@ class TcpLine:
             except BlockingIOError:
                 continue
             except OSError:
-                self.unplug()
+                self._drop()
         return self._client is not None
 
     def receive(self, wait_s: float) -> bytes:
         """Return what the client sent, at the latest after `wait_s`."""
         if self._client is None:
-            select.select([self._server], [], [], wait_s)
+            time.sleep(wait_s)
             return b""
         if not select.select([self._client], [], [], wait_s)[0]:
             return b""
@@ -83,37 +91,46 @@ class TcpLine:
         except OSError:
             data = b""
         if not data:
-            self.unplug()
+            self._drop()
         return data
 
     def unplug(self) -> None:
-        """Let go of the client; it may come again."""
-        if self._client is not None:
-            self._client.close()
-            self._client = None
+        """Close everything; knocking clients are refused."""
+        self._drop()
+        self._server.close()
+
+    def plug(self) -> None:
+        """Listen again."""
+        self._server = socket.create_server(self._host_port, backlog=1)
 
     def close(self) -> None:
         """Give up the address."""
         self.unplug()
-        self._server.close()
+
+    def _drop(self) -> None:
+        if self._client is not None:
+            self._client.close()
+            self._client = None
 
 
 class PtyLine:
-    """A pseudo-terminal; the client opens its name like a serial port."""
+    """A pseudo-terminal; the client opens its address like a serial port.
+
+    The address is a link to the terminal of the moment, so that it can vanish and come back as a USB port does.
+    """
 
     def __init__(self) -> None:
         if sys.platform == "win32":
             raise ValueError("pseudo-terminals exist on POSIX systems only; serve host:port instead")
-        import tty  # noqa: PLC0415 - POSIX only
-
-        self._master, slave = os.openpty()
-        tty.setraw(slave)
-        self.address = os.ttyname(slave)
-        os.close(slave)  # so that the master shows whether a client holds the other end
-        os.set_blocking(self._master, False)
+        self._folder = tempfile.TemporaryDirectory(prefix="simulated-port-")
+        self.address = os.path.join(self._folder.name, "port")
+        self._master: int | None = None
+        self.plug()
 
     def connected(self) -> bool:
         """Tell whether a client holds the other end."""
+        if sys.platform == "win32" or self._master is None:
+            return False
         poll = select.poll()
         poll.register(self._master, 0)
         return not any(event & select.POLLHUP for _, event in poll.poll(0))
@@ -121,7 +138,7 @@ class PtyLine:
     def send(self, data: bytes) -> bool:
         """Send all, waiting while the client is slow; return False if the client is gone."""
         view = memoryview(data)
-        while view and self.connected():
+        while view and self._master is not None and self.connected():
             if not select.select([], [self._master], [], POLL_S)[1]:
                 continue
             try:
@@ -132,7 +149,7 @@ class PtyLine:
 
     def receive(self, wait_s: float) -> bytes:
         """Return what the client sent, at the latest after `wait_s`."""
-        if not self.connected():
+        if self._master is None or not self.connected():
             time.sleep(wait_s)
             return b""
         if not select.select([self._master], [], [], wait_s)[0]:
@@ -143,8 +160,23 @@ class PtyLine:
             return b""
 
     def unplug(self) -> None:
-        """Do nothing: a pseudo-terminal cannot drop its client and keep its name; the line falls silent instead."""
+        """Close the terminal; its name is gone."""
+        if self._master is not None:
+            os.unlink(self.address)
+            os.close(self._master)
+            self._master = None
+
+    def plug(self) -> None:
+        """Open a terminal under the same address."""
+        if sys.platform == "win32":
+            return
+        self._master, slave = os.openpty()
+        tty.setraw(slave)
+        os.symlink(os.ttyname(slave), self.address)
+        os.close(slave)  # so that the master shows whether a client holds the other end
+        os.set_blocking(self._master, False)
 
     def close(self) -> None:
         """Give up the address."""
-        os.close(self._master)
+        self.unplug()
+        self._folder.cleanup()

@@ -5,45 +5,26 @@ waits for a client, streams one scan and ends; its last line says, as JSON, how 
 struck how often.
 """
 
-import argparse
 import json
 import math
 import sys
 import time
 from binascii import crc_hqx
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
-from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .faults import CATALOGUE, Fault, Injector
+from .faults import Injector
 from .line import Line, open_line
-from .motion import Motion, Walk, read_path, walk
+from .motion import Walk, walk
+from .settings import Announce, SimulatorSettings, say, settings_from
 
 HEARTBEAT_S = 0.5
 IMPATIENCE_S = 2.0  # a client that says nothing for so long gets the scan all the same
-FAREWELL_S = 10.0  # how long the line stays up for a slow client after the scan
+FAREWELL_S = 10.0  # how long the device waits for the client with the end of the scan
 TICK_S = 0.001
 BURST_POINTS = 64  # largest number of points sent at once when the scan is not paced
-
-
-@dataclass(frozen=True, slots=True)
-class SimulatorSettings:
-    """What a simulated device is told.
-
-    address    `pty` or `host:port`; port 0 takes any free one
-    path_mm    (k, 2) or (k, 3) points of the path on the part
-    paced      send points when they are due by `motion.rate_hz`; otherwise as fast as the client takes them
-    """
-
-    address: str
-    path_mm: NDArray[np.float64]
-    motion: Motion
-    faults: tuple[Fault, ...] = ()
-    paced: bool = True
 
 
 class Device(Protocol):
@@ -106,21 +87,22 @@ def _line(text: str) -> bytes:
     return b"%b*%04X\r\n" % (body, crc_hqx(body, 0xFFFF))
 
 
-def serve(settings: SimulatorSettings, announce: Callable[[str], None]) -> None:
+def serve(settings: SimulatorSettings, announce: Announce) -> None:
     """Serve one scan of the line format; `announce` gets the address, and at the end the tally as JSON."""
     stream(settings, AsciiDevice(), announce)
 
 
-def stream(settings: SimulatorSettings, device: Device, announce: Callable[[str], None]) -> None:
+def stream(settings: SimulatorSettings, device: Device, announce: Announce) -> None:
     """Serve one scan of any streaming device."""
     scan = walk(settings.path_mm, settings.motion)
     injector = Injector(settings.faults, settings.motion.seed)
     line = open_line(settings.address)
     try:
         announce(line.address)
-        _Scan(line, device, scan, injector, settings.paced).run()
+        streamed = _Scan(line, device, scan, injector, settings.paced)
+        streamed.run()
         announce(json.dumps({"points": len(scan.time_s), **injector.tally}))
-        _wait_for_farewell(line)
+        streamed.take_leave()
     finally:
         line.close()
 
@@ -130,6 +112,7 @@ class _Scan:
 
     def __init__(self, line: Line, device: Device, scan: Walk, injector: Injector, paced: bool) -> None:
         self._line, self._device, self._scan, self._injector, self._paced = line, device, scan, injector, paced
+        self._unplugged = False
 
     def run(self) -> None:
         self._wait_for_client()
@@ -142,8 +125,22 @@ class _Scan:
             due = self._due(time.monotonic() - start_s, index)
             self._send(b"".join(map(self._frame, range(index, due))))
             index = due
+            if self._unplugged:
+                self._line.plug()
+                self._unplugged = False
             self._listen(TICK_S if self._paced else 0.0)
-        self._send(self._injector.held() + self._device.closing(count))
+        self._send(self._injector.held())
+        self._wait_until(self._line.connected)
+        self._send(self._device.closing(count))
+
+    def take_leave(self) -> None:
+        """Keep the line up until the client has gone, so that the last bytes are not lost with it."""
+        self._wait_until(lambda: not self._line.connected())
+
+    def _wait_until(self, met: Callable[[], bool]) -> None:
+        end_s = time.monotonic() + FAREWELL_S
+        while not met() and time.monotonic() < end_s:
+            self._listen(0.02)
 
     def _due(self, elapsed_s: float, index: int) -> int:
         """Return the number of points taken by now, ending at the next point at which a fault is to strike."""
@@ -177,7 +174,9 @@ class _Scan:
         away_s = self._injector.event("unplug", index)
         if away_s is not None:
             self._line.unplug()
+            self._unplugged = True
             self._pause(away_s, index, alive=False)
+            return 0.0  # the device goes on measuring; nobody hears it
         return time.monotonic() - began_s
 
     def _pause(self, seconds: float, index: int, *, alive: bool) -> None:
@@ -204,41 +203,7 @@ class _Scan:
             self._listen(0.02)
 
 
-def _wait_for_farewell(line: Line) -> None:
-    """Keep the line up until the client has gone, so that the last bytes are not lost with it."""
-    end_s = time.monotonic() + FAREWELL_S
-    while line.connected() and time.monotonic() < end_s:
-        line.receive(0.02)
-
-
-def settings_from(arguments: Sequence[str]) -> SimulatorSettings:
-    """Read the settings from command-line arguments."""
-    parser = argparse.ArgumentParser(description="A simulated device; faults: " + ", ".join(CATALOGUE))
-    parser.add_argument("--address", required=True, help="pty or host:port")
-    parser.add_argument("--path", required=True, type=Path, help="points of the path on the part, mm")
-    parser.add_argument("--fault", action="append", default=[], type=Fault.parse, metavar="NAME[:VALUE][@POINT]")
-    parser.add_argument("--unpaced", action="store_true", help="as fast as the client takes the points")
-    parser.add_argument("--rate", dest="rate_hz", type=float, default=1000.0, help="points per second")
-    parser.add_argument("--speed", dest="speed_mm_s", type=float, default=50.0, help="mm per second along the path")
-    parser.add_argument("--open", dest="closed", action="store_false", help="the path is open")
-    parser.add_argument("--backward", action="store_true")
-    for name, kind in (("count", int), ("seed", int), ("form_error_mm", float), ("noise_mm", float), ("tip_radius_mm", float)):
-        parser.add_argument("--" + name.replace("_", "-"), type=kind)
-    for name in ("defect_mm", "defect_station_mm", "rotation_deg", "start_mm"):
-        parser.add_argument("--" + name.replace("_", "-"), type=float)
-    parser.add_argument("--translation-mm", type=float, nargs=3)
-    given = {name: value for name, value in vars(parser.parse_args(arguments)).items() if value is not None}
-    if "translation_mm" in given:
-        given["translation_mm"] = tuple(given["translation_mm"])
-    motion = Motion(**{field.name: given[field.name] for field in fields(Motion) if field.name in given})
-    return SimulatorSettings(given["address"], read_path(given["path"]), motion, tuple(given["fault"]), not given["unpaced"])
-
-
-def say(text: str) -> None:
-    """Write one line for the parent process to read at once."""
-    sys.stdout.write(text + "\n")
-    sys.stdout.flush()
-
+DEVICES = {"serial": serve}
 
 if __name__ == "__main__":
     serve(settings_from(sys.argv[1:]), say)

@@ -1,0 +1,190 @@
+"""The ASCII line format against golden bytes, any cut, and damage."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drivers.ascii_frames import LONGEST_LINE, AsciiDecoder
+from drivers.errors import ProtocolError
+from drivers.source import Damaged, Heartbeat, ScanClosed, ScanOpened
+from simulators.serial_scanner import AsciiDevice
+from tests.drivers.streams import account, any_cut_is_the_same, decoded, flipped, only_sent_points
+
+# Written by hand from the format's definition; the checksums by the bitwise CRC-16/CCITT-FALSE below, not by the decoder's library call.
+GOLDEN = (
+    b"S,ACME scanner,SN-7,mm,3*4F2A\r\n"
+    b"P,0,1000,1.5,-2.25,0.125,0*B8C0\r\n"
+    b"P,1,1500,1.50001,-2.25001,0.12501,0*B195\r\n"
+    b"H,2,2000*F518\r\n"
+    b"P,2,2500,10,20,30,1*C4E8\r\n"
+    b"E,3*7F7A\r\n"
+)
+
+
+def crc_bitwise(data: bytes) -> int:
+    crc = 0xFFFF
+    for byte in data:
+        crc ^= byte << 8
+        for _ in range(8):
+            crc = ((crc << 1) ^ 0x1021 if crc & 0x8000 else crc << 1) & 0xFFFF
+    return crc
+
+
+def line(text: str) -> bytes:
+    return b"%b*%04X\r\n" % (text.encode(), crc_bitwise(text.encode()))
+
+
+def stream(points: int, unit: str = "mm") -> tuple[bytes, list[tuple[float, float, float]]]:
+    rng = np.random.default_rng(points)
+    xyz = [tuple(row) for row in np.round(rng.uniform(-100, 100, (points, 3)), 5).tolist()]
+    lines = [line(f"S,dev,1,{unit},{points}")]
+    lines += [line(f"P,{i},{500 * i},{x:.5f},{y:.5f},{z:.5f},0") for i, (x, y, z) in enumerate(xyz)]
+    return b"".join([*lines, line(f"E,{points}")]), xyz
+
+
+def test_the_checksum_is_crc_16_ccitt_false() -> None:
+    assert crc_bitwise(b"123456789") == 0x29B1  # check value in the catalogue of parametrised CRC algorithms
+
+
+def test_golden_bytes() -> None:
+    book = any_cut_is_the_same(AsciiDecoder, GOLDEN)
+    assert book.sequence == [0, 1]
+    assert book.time_s == [0.001, 0.0015]
+    assert book.points_mm == [(1.5, -2.25, 0.125), (1.50001, -2.25001, 0.12501)]
+    assert dict(book.counts) == {("Rejected", "marked invalid by the device"): 1}
+    assert book.others == [ScanOpened("ACME scanner", "SN-7", 3), Heartbeat(), ScanClosed(3)]
+
+
+def test_the_simulated_device_writes_the_golden_bytes() -> None:
+    device = AsciiDevice()
+    point = device.frame(1, 0.0015, (1.50001, -2.25001, 0.12501), invalid=False)
+    assert decoded(AsciiDecoder("mm"), point).points_mm == [(1.50001, -2.25001, 0.12501)]
+    assert point == line("P,1,1500,1.500010,-2.250010,0.125010,0")
+    assert device.heartbeat(2, 0.002) == b"H,2,2000*F518\r\n"
+    assert device.closing(3) == 3 * b"E,3*7F7A\r\n"
+
+
+@given(seed=st.integers(0, 2**32), edges=st.lists(st.integers(0, 2000), max_size=30))
+@settings(max_examples=60, deadline=None)
+def test_any_cut_of_a_damaged_stream_gives_the_same(seed: int, edges: list[int]) -> None:
+    data, _ = stream(60)
+    damaged = flipped(data, 3e-3, np.random.default_rng(seed))
+    cuts = [min(edge, len(damaged)) for edge in edges]
+    assert decoded(AsciiDecoder("mm"), damaged, cuts) == decoded(AsciiDecoder("mm"), damaged)
+
+
+@given(st.binary(max_size=3000), st.lists(st.integers(0, 3000), max_size=10))
+@settings(max_examples=100, deadline=None)
+def test_every_byte_of_noise_is_counted(noise: bytes, edges: list[int]) -> None:
+    book = decoded(AsciiDecoder("mm"), noise, [min(edge, len(noise)) for edge in edges])
+    assert not book.sequence
+    assert book.total("Damaged") == len(noise)
+
+
+def test_units_are_converted() -> None:
+    for unit, factor in (("mm", 1.0), ("um", 1e-3), ("cm", 10.0), ("m", 1000.0), ("inch", 25.4)):
+        data, xyz = stream(20, unit)
+        np.testing.assert_allclose(decoded(AsciiDecoder(), data).points_mm, np.array(xyz) * factor, rtol=1e-15)
+
+
+def test_an_unknown_unit_is_refused_with_the_way_out() -> None:
+    with pytest.raises(ProtocolError, match=r"dev 1 sends points in 'furlong'; set the device to one of mm, um"):
+        AsciiDecoder().feed(line("S,dev,1,furlong,5"))
+
+
+def test_points_without_a_scan_header_are_rejected_unless_the_unit_is_known() -> None:
+    data, xyz = stream(5)
+    headless = data[data.index(b"P") :]
+    assert decoded(AsciiDecoder(), headless).counts == {("Rejected", "no scan header arrived: the unit is unknown"): 5}
+    assert decoded(AsciiDecoder("mm"), headless).points_mm == xyz
+
+
+def test_lost_frames_and_a_lost_tail_are_counted() -> None:
+    data, xyz = stream(10)
+    lines = data.splitlines(keepends=True)
+    book = decoded(AsciiDecoder(), b"".join(lines[:3] + lines[6:9] + lines[-1:]))
+    assert book.sequence == [0, 1, 5, 6, 7]
+    assert book.points_mm == [xyz[i] for i in book.sequence]
+    assert book.lost == 3 + 2
+
+
+def test_a_repeated_frame_is_rejected() -> None:
+    data, _ = stream(4)
+    lines = data.splitlines(keepends=True)
+    book = decoded(AsciiDecoder(), b"".join(lines[:3] + lines[2:]))
+    assert (book.sequence, book.lost) == ([0, 1, 2, 3], 0)
+    assert book.counts["Rejected", "frame repeated"] == 1
+
+
+def test_a_late_frame_is_a_point_and_no_longer_lost() -> None:
+    data, xyz = stream(6)
+    lines = data.splitlines(keepends=True)
+    lines[3], lines[4] = lines[4], lines[3]
+    book = any_cut_is_the_same(AsciiDecoder, b"".join(lines))
+    assert (book.sequence, book.lost) == ([0, 1, 3, 2, 4, 5], 0)
+    assert book.points_mm == [xyz[i] for i in book.sequence]
+    assert book.time_s == [i * 500e-6 for i in book.sequence]
+
+
+def test_a_heartbeat_tells_of_points_lost_before_a_pause() -> None:
+    decoder = AsciiDecoder("mm")
+    decoder.feed(line("P,0,0,0,0,0,0"))
+    assert account(decoder.feed(line("H,4,2000"))).lost == 3
+
+
+def test_sequence_and_clock_wrap() -> None:
+    decoder = AsciiDecoder("mm")
+    decoder._counter.expected = 2**32 - 2  # a scan of four thousand million points is too long for a test
+    book = account(decoder.feed(b"".join(line(f"P,{(2**32 - 2 + i) % 2**32},{(2**32 - 600 + 500 * i) % 2**32},0,0,0,0") for i in range(4))))
+    assert book.sequence == [2**32 - 2, 2**32 - 1, 2**32, 2**32 + 1]
+    np.testing.assert_allclose(np.diff(book.time_s), 500e-6, rtol=0, atol=1e-9)
+
+
+def test_garbage_without_a_line_end_is_counted_and_needs_no_memory() -> None:
+    decoder = AsciiDecoder("mm")
+    found = [arrival for _ in range(1000) for arrival in decoder.feed(b"x" * 1000)]
+    assert set(found) == {Damaged(LONGEST_LINE, "no line end in time")}
+    assert len(decoder._pending) <= LONGEST_LINE
+    rest = decoder.feed(b"\n" + line("P,0,0,1,2,3,0"))
+    assert account(found + rest).total("Damaged") == 1_000_001
+    assert account(rest).points_mm == [(1.0, 2.0, 3.0)]
+
+
+@pytest.mark.parametrize("text", ["P,0,0,1e5,0,0,0", "P,0,0,nan,0,0,0", "P,0,0,1_0,0,0,0", "P,0,0, 1,0,0,0", "P,0,0,1,0,0", "Q,1", ""])
+def test_sound_lines_of_another_form_are_damage(text: str) -> None:
+    data = line(text)
+    assert decoded(AsciiDecoder("mm"), data).counts == {("Damaged", "sound line of unknown form"): len(data)}
+
+
+def test_a_line_cut_off_by_the_end_of_the_link_is_counted_and_the_next_is_read() -> None:
+    decoder = AsciiDecoder("mm")
+    decoder.feed(b"P,0,0,1,2")
+    assert account(decoder.interrupted()).total("Damaged") == 9
+    assert account(decoder.feed(line("P,1,0,1,2,3,0"))).sequence == [1]
+
+
+def test_a_device_that_begins_anew_opens_again() -> None:
+    data, _ = stream(3)
+    lines = data.splitlines(keepends=True)
+    book = decoded(AsciiDecoder(), b"".join(lines[:3]) + data)
+    assert book.others == [ScanOpened("dev", "1", 3), ScanOpened("dev", "1", 3), ScanClosed(3)]
+    assert (book.sequence, book.lost) == ([0, 1, 0, 1, 2], 0)
+
+
+def test_points_after_the_end_are_rejected() -> None:
+    data, _ = stream(3)
+    assert decoded(AsciiDecoder(), data + line("P,3,0,1,2,3,0")).counts == {("Rejected", "sent after the end of the scan"): 1}
+
+
+def test_a_million_points_with_flipped_bits_give_no_wrong_point_and_the_true_loss() -> None:
+    count = 1_000_000
+    device, rng = AsciiDevice(), np.random.default_rng(4)
+    sent_mm = np.round(rng.uniform(-100, 100, (count, 3)), 6)
+    opening = device.opening(count)
+    body = b"".join(device.frame(i, i * 1e-4, point, invalid=False) for i, point in enumerate(sent_mm.tolist()))
+    damaged = flipped(opening + body, 1e-4, rng, first=len(opening)) + device.closing(count)
+    book = decoded(AsciiDecoder(), damaged, range(1024, len(damaged), 1024))
+    only_sent_points(book, sent_mm, within_mm=0.0)
+    assert len(set(book.sequence)) == len(book.sequence)
+    assert 1000 < book.lost == count - len(book.sequence)

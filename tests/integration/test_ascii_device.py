@@ -1,0 +1,130 @@
+"""The simulated scanner and the serial source on a real pseudo-terminal and a real TCP connection."""
+
+import os
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivers.ascii_frames import AsciiDecoder
+from drivers.errors import LinkError, ProtocolError
+from drivers.serial_scanner import SerialScanner
+from drivers.source import Arrival, LinkDown, LinkUp, PointBatch, ScanClosed, ScanOpened
+from tests.drivers.streams import Account, account, only_sent_points
+from tests.integration.simulated import Simulated, simulated
+
+LINES = [
+    pytest.param("pty", marks=pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals exist on POSIX systems only")),
+    "127.0.0.1:0",
+]
+COUNT = 1000
+
+
+def scanned(device: Simulated, silence_s: float = 3.0) -> Account:
+    return account(SerialScanner(device.address, AsciiDecoder(), silence_s=silence_s).arrivals())
+
+
+@pytest.mark.parametrize("line", LINES)
+def test_every_point_arrives_as_it_was_measured(line: str, tmp_path: Path) -> None:
+    with simulated("serial", line, tmp_path, "--unpaced") as device:
+        book = scanned(device)
+    assert book.sequence == list(range(COUNT))
+    only_sent_points(book, device.sent_mm, within_mm=0.51e-6)
+    assert book.others == [ScanOpened("simulated scanner", "SIM-0001", COUNT), ScanClosed(COUNT)]
+    np.testing.assert_allclose(book.time_s, np.arange(COUNT) / 2000.0, atol=0.51e-6)
+    assert {kind for kind, _ in book.counts} == {"WireBytes"}
+
+
+@pytest.mark.parametrize("line", LINES)
+def test_damage_gives_no_wrong_point_and_the_true_loss(line: str, tmp_path: Path) -> None:
+    faults = ["flip:0.002@10", "lost-frames:0.02", "repeated-frames:0.02", "reordered-frames:0.02", "gap:30@500", "burst:200@700"]
+    with simulated("serial", line, tmp_path, "--unpaced", *(f"--fault={fault}" for fault in faults)) as device:
+        book, tally = scanned(device), device.tally()
+    only_sent_points(book, device.sent_mm, within_mm=0.51e-6)
+    assert len(set(book.sequence)) == len(book.sequence)
+    assert book.lost == COUNT - len(book.sequence)
+    assert book.lost >= tally["lost-frames"] + tally["gap"] > 40
+    assert book.total("Damaged") > 0
+    assert 0 < book.counts["Rejected", "frame repeated"] <= tally["repeated-frames"]
+
+
+def test_points_marked_invalid_are_rejected(tmp_path: Path) -> None:
+    with simulated("serial", "127.0.0.1:0", tmp_path, "--unpaced", "--fault=invalid:0.05") as device:
+        book, tally = scanned(device), device.tally()
+    assert book.counts["Rejected", "marked invalid by the device"] == tally["invalid"] > 0
+    assert len(book.sequence) + tally["invalid"] == COUNT
+    assert book.lost == 0
+
+
+@pytest.mark.parametrize("line", LINES)
+def test_a_device_that_dies_ends_with_a_clear_error_and_what_was_received(line: str, tmp_path: Path) -> None:
+    arrivals: list[Arrival] = []
+    with simulated("serial", line, tmp_path, "--fault=die@400") as device:
+        with pytest.raises(LinkError, match="the link was lost"):
+            arrivals.extend(SerialScanner(device.address, AsciiDecoder()).arrivals())
+        status = device.process.wait()
+    assert status == 9
+    assert account(arrivals).sequence == list(range(len(account(arrivals).sequence)))
+
+
+@pytest.mark.parametrize("line", LINES)
+def test_a_killed_device_ends_with_a_clear_error(line: str, tmp_path: Path) -> None:
+    with simulated("serial", line, tmp_path) as device:
+        arrivals = SerialScanner(device.address, AsciiDecoder()).arrivals()
+        first = next(len(arrival) for arrival in arrivals if isinstance(arrival, PointBatch))
+        device.process.kill()
+        with pytest.raises(LinkError, match="the link was lost"):
+            list(arrivals)
+    assert 0 < first < COUNT
+
+
+@pytest.mark.parametrize("line", LINES)
+def test_an_unplugged_line_comes_back_and_the_run_goes_on(line: str, tmp_path: Path) -> None:
+    with simulated("serial", line, tmp_path, "--fault=unplug:0.05@300") as device:
+        arrivals = list(SerialScanner(device.address, AsciiDecoder(), reconnect_s=20.0).arrivals())
+    book = account(arrivals)
+    kinds = [type(arrival) for arrival in book.others]
+    assert kinds == [ScanOpened, LinkDown, LinkUp, ScanClosed]
+    only_sent_points(book, device.sent_mm, within_mm=0.51e-6)
+    assert 300 <= len(book.sequence) == COUNT - book.lost
+
+
+def test_a_silent_device_is_told_from_a_slow_one(tmp_path: Path) -> None:
+    with simulated("serial", "127.0.0.1:0", tmp_path, "--fault=stall:1.2@200") as device:
+        assert scanned(device, silence_s=0.7).sequence == list(range(COUNT))  # heartbeats came meanwhile
+    with (
+        simulated("serial", "127.0.0.1:0", tmp_path, "--fault=silence@200") as device,
+        pytest.raises(LinkError, match=r"silent for 0\.3 s"),
+    ):
+        scanned(device, silence_s=0.3)
+
+
+def test_bytes_of_another_format_are_called_so(tmp_path: Path) -> None:
+    garbled = simulated("serial", "127.0.0.1:0", tmp_path, "--fault=flip:0.5", "--fault=stall:30@900")
+    with garbled as device, pytest.raises(ProtocolError, match="not one valid frame; check baud rate"):
+        scanned(device, silence_s=0.2)
+
+
+def test_stop_ends_the_scan_from_another_thread(tmp_path: Path) -> None:
+    with simulated("serial", "127.0.0.1:0", tmp_path, "--fault=silence@100") as device:
+        source = SerialScanner(device.address, AsciiDecoder(), silence_s=60.0)
+        ended = threading.Thread(target=lambda: list(source.arrivals()))
+        ended.start()
+        source.stop()
+        ended.join(timeout=10.0)
+        assert not ended.is_alive()
+
+
+def test_a_port_that_is_not_there_is_named() -> None:
+    with pytest.raises(LinkError, match="no-such-port: cannot be opened"):
+        list(SerialScanner("no-such-port", AsciiDecoder()).arrivals())
+
+
+@pytest.mark.skipif(os.name != "posix", reason="ports are shared out on POSIX systems only when asked for")
+def test_a_port_in_use_is_refused(tmp_path: Path) -> None:
+    with simulated("serial", "pty", tmp_path) as device:
+        first = SerialScanner(device.address, AsciiDecoder()).arrivals()
+        next(first)
+        with pytest.raises(LinkError, match="cannot be opened"):
+            next(iter(SerialScanner(device.address, AsciiDecoder()).arrivals()))
