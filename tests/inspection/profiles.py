@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
 
-from inspection.curve import NurbsCurve
+from inspection import NurbsCurve
 
 Array = NDArray[np.float64]
 

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from scipy.special import ellipe
 
-from inspection.curve import NurbsCurve
-from inspection.errors import NominalError
+from inspection import NominalError, NurbsCurve
 from tests.inspection import profiles
 from tests.inspection.profiles import Array
 

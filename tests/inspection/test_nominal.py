@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from inspection.curve import NurbsCurve
-from inspection.errors import NominalError
-from inspection.nominal import NominalProfile, discretize
+from inspection import NominalError, NominalProfile, NurbsCurve, discretize
 from tests.inspection import profiles
 
 

@@ -9,12 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inspection.curve import NurbsCurve
-from inspection.deviations import Deviations, profile_error_mm
-from inspection.nominal import NominalProfile, discretize
-from inspection.profile_error import deviations
+from inspection import Deviations, NominalProfile, NurbsCurve, deviations, discretize, profile_error_mm
 from tests.inspection import profiles
-from tests.inspection.closest_point import Closest, closest_point
+from tests.inspection.oracle import Closest, closest_point
 from tests.inspection.profiles import Array
 
 METHODS = ("exact", "circle", "chord", "pcp", "veaw", "inversion")
@@ -117,7 +114,7 @@ def test_deviation_from_a_circle_is_radius_minus_radius(material: str, clockwise
     solid = (material == "left") != clockwise  # material inside the circle, so that a larger radius is out of it
     truth = radius - 25.0 if solid else 25.0 - radius
     for method in ("exact", "circle", "inversion"):
-        found = deviations(points, nominal, method)  # type: ignore[arg-type]
+        found = deviations(points, nominal, method)
         assert np.abs(found.deviation_mm - truth).max() < 1e-12, method
         assert np.abs(found.foot_mm - 25.0 * points / radius[:, None]).max() < 1e-11, method
     inside = radius < 25.0

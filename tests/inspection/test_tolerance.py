@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from inspection.tolerance import ToleranceZone, Verdict
+from inspection import ToleranceZone, Verdict
 
 CONFORM, UNCERTAIN, NONCONFORM = Verdict.CONFORM, Verdict.UNCERTAIN, Verdict.NONCONFORM
 

@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from inspection.curve import NurbsCurve
+from inspection import NurbsCurve
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.inspection import profiles
-from tests.inspection.closest_point import Array, closest_point
+from tests.inspection.oracle import Array, closest_point
 
 
 def ellipse_distance(a: float, b: float, point: Array) -> float:
