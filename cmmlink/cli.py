@@ -21,7 +21,8 @@ import click
 import typer
 from rich.console import Console
 
-from cmmlink.demo import DEMO_PLAN, actual_path
+from cmmlink.demo import plan_file as demo_plan_file
+from cmmlink.demo import write_part_path
 from cmmlink.errors import PlanError, StoreError
 from cmmlink.events import RunStarted, Sink
 from cmmlink.nominal_files import NominalFile, load_nominal, material_side
@@ -118,11 +119,11 @@ def demo(
     as_json: Json = False,
 ) -> int:
     """Run the whole chain on a simulated device, no set-up."""
-    plan = load_plan(DEMO_PLAN)
+    plan = load_plan(demo_plan_file())
     profile = planned_profile(plan)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "path.csv"
-        actual_path(profile, path)
+        write_part_path(profile.curve, path)
         arguments = ["--path", str(path), *_demo_motion(plan, profile, seed, defect)]
         with _simulator("serial", arguments) as address:
             return _run(plan.with_address(address), profile, Telling(headless, as_json, out), simulated=True)
