@@ -39,7 +39,9 @@ from drivers.serial_scanner import SerialScanner, ports
 from drivers.source import ScanSource
 from inspection import InspectionError, LiveInspection, NominalProfile, ToleranceZone, Verdict
 
-app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help="Inspect profiles while they are scanned.")
+app = typer.Typer(
+    add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help="Inspect profiles while they are scanned."
+)
 
 _EXIT = {Verdict.CONFORM: 0, Verdict.NONCONFORM: 1, Verdict.UNCERTAIN: 3}
 _UNUSABLE, _DEVICE_FAILED, _NO_RECORD = 2, 4, 5
