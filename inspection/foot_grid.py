@@ -1,0 +1,481 @@
+"""The map from any place to the piece of curve that is closest to it, worked out once for a nominal.
+
+The curve is cut into short polynomial pieces; a quadtree over the places where measured points can lie is refined until
+every cell knows, with proof, the one stretch of curve that can hold the closest point of all its points. Cells that the
+medial axis crosses know several stretches. Everything is packed into two arrays, because a compiled call costs per array.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inspection.curve import NurbsCurve, left_of
+from inspection.errors import NominalError
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+FAR, LISTED = -1, -2  # what a cell holds instead of a piece: nothing, or LISTED - (place of its list)
+MOST_BRANCHES = 4  # cells with more stretches than this are left to the search over the whole curve
+HEADER = 16  # numbers before the packed tables, in both arrays
+PIECE_WIDTH = 16  # 6 + 6 coefficients, parameter at the middle, parameter per unit of t, valid t from, to
+VERTEX_WIDTH = 8  # x, y, pseudo-normal x, y, parameter, kind, 0, 0
+
+_BLOCK_LEVEL = 6  # the quadtree's root is cut into 64 x 64 blocks, found by one division
+_DEEPEST = 11  # smallest cells: half a thousandth of the size of the curve
+_NEAR = 0.015  # band in which cells may become that small, as a fraction of the size
+_BAND = 0.05  # band of the whole grid: beyond it every point is searched for along the whole curve
+_PIECE_LENGTH = 1 / 200  # longest piece, as a fraction of the size
+_PIECE_TURN = 1 / 6  # rad; a piece never turns by more, so that one third-order step from its middle comes close
+_OVERLAP = 0.3  # a piece stays valid for this part of its length beyond its borders, within its knot span
+_VERTEX_GRAIN = 2e-13  # part of a piece by which a foot may miss the end of the curve through round-off
+_STEEPEST = 0.9  # a cell is certified where curvature x distance stays below this on the near side of the evolute
+_MOST_PIECES = 200_000
+_NODES = (np.arange(9) + 0.5) / 9  # inside a knot span, never on its borders
+_CHEBYSHEV = np.cos((2 * np.arange(6) + 1) * np.pi / 12)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FootGrid:
+    """Packed tables of a curve for `kernels.project`.
+
+    reals      : header (origin x, y, blocks per mm, size in mm, pieces' ...), pieces, bounds of pieces, boxes of the search tree, vertices
+    integers   : header (blocks across, offsets of the tables in both arrays), links of pieces, blocks, cells, lists
+    pieces     : number of polynomial pieces
+    cells      : number of cells of the grid
+    band_mm    : half width of the band that the grid covers
+    """
+
+    reals: Array
+    integers: NDArray[np.int32]
+    pieces: int
+    cells: int
+    band_mm: float
+
+    def __post_init__(self) -> None:
+        self.reals.setflags(write=False)
+        self.integers.setflags(write=False)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pieces:
+    """Polynomial pieces in order along the curve.
+
+    rows           : (p, PIECE_WIDTH)
+    after, before  : (p,) the adjoining piece, or -1 - vertex
+    start_mm, along_mm, sagitta_mm : (p, 2), (p, 2), (p,) chord and how far the piece strays from it
+    middle_mm, tangent, curvature  : (p, 2), (p, 2), (p,) at the middle
+    least, most    : (p,) range of curvature, overlap included
+    reach_mm       : (p,) half the arc length, overlap included
+    length_mm      : (p,)
+    vertices       : (v, VERTEX_WIDTH)
+    """
+
+    rows: Array
+    after: Index
+    before: Index
+    start_mm: Array
+    along_mm: Array
+    sagitta_mm: Array
+    middle_mm: Array
+    tangent: Array
+    curvature: Array
+    least: Array
+    most: Array
+    reach_mm: Array
+    length_mm: Array
+    vertices: Array
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+
+def build_foot_grid(curve: NurbsCurve) -> FootGrid:
+    """Tables for the closest point of `curve` to any place. Raises NominalError when the curve cannot be cut into pieces."""
+    pieces = _pieces(curve)
+    ends = np.vstack([pieces.start_mm, pieces.start_mm + pieces.along_mm])
+    low, high = ends.min(axis=0), ends.max(axis=0)
+    size = float((high - low).max())
+    root = size * (1 + 2 * _BAND) * 1.02
+    origin = (low + high) / 2 - root / 2
+    leaves = _refine(pieces, origin, root, size)
+    return _pack(pieces, origin, root, size, leaves)
+
+
+# --- pieces -----------------------------------------------------------------------------------------------------------
+
+
+def _pieces(curve: NurbsCurve) -> _Pieces:
+    size = float(np.ptp(curve.control_points_mm, axis=0).max())
+    low, high, span_low, span_high = _cut(curve, size)
+    width, middle = high - low, (low + high) / 2
+    smooth_before, smooth_after = low > span_low, high < span_high
+    first = np.where(smooth_before, np.maximum(-0.5 - _OVERLAP, (span_low - middle) / width), -0.5)
+    last = np.where(smooth_after, np.minimum(0.5 + _OVERLAP, (span_high - middle) / width), 0.5)
+    coefficients = _coefficients(curve, middle, width, first, last)
+    before, after, vertices = _links(curve, low, high, size)
+    is_end = np.append(vertices[:, 5] == 2, False)
+    grain = np.where(is_end, _VERTEX_GRAIN, -_VERTEX_GRAIN)
+    slack_before, slack_after = (np.where(link < 0, grain[np.where(link < 0, -1 - link, -1)], 1e-9) for link in (before, after))
+    rows = np.column_stack([coefficients.reshape(-1, 12), middle, width, first - slack_before, last + slack_after])
+    return _with_geometry(rows, before, after, vertices)
+
+
+def _cut(curve: NurbsCurve, size: float) -> tuple[Array, Array, Array, Array]:
+    """Halve every knot span until its parts are short, nearly straight, and polynomials of degree five."""
+    start, end = curve.domain
+    knots = np.unique(np.clip(curve.knots, start, end))
+    low, high = knots[:-1], knots[1:]
+    span_low, span_high = low, high
+    done: list[tuple[Array, ...]] = []
+    for _ in range(40):
+        u = low[:, None] + (high - low)[:, None] * _NODES
+        _, first, second = curve.derivatives(u.ravel(), 2).reshape(3, *u.shape, 2)
+        speed = np.hypot(first[..., 0], first[..., 1])
+        cross = np.abs(first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0])
+        length = speed.mean(axis=1) * (high - low)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            turn = (cross / speed**2).max(axis=1) * (high - low)
+            uneven = speed.max(axis=1) / speed.min(axis=1)
+        good = (length <= _PIECE_LENGTH * size) & (turn <= _PIECE_TURN) & (uneven <= 1.5)
+        good &= _is_quintic(curve, low, high, span_low, span_high, size)
+        done.append((low[good], high[good], span_low[good], span_high[good]))
+        middle = (low + high) / 2
+        low, high, span_low, span_high = (
+            np.concatenate([a[~good], b[~good]]) for a, b in ((low, middle), (middle, high), (span_low, span_low), (span_high, span_high))
+        )
+        if not low.size or len(low) > _MOST_PIECES:
+            break
+    if low.size:
+        raise NominalError(f"the curve stands still or is not smooth near parameter {low[0]:g}: remove the repeated control point or knot")
+    order = np.argsort(np.concatenate([part[0] for part in done]))
+    cut = tuple(np.concatenate([part[i] for part in done])[order] for i in range(4))
+    return cut[0], cut[1], cut[2], cut[3]
+
+
+def _is_polynomial(curve: NurbsCurve) -> bool:
+    """Whether every knot span is a polynomial of degree five or less as it stands."""
+    assert curve.weights is not None
+    return curve.degree <= 5 and bool(np.all(curve.weights == curve.weights[0]))
+
+
+def _is_quintic(curve: NurbsCurve, low: Array, high: Array, span_low: Array, span_high: Array, size: float) -> NDArray[np.bool_]:
+    """Whether the quintic through six points misses the curve by no more than round-off (between the six, where it is worst)."""
+    if _is_polynomial(curve):
+        return np.ones(len(low), dtype=bool)
+    middle, width = (low + high) / 2, high - low
+    first, last = np.maximum(-0.5 - _OVERLAP, (span_low - middle) / width), np.minimum(0.5 + _OVERLAP, (span_high - middle) / width)
+    c = _coefficients(curve, middle, width, first, last)
+    t = (first + last)[:, None] / 2 + (last - first)[:, None] / 2 * np.cos(np.arange(1, 6) * np.pi / 6)  # extrema of the error
+    exact = curve.point((middle[:, None] + width[:, None] * t).ravel()).reshape(*t.shape, 2)
+    powers = t[:, :, None] ** np.arange(6)
+    missed = np.abs(np.einsum("pdk,ptk->ptd", c, powers) - exact).max(axis=(1, 2))
+    scale = max(size, float(np.abs(curve.control_points_mm).max()))
+    return np.asarray(missed <= 4 * np.finfo(float).eps * scale)
+
+
+def _coefficients(curve: NurbsCurve, middle: Array, width: Array, first: Array, last: Array) -> Array:
+    """Coefficients (p, 2, 6) of C(middle + width t)."""
+    if _is_polynomial(curve):
+        derivative = curve.derivatives(middle, 5)  # (6, p, 2)
+        factor = width ** np.arange(6)[:, None] / np.array([1.0, 1, 2, 6, 24, 120])[:, None]  # (6, p)
+        return np.ascontiguousarray((derivative * factor[:, :, None]).transpose(1, 2, 0))
+    t = (first + last)[:, None] / 2 + (last - first)[:, None] / 2 * _CHEBYSHEV  # (p, 6)
+    centre = curve.point(middle)
+    points = curve.point((middle[:, None] + width[:, None] * t).ravel()).reshape(*t.shape, 2) - centre[:, None, :]
+    solution = np.linalg.solve(t[:, :, None] ** np.arange(6), points).transpose(0, 2, 1)  # (p, 2, 6)
+    solution[:, :, 0] += centre
+    return np.ascontiguousarray(solution)
+
+
+def _links(curve: NurbsCurve, low: Array, high: Array, size: float) -> tuple[Index, Index, Array]:
+    """The piece before and after each piece, or -1 - vertex; and the vertices: corners, then the ends of an open curve."""
+    count = len(low)
+    before, after = np.arange(-1, count - 1), np.arange(1, count + 1)
+    before[0], after[-1] = count - 1, 0
+    vertices = []
+    for corner in curve.corners:
+        follower = int(np.argmin(np.abs(low - corner)))
+        vertices.append(_vertex(curve, corner, 1.0))
+        after[before[follower]], before[follower] = -len(vertices), -len(vertices)
+    if not curve.closed:
+        before[0], after[-1] = -1 - len(vertices), -2 - len(vertices)
+        vertices += [_vertex(curve, curve.domain[0], 2.0), _vertex(curve, curve.domain[1], 2.0)]
+    return before, after, np.array(vertices).reshape(-1, VERTEX_WIDTH)
+
+
+def _vertex(curve: NurbsCurve, u: float, kind: float) -> Array:
+    """One row of the vertices. The pseudo-normal is the bisector of both normals (of a cusp: the later one's)."""
+    here = np.array([u])
+    point, tangent = curve.derivatives(here, 1)[:, 0]
+    tangent = tangent / np.hypot(*tangent)
+    if kind == 1.0:
+        earlier = curve.derivatives(left_of(here, curve), 1)[1, 0]
+        both = tangent + earlier / np.hypot(*earlier)
+        tangent = both / np.hypot(*both) if np.hypot(*both) > 1e-9 else tangent
+    return np.array([point[0], point[1], -tangent[1], tangent[0], u, kind, 0.0, 0.0])
+
+
+def _with_geometry(rows: Array, before: Index, after: Index, vertices: Array) -> _Pieces:
+    """Chords, frames and bounds of the pieces from their coefficients."""
+    c = rows[:, :12].reshape(-1, 2, 6)
+    first, last = rows[:, 14], rows[:, 15]
+    t = first[:, None] + (last - first)[:, None] * np.linspace(0, 1, 9)  # (p, 9)
+    powers = np.arange(6)
+    velocity = np.einsum("pdk,ptk->ptd", c[:, :, 1:] * powers[1:], t[:, :, None] ** powers[:5])
+    bend = np.einsum("pdk,ptk->ptd", c[:, :, 2:] * (powers[2:] * powers[1:5]), t[:, :, None] ** powers[:4])
+    speed = np.hypot(velocity[..., 0], velocity[..., 1])
+    curvature = (velocity[..., 0] * bend[..., 1] - velocity[..., 1] * bend[..., 0]) / speed**3
+    spread = 0.25 * np.ptp(curvature, axis=1)  # what may hide between nine samples
+    start, stop = (np.einsum("pdk,k->pd", c, np.array(side) ** powers) for side in (-0.5, 0.5))
+    tangent = c[:, :, 1] / np.hypot(c[:, 0, 1], c[:, 1, 1])[:, None]
+    second = np.abs(c[:, :, 2:] * (powers[2:] * powers[1:5]) * 0.5 ** powers[:4]).sum(axis=2)  # bound of |C''|
+    middle_speed = np.hypot(c[:, 0, 1], c[:, 1, 1])
+    return _Pieces(
+        rows=rows,
+        after=after,
+        before=before,
+        start_mm=start,
+        along_mm=stop - start,
+        sagitta_mm=np.hypot(second[:, 0], second[:, 1]) / 8,
+        middle_mm=c[:, :, 0],
+        tangent=tangent,
+        curvature=2 * (c[:, 0, 1] * c[:, 1, 2] - c[:, 1, 1] * c[:, 0, 2]) / middle_speed**3,
+        least=curvature.min(axis=1) - spread,
+        most=curvature.max(axis=1) + spread,
+        reach_mm=speed.max(axis=1) * np.maximum(-first, last),
+        length_mm=middle_speed,
+        vertices=vertices,
+    )
+
+
+# --- quadtree ---------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Leaves:
+    """Finished cells: level, x and y index at that level, content; and the lists of pieces of LISTED cells."""
+
+    level: Index
+    x: Index
+    y: Index
+    content: Index
+    lists: Index
+
+
+@dataclass(slots=True, eq=False)
+class _Pairs:
+    """Cells of one level with the pieces that may hold the closest point of one of their points, sorted by cell, then piece.
+
+    x, y  : (c,) index of the cell
+    first : (c,) its first pair
+    cell, piece : (k,) the pairs
+    """
+
+    x: Index
+    y: Index
+    first: Index
+    cell: Index
+    piece: Index
+
+
+def _refine(pieces: _Pieces, origin: Array, root: float, size: float) -> _Leaves:
+    """Split cells until each is certified, or as small as its distance from the curve allows."""
+    level = 0
+    count = len(pieces)
+    pairs = _Pairs(np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros(count, np.int64), np.arange(count))
+    done: list[tuple[Index, ...]] = []
+    lists: list[int] = []
+    while len(pairs.x):
+        side = root / 2**level
+        radius = side * np.sqrt(0.5) * (1 + 1e-9)
+        centre = origin + (np.column_stack([pairs.x, pairs.y]) + 0.5) * side
+        nearest, lowest = _keep_possible(pairs, pieces, centre, radius)
+        far = lowest - radius > _BAND * size
+        deepest = np.where(lowest - radius > _NEAR * size, _DEEPEST - 2, _DEEPEST)
+        branches, certified, fits = _judge(pairs, pieces, centre, nearest, radius)
+        single = (branches == 1) & certified & (fits | (level >= deepest))
+        last = level >= deepest
+        ready = ~far & (level >= _BLOCK_LEVEL) & (single | last)
+        content = np.where(single, pairs.piece[nearest], FAR)
+        listed = np.flatnonzero(ready & ~single & certified & (branches <= MOST_BRANCHES))
+        content[listed] = _lists(pairs, pieces, centre, listed, lists)
+        rows = np.flatnonzero(ready)
+        done.append((np.full(len(rows), level), pairs.x[rows], pairs.y[rows], content[rows]))
+        pairs = _split(pairs, ~far & ~ready)
+        level += 1
+    joined = [np.concatenate([part[i] for part in done]) for i in range(4)]
+    return _Leaves(joined[0], joined[1], joined[2], joined[3], np.array(lists, dtype=np.int64))
+
+
+def _chord_distance(pairs: _Pairs, pieces: _Pieces, centre: Array) -> Array:
+    """Distance (k,) of each pair's cell centre from the chord of its piece."""
+    p, x, y = pairs.piece, centre[pairs.cell, 0], centre[pairs.cell, 1]
+    x -= pieces.start_mm[p, 0]
+    y -= pieces.start_mm[p, 1]
+    ax, ay = pieces.along_mm[p, 0], pieces.along_mm[p, 1]
+    t = np.clip((x * ax + y * ay) / (ax * ax + ay * ay), 0.0, 1.0)
+    x -= t * ax
+    y -= t * ay
+    return np.asarray(np.sqrt(x * x + y * y))
+
+
+def _keep_possible(pairs: _Pairs, pieces: _Pieces, centre: Array, radius: float) -> tuple[Index, Array]:
+    """Drop pairs that cannot hold a closest point; the pair of the nearest piece and the least distance of every cell.
+
+    A point of the cell is at most upper + radius from the curve, so its foot is at most upper + 2 radius from the centre.
+    """
+    distance = _chord_distance(pairs, pieces, centre)
+    sagitta = pieces.sagitta_mm[pairs.piece]
+    upper = np.minimum.reduceat(distance + sagitta, pairs.first)
+    keep = distance - sagitta <= (upper + 2 * radius)[pairs.cell]
+    distance, sagitta = distance[keep], sagitta[keep]
+    pairs.cell, pairs.piece = pairs.cell[keep], pairs.piece[keep]
+    pairs.first = np.flatnonzero(np.diff(pairs.cell, prepend=-1))
+    lowest = np.minimum.reduceat(distance - sagitta, pairs.first)
+    is_least = np.flatnonzero(distance == np.minimum.reduceat(distance, pairs.first)[pairs.cell])
+    nearest = is_least[np.flatnonzero(np.diff(pairs.cell[is_least], prepend=-1))]
+    return nearest, lowest
+
+
+def _breaks(pairs: _Pairs, pieces: _Pieces) -> NDArray[np.bool_]:
+    """Pairs (k,) at which a new stretch of curve begins within their cell, the first of the cell included."""
+    piece = pairs.piece
+    starts = np.ones(len(piece), dtype=bool)
+    starts[1:] = (pieces.before[piece[1:]] != piece[:-1]) | (pairs.cell[1:] != pairs.cell[:-1])
+    return starts
+
+
+def _judge(
+    pairs: _Pairs, pieces: _Pieces, centre: Array, nearest: Index, radius: float
+) -> tuple[Index, NDArray[np.bool_], NDArray[np.bool_]]:
+    """For every cell: stretches of curve, whether each has one foot at most, whether the nearest piece covers all feet of the cell."""
+    starts = _breaks(pairs, pieces)
+    branches = np.add.reduceat(starts.astype(np.int64), pairs.first)
+    final = np.append(pairs.first[1:], len(pairs.piece)) - 1
+    around_seam = pieces.before[pairs.piece[pairs.first]] == pairs.piece[final]
+    branches -= around_seam & (branches > 1)
+    p = pairs.piece
+    offset = centre[pairs.cell] - pieces.middle_mm[p]
+    tx, ty = pieces.tangent[p, 0], pieces.tangent[p, 1]
+    along, aside = offset[:, 0] * tx + offset[:, 1] * ty, offset[:, 1] * tx - offset[:, 0] * ty
+    steepest = _steepest(pieces, p, along, aside, radius)
+    certified = np.maximum.reduceat(steepest, pairs.first) < _STEEPEST
+    p, along, aside = p[nearest], along[nearest], aside[nearest]
+    shrink = np.maximum(1 - pieces.curvature[p] * aside, 0.1)
+    foot = along / shrink / pieces.length_mm[p]
+    reach = radius / np.clip(1 - steepest[nearest], 0.1, 1.0) / pieces.length_mm[p]
+    fits = (foot - reach >= pieces.rows[p, 14]) | (pieces.before[p] < 0)
+    fits &= (foot + reach <= pieces.rows[p, 15]) | (pieces.after[p] < 0)
+    return branches, certified, fits
+
+
+def _steepest(pieces: _Pieces, p: Index, along: Array, aside: Array, radius: float) -> Array:
+    """Upper bound (k,) of curvature x signed distance over a piece and all points of the cell.
+
+    Below one, the tangential distance grows along the piece, so there is one foot at most.
+    """
+    least, most, reach = pieces.least[p], pieces.most[p], pieces.reach_mm[p]
+    sharpest = np.maximum(np.abs(least), np.abs(most))
+    drift = sharpest * (np.abs(along) + 2 * reach * np.maximum(1.0, sharpest * np.abs(aside))) * reach + radius
+    low, high = aside - drift, aside + drift
+    return np.asarray(np.maximum(np.maximum(least * low, least * high), np.maximum(most * low, most * high)))
+
+
+def _lists(pairs: _Pairs, pieces: _Pieces, centre: Array, cells: Index, lists: list[int]) -> Index:
+    """Append the nearest piece of each stretch of the cells to `lists` (count, pieces...); what the cells hold."""
+    starts = _breaks(pairs, pieces)
+    distance = _chord_distance(pairs, pieces, centre)
+    final = np.append(pairs.first[1:], len(pairs.piece))
+    content = np.empty(len(cells), dtype=np.int64)
+    known: dict[tuple[int, ...], int] = {}
+    for row, cell in enumerate(cells):
+        stretch = slice(pairs.first[cell], final[cell])
+        piece, reach = pairs.piece[stretch], distance[stretch]
+        borders = np.append(np.flatnonzero(starts[stretch]), len(piece))
+        chosen = [int(piece[a + np.argmin(reach[a:b])]) for a, b in zip(borders[:-1], borders[1:], strict=True)]
+        key = tuple(chosen)
+        if key not in known:
+            known[key] = len(lists)
+            lists.extend([len(chosen), *chosen])
+        content[row] = LISTED - known[key]
+    return content
+
+
+def _split(pairs: _Pairs, chosen: NDArray[np.bool_]) -> _Pairs:
+    """The four quarters of every chosen cell, each with its parent's pairs."""
+    new = np.cumsum(chosen) - 1
+    kept = chosen[pairs.cell]
+    cell, piece = new[pairs.cell[kept]], pairs.piece[kept]
+    count = int(chosen.sum())
+    x, y = 2 * pairs.x[chosen], 2 * pairs.y[chosen]
+    cells = np.concatenate([cell + quarter * count for quarter in range(4)])
+    first = np.flatnonzero(np.diff(cells, prepend=-1))
+    return _Pairs(np.concatenate([x, x + 1, x, x + 1]), np.concatenate([y, y, y + 1, y + 1]), first, cells, np.tile(piece, 4))
+
+
+# --- packing ----------------------------------------------------------------------------------------------------------
+
+
+def _pack(pieces: _Pieces, origin: Array, root: float, size: float, leaves: _Leaves) -> FootGrid:
+    across = 2**_BLOCK_LEVEL
+    blocks, cells = _cells(leaves)
+    boxes = _search_tree(pieces)
+    bounds = _bounds(pieces)
+    tables = [np.zeros(HEADER), pieces.rows.ravel(), bounds.ravel(), boxes.ravel(), pieces.vertices.ravel()]
+    links = np.column_stack([pieces.before, pieces.after])
+    index_tables = [np.zeros(HEADER, np.int64), links.ravel(), blocks.ravel(), cells, leaves.lists]
+    real_at = np.cumsum([len(table) for table in tables])
+    index_at = np.cumsum([len(table) for table in index_tables])
+    tables[0][:5] = [origin[0], origin[1], across / root, size, 16 * np.finfo(float).eps * (size + np.abs(origin).max())]
+    index_tables[0][:13] = [across, len(pieces), len(boxes) // 2, *real_at, *index_at]
+    return FootGrid(np.concatenate(tables), np.concatenate(index_tables).astype(np.int32), len(pieces), len(cells), _BAND * size)
+
+
+def _cells(leaves: _Leaves) -> tuple[Index, Index]:
+    """Blocks (across x across, 2): offset and depth of their cells, and the content of all cells."""
+    across = 2**_BLOCK_LEVEL
+    depth = leaves.level - _BLOCK_LEVEL
+    block = (leaves.y >> depth) * across + (leaves.x >> depth)
+    deepest = np.full(across * across, -1)
+    np.maximum.at(deepest, block, depth)
+    offset = np.concatenate([[0], np.cumsum(np.where(deepest < 0, 0, 4 ** np.maximum(deepest, 0)))])
+    cells = np.full(offset[-1], FAR)
+    finer = deepest[block] - depth
+    for fine in np.unique(finer):
+        rows = np.flatnonzero(finer == fine)
+        row_depth = deepest[block[rows]]
+        step = np.arange(2**fine)
+        x = ((leaves.x[rows] << fine) & ((1 << row_depth) - 1))[:, None, None] + step[None, None, :]
+        y = ((leaves.y[rows] << fine) & ((1 << row_depth) - 1))[:, None, None] + step[None, :, None]
+        place = offset[block[rows]][:, None, None] + (y << row_depth[:, None, None]) + x
+        cells[place] = leaves.content[rows][:, None, None]
+    return np.column_stack([np.where(deepest < 0, -1, offset[:-1]), np.maximum(deepest, 0)]), cells
+
+
+def _bounds(pieces: _Pieces) -> Array:
+    """Bounds (p, 4) of |C'|, |C''|, |C'''| on each piece."""
+    c = np.abs(pieces.rows[:, :12].reshape(-1, 2, 6))
+    result = np.zeros((len(pieces), 4))
+    factor = np.ones(6)
+    for order in range(3):
+        factor = factor * np.maximum(np.arange(6) - order, 0)
+        terms = c * factor * 0.5 ** np.maximum(np.arange(6) - order - 1, 0)
+        result[:, order] = np.hypot(*terms.sum(axis=2).T)
+    return result
+
+
+def _search_tree(pieces: _Pieces) -> Array:
+    """Bounding boxes (2 q, 4) of a binary tree over the pieces: node 1 is the root, node q + p is piece p; low x, y, high x, y."""
+    q = 1 << max(0, (len(pieces) - 1).bit_length())
+    boxes = np.full((2 * q, 4), np.inf)
+    boxes[:, 2:] = -np.inf
+    ends = np.stack([pieces.start_mm, pieces.start_mm + pieces.along_mm])
+    sagitta = pieces.sagitta_mm[:, None] * (1 + 1e-9)
+    boxes[q : q + len(pieces)] = np.hstack([ends.min(axis=0) - sagitta, ends.max(axis=0) + sagitta])
+    while q > 1:
+        children = boxes[q : 2 * q].reshape(q // 2, 2, 4)
+        boxes[q // 2 : q] = np.hstack([children[:, :, :2].min(axis=1), children[:, :, 2:].max(axis=1)])
+        q //= 2
+    return boxes
