@@ -22,7 +22,7 @@ HEADER = 16  # numbers before the packed tables, in both arrays
 PIECE_WIDTH = 16  # 6 + 6 coefficients, parameter at the middle, parameter per unit of t, valid t from, to
 VERTEX_WIDTH = 8  # x, y, pseudo-normal x, y, parameter, kind, 0, 0
 
-_BLOCK_LEVEL = 6  # the quadtree's root is cut into 64 x 64 blocks, found by one division
+BLOCK_LEVEL = 6  # the quadtree's root is cut into 64 x 64 blocks, found by one division
 _DEEPEST = 11  # smallest cells: half a thousandth of the size of the curve
 _NEAR = 0.015  # band in which cells may become that small, as a fraction of the size
 _BAND = 0.05  # band of the whole grid: beyond it every point is searched for along the whole curve
@@ -297,10 +297,10 @@ def _refine(pieces: _Pieces, origin: Array, root: float, size: float) -> _Leaves
         branches, certified, fits = _judge(pairs, pieces, centre, nearest, radius)
         single = (branches == 1) & certified & (fits | (level >= deepest))
         last = level >= deepest
-        ready = ~far & (level >= _BLOCK_LEVEL) & (single | last)
+        ready = ~far & (level >= BLOCK_LEVEL) & (single | last)
         content = np.where(single, pairs.piece[nearest], FAR)
         listed = np.flatnonzero(ready & ~single & certified & (branches <= MOST_BRANCHES))
-        content[listed] = _lists(pairs, pieces, centre, listed, lists)
+        content[listed] = _lists(pairs, pieces, centre, radius, listed, lists)
         rows = np.flatnonzero(ready)
         done.append((np.full(len(rows), level), pairs.x[rows], pairs.y[rows], content[rows]))
         pairs = _split(pairs, ~far & ~ready)
@@ -363,12 +363,25 @@ def _judge(
     steepest = _steepest(pieces, p, along, aside, radius)
     certified = np.maximum.reduceat(steepest, pairs.first) < _STEEPEST
     p, along, aside = p[nearest], along[nearest], aside[nearest]
+    certified &= _neighbours_certified(pieces, p, centre, radius)
     shrink = np.maximum(1 - pieces.curvature[p] * aside, 0.1)
     foot = along / shrink / pieces.length_mm[p]
     reach = radius / np.clip(1 - steepest[nearest], 0.1, 1.0) / pieces.length_mm[p]
     fits = (foot - reach >= pieces.rows[p, 14]) | (pieces.before[p] < 0)
     fits &= (foot + reach <= pieces.rows[p, 15]) | (pieces.after[p] < 0)
     return branches, certified, fits
+
+
+def _neighbours_certified(pieces: _Pieces, p: Index, centre: Array, radius: float) -> NDArray[np.bool_]:
+    """Whether the pieces before and after p (c,), too, have one foot at most for points near centre (c, 2)."""
+    certified = np.ones(len(p), dtype=bool)
+    for link in (pieces.before[p], pieces.after[p]):
+        neighbour = np.where(link >= 0, link, p)
+        offset = centre - pieces.middle_mm[neighbour]
+        tx, ty = pieces.tangent[neighbour, 0], pieces.tangent[neighbour, 1]
+        along, aside = offset[:, 0] * tx + offset[:, 1] * ty, offset[:, 1] * tx - offset[:, 0] * ty
+        certified &= _steepest(pieces, neighbour, along, aside, radius) < _STEEPEST
+    return certified
 
 
 def _steepest(pieces: _Pieces, p: Index, along: Array, aside: Array, radius: float) -> Array:
@@ -383,7 +396,7 @@ def _steepest(pieces: _Pieces, p: Index, along: Array, aside: Array, radius: flo
     return np.asarray(np.maximum(np.maximum(least * low, least * high), np.maximum(most * low, most * high)))
 
 
-def _lists(pairs: _Pairs, pieces: _Pieces, centre: Array, cells: Index, lists: list[int]) -> Index:
+def _lists(pairs: _Pairs, pieces: _Pieces, centre: Array, radius: float, cells: Index, lists: list[int]) -> Index:
     """Append the nearest piece of each stretch of the cells to `lists` (count, pieces...); what the cells hold."""
     starts = _breaks(pairs, pieces)
     distance = _chord_distance(pairs, pieces, centre)
@@ -395,6 +408,9 @@ def _lists(pairs: _Pairs, pieces: _Pieces, centre: Array, cells: Index, lists: l
         piece, reach = pairs.piece[stretch], distance[stretch]
         borders = np.append(np.flatnonzero(starts[stretch]), len(piece))
         chosen = [int(piece[a + np.argmin(reach[a:b])]) for a, b in zip(borders[:-1], borders[1:], strict=True)]
+        if not _neighbours_certified(pieces, np.array(chosen), np.tile(centre[cell], (len(chosen), 1)), radius).all():
+            content[row] = FAR
+            continue
         key = tuple(chosen)
         if key not in known:
             known[key] = len(lists)
@@ -419,7 +435,7 @@ def _split(pairs: _Pairs, chosen: NDArray[np.bool_]) -> _Pairs:
 
 
 def _pack(pieces: _Pieces, origin: Array, root: float, size: float, leaves: _Leaves) -> FootGrid:
-    across = 2**_BLOCK_LEVEL
+    across = 2**BLOCK_LEVEL
     blocks, cells = _cells(leaves)
     boxes = _search_tree(pieces)
     bounds = _bounds(pieces)
@@ -430,13 +446,21 @@ def _pack(pieces: _Pieces, origin: Array, root: float, size: float, leaves: _Lea
     index_at = np.cumsum([len(table) for table in index_tables])
     tables[0][:5] = [origin[0], origin[1], across / root, size, 16 * np.finfo(float).eps * (size + np.abs(origin).max())]
     index_tables[0][:13] = [across, len(pieces), len(boxes) // 2, *real_at, *index_at]
-    return FootGrid(np.concatenate(tables), np.concatenate(index_tables).astype(np.int32), len(pieces), len(cells), _BAND * size)
+    return FootGrid(_aligned(np.concatenate(tables)), np.concatenate(index_tables).astype(np.int32), len(pieces), len(cells), _BAND * size)
+
+
+def _aligned(numbers: Array) -> Array:
+    """The same numbers, beginning on a cache line."""
+    memory = np.empty(len(numbers) + 8)
+    skip = (-memory.ctypes.data % 64) // 8
+    memory[skip : skip + len(numbers)] = numbers
+    return memory[skip : skip + len(numbers)]
 
 
 def _cells(leaves: _Leaves) -> tuple[Index, Index]:
-    """Blocks (across x across, 2): offset and depth of their cells, and the content of all cells."""
-    across = 2**_BLOCK_LEVEL
-    depth = leaves.level - _BLOCK_LEVEL
+    """Blocks (across x across,), 16 x offset + depth of their cells or FAR, and the content of all cells."""
+    across = 2**BLOCK_LEVEL
+    depth = leaves.level - BLOCK_LEVEL
     block = (leaves.y >> depth) * across + (leaves.x >> depth)
     deepest = np.full(across * across, -1)
     np.maximum.at(deepest, block, depth)
@@ -451,7 +475,7 @@ def _cells(leaves: _Leaves) -> tuple[Index, Index]:
         y = ((leaves.y[rows] << fine) & ((1 << row_depth) - 1))[:, None, None] + step[None, :, None]
         place = offset[block[rows]][:, None, None] + (y << row_depth[:, None, None]) + x
         cells[place] = leaves.content[rows][:, None, None]
-    return np.column_stack([np.where(deepest < 0, -1, offset[:-1]), np.maximum(deepest, 0)]), cells
+    return np.where(deepest < 0, -1, 16 * offset[:-1] + deepest), cells
 
 
 def _bounds(pieces: _Pieces) -> Array:

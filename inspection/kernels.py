@@ -18,15 +18,17 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from inspection.foot_grid import HEADER, LISTED, MOST_BRANCHES, PIECE_WIDTH, VERTEX_WIDTH, FootGrid
+from inspection.foot_grid import BLOCK_LEVEL, FAR, LISTED, MOST_BRANCHES, PIECE_WIDTH, VERTEX_WIDTH, FootGrid
 
 Array = NDArray[np.float64]
 
 _BLOCK = 128  # points worked on together: their intermediate values stay in the first-level cache
-_ROUNDS = 4  # tries for points whose foot lies on a neighbouring piece or on one of several stretches
 _QUEUE = _BLOCK * MOST_BRANCHES
-_REALS = 10 * (_BLOCK + _QUEUE)
-_INTEGERS = 2 * _BLOCK + 3 * _QUEUE
+_REALS = 29 * _BLOCK + _QUEUE
+_INTEGERS = 7 * _BLOCK + 3 * _QUEUE
+_ACROSS = float(1 << BLOCK_LEVEL)
+_TRIES, _WALKED = 2, 4  # further steps on one piece; added to the tries once the neighbouring piece is tried
+_ANY = 0x7FFFFFFF  # tells the compiler that an index is not negative
 _STEP = 3e-9  # largest last step, in pieces, after which the square of the error is below round-off
 _CHUNK = 16_384  # points per task when several threads share a large batch
 _compiled: Callable[..., Any] = njit(cache=True, nogil=True, error_model="numpy")
@@ -49,6 +51,7 @@ def _stack_reals(typing_context: Any) -> Any:
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         place = cgutils.alloca_once(builder, ir.ArrayType(ir.DoubleType(), _REALS))
+        place.align = 64
         return builder.bitcast(place, ir.DoubleType().as_pointer())
 
     return types.CPointer(types.float64)(), generate
@@ -63,6 +66,44 @@ def _stack_integers(typing_context: Any) -> Any:
         return builder.bitcast(place, ir.IntType(64).as_pointer())
 
     return types.CPointer(types.int64)(), generate
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _rows_to_columns(typing_context: Any, table: Any, rows: Any, first: Any, target: Any, place: Any) -> Any:
+    """Eight rows of eight numbers of a table become eight columns: target[place + q _BLOCK + i] = table[rows[first + i] + q].
+
+    Whole rows are loaded and transposed in registers, which takes a third of the time of gathering single numbers.
+    """
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        eight = ir.VectorType(ir.DoubleType(), 8)
+        table_data, rows_data, target_data = (
+            context.make_array(signature.args[i])(context, builder, args[i]).data for i in (0, 1, 3)
+        )
+        word = ir.IntType(64)
+
+        def at(data: Any, offset: Any) -> Any:
+            return builder.gep(data, [offset], inbounds=True)
+
+        lines = []
+        for i in range(8):
+            row = builder.load(at(rows_data, builder.add(args[2], word(i))))
+            lines.append(builder.load(builder.bitcast(at(table_data, row), eight.as_pointer()), align=8))
+        for span in (4, 2, 1):
+            mask_low = [i + (8 - span if i & span else 0) for i in range(8)]
+            mask_high = [i + (8 if i & span else span) for i in range(8)]
+            mixed = list(lines)
+            for i in range(8):
+                if not i & span:
+                    mixed[i] = builder.shuffle_vector(lines[i], lines[i + span], ir.Constant(ir.VectorType(ir.IntType(32), 8), mask_low))
+                    mixed[i + span] = builder.shuffle_vector(lines[i], lines[i + span], ir.Constant(ir.VectorType(ir.IntType(32), 8), mask_high))
+            lines = mixed
+        for q in range(8):
+            offset = builder.add(args[4], word(q * _BLOCK))
+            builder.store(lines[q], builder.bitcast(at(target_data, offset), eight.as_pointer()), align=8)
+        return context.get_dummy_value()
+
+    return types.void(table, rows, types.int64, target, types.int64), generate
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,9 +131,9 @@ def project(points_mm: Array, grid: FootGrid, threads: int | None = None) -> Fee
 
     threads : None chooses by the number of points; the result is the same.
     """
-    points = np.ascontiguousarray(points_mm, dtype=np.float64).view()
+    points = np.ascontiguousarray(points_mm, dtype=np.float64).reshape(-1).view()
     points.flags.writeable = False  # one type for the compiler, whatever the caller's flags
-    m = len(points)
+    m = len(points) // 2
     numbers = np.empty(7 * m)
     vertex = np.empty(m, dtype=np.uint8)
     if threads is None:
@@ -105,154 +146,291 @@ def project(points_mm: Array, grid: FootGrid, threads: int | None = None) -> Fee
     return Feet(numbers[:m], numbers[m : 3 * m].reshape(m, 2), numbers[3 * m : 4 * m], numbers[4 * m : 6 * m].reshape(m, 2), numbers[6 * m :], vertex)
 
 
-# Rows of the block's memory, _BLOCK or _QUEUE numbers each.
-_RX, _RY, _RU, _RFX, _RFY, _RE, _RNX, _RNY, _RK, _RT = range(10)
+# Where the memory of a block keeps what, _BLOCK numbers each. Reals: the row of the piece (16 columns), then
+_X, _Y, _U, _FOOT_X, _FOOT_Y, _E, _NX, _NY, _CURVATURE, _T, _RESUME, _LEAST, _LEAST_U, _WAITING_T = (_BLOCK * i for i in range(16, 30))
+# Integers: piece (or FAR, LISTED - place) of each lane, its row, whether solved, its point, its tries; which points are lost; the queue
+_CONTENT, _ROW, _SOLVED, _POINT, _TRY, _LOST = (_BLOCK * i for i in range(6))
+_WAITING = 7 * _BLOCK
 
 
 @_compiled
 def _project(points: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, start: int, stop: int) -> None:
-    """Closest points of points[start:stop] into numbers (7 m: parameter, foot, distance, gradient, curvature) and vertex (m,)."""
-    m = len(points)
-    ox, oy, per_mm = reals[0], reals[1], reals[2]
-    across = integers[0]
-    real_pieces, real_vertices = integers[3], integers[6]
-    int_links, int_blocks, int_cells, int_lists = integers[8], integers[9], integers[10], integers[11]
-    pieces = reals[real_pieces:]
-    vertices = reals[real_vertices:]
-    links = integers[int_links:]
-    blocks = integers[int_blocks:]
-    cells = integers[int_cells:]
-    lists = integers[int_lists:]
-    w = carray(_stack_reals(), _REALS)  # this block's points
-    held = carray(_stack_integers(), _INTEGERS)  # piece (or FAR, LISTED - k) of each point; state
-    best = np.empty(8)
+    """Closest points of points[start:stop] into numbers (7 m: parameter, foot, distance, gradient, curvature) and vertex (m,).
 
+    points (2 m,) is flat. All points of a block are solved on the piece that their cell holds; those whose foot is not on
+    that piece, or whose cell holds several stretches, queue for further tries; the few left are searched for.
+    """
+    pieces, blocks, cells = reals[integers[3] :], integers[integers[9] :], integers[integers[10] :]
+    w = carray(_stack_reals(), _REALS)
+    q = carray(_stack_integers(), _INTEGERS)
+    best = np.empty(8)
     for block in range(start, stop, _BLOCK):
         k = min(_BLOCK, stop - block)
+        here = points[2 * block : 2 * (block + k)]
         for j in range(k):
-            x, y = points[block + j, 0], points[block + j, 1]
-            fx, fy = (x - ox) * per_mm, (y - oy) * per_mm
-            inside = (fx >= 0.0) & (fx < across) & (fy >= 0.0) & (fy < across)
-            fx = fx if inside else 0.0
-            fy = fy if inside else 0.0
-            bx, by = np.int32(fx), np.int32(fy)
-            b = 2 * (by * across + bx)
-            offset, depth = blocks[b], blocks[b + 1]
-            count = np.int32(1) << depth
-            cell = (np.int32((fy - by) * count) << depth) + np.int32((fx - bx) * count)
-            known = inside & (offset >= 0)
-            content = cells[offset + cell if known else 0]
-            held[j] = content if known else -1
-            w[_RX * _BLOCK + j] = x
-            w[_RY * _BLOCK + j] = y
-        for j in range(k):
-            _start(w, held, pieces, j, _BLOCK)
-        for j in range(k):
-            _solve(w, held, pieces, j, _BLOCK, _BLOCK)
-        for j in range(k):
-            numbers[block + j] = w[_RU * _BLOCK + j]
-        for j in range(k):
-            numbers[m + 2 * (block + j)] = w[_RFX * _BLOCK + j]
-            numbers[m + 2 * (block + j) + 1] = w[_RFY * _BLOCK + j]
-        for j in range(k):
-            numbers[3 * m + block + j] = w[_RE * _BLOCK + j]
-        for j in range(k):
-            numbers[4 * m + 2 * (block + j)] = w[_RNX * _BLOCK + j]
-            numbers[4 * m + 2 * (block + j) + 1] = w[_RNY * _BLOCK + j]
-        for j in range(k):
-            numbers[6 * m + block + j] = w[_RK * _BLOCK + j]
-        for j in range(k):
-            vertex[block + j] = 0
-        left = 0
-        for j in range(k):
-            left += held[_BLOCK + j]
-        if left == k:
-            continue
-        for j in range(k):
-            if held[_BLOCK + j] == 1:
-                continue
-            _search(points[block + j, 0], points[block + j, 1], reals, integers, best)
-            i = block + j
-            numbers[i] = best[0]
-            numbers[m + 2 * i], numbers[m + 2 * i + 1] = best[1], best[2]
-            numbers[3 * m + i] = best[3]
-            numbers[4 * m + 2 * i], numbers[4 * m + 2 * i + 1] = best[4], best[5]
-            numbers[6 * m + i] = best[6]
-            vertex[i] = np.uint8(best[7])
+            _locate(w, q, here, blocks, cells, reals[0], reals[1], reals[2], j)
+        lanes, first = k, True
+        while True:
+            for j in range(lanes, (lanes + 7) & ~7):
+                q[_ROW + j] = 0
+            for j in range(0, lanes, 8):
+                _rows_to_columns(pieces, q, _ROW + j, w, j)
+                _rows_to_columns(pieces[8:], q, _ROW + j, w, 8 * _BLOCK + j)
+            for j in range(lanes):
+                _start(w, j)
+            if not first:
+                _resume(w, lanes)
+            for j in range(lanes):
+                _solve(w, q, j)
+            if first:
+                _store_block(w, numbers, vertex, block, k)
+                waiting = _queue_unsolved(w, q, reals, integers, numbers, vertex, block, k, best)
+                first = False
+            else:
+                waiting = _settle(w, q, reals, integers, numbers, vertex, block, lanes, waiting, best)
+            if waiting == 0:
+                break
+            lanes = min(_BLOCK, waiting)
+            waiting -= lanes
+            _take(w, q, here, lanes, waiting)
+        if q[_LOST + _BLOCK] == 1:
+            for j in range(k):
+                if q[_LOST + j] == 1:
+                    _search(here[2 * j], here[2 * j + 1], reals, integers, best)
+                    _store(best, numbers, vertex, block + j)
 
 
 @_inlined
-def _start(w: Any, held: Any, pieces: Any, j: int, width: int) -> None:
+def _locate(w: Any, q: Any, here: Any, blocks: Any, cells: Any, x0: float, y0: float, per_mm: float, j: int) -> None:
+    """What the cell of point j holds."""
+    x, y = here[2 * j], here[2 * j + 1]
+    fx, fy = (x - x0) * per_mm, (y - y0) * per_mm
+    inside = (fx >= 0.0) & (fx < _ACROSS) & (fy >= 0.0) & (fy < _ACROSS)
+    fx = fx if inside else 0.0
+    fy = fy if inside else 0.0
+    bx, by = np.int32(fx), np.int32(fy)
+    block = blocks[((by << BLOCK_LEVEL) | bx) & _ANY]
+    depth = block & 15
+    count = float(np.int32(1) << depth)
+    cell = (block >> 4) + (np.int32((fy - by) * count) << depth) + np.int32((fx - bx) * count)
+    known = inside & (block >= 0)
+    content = cells[(cell if known else 0) & _ANY]
+    content = content if known else FAR
+    q[_CONTENT + j] = content
+    q[_ROW + j] = PIECE_WIDTH * max(content, 0)
+    w[_X + j] = x
+    w[_Y + j] = y
+
+
+@_inlined
+def _start(w: Any, j: int) -> None:
     """One Halley step from the middle of the piece, where the derivatives are the coefficients."""
-    row = PIECE_WIDTH * max(held[j], 0)
-    rx, ry = pieces[row] - w[_RX * width + j], pieces[row + 6] - w[_RY * width + j]
-    c1, d1, c2, d2 = pieces[row + 1], pieces[row + 7], pieces[row + 2], pieces[row + 8]
-    c3, d3 = pieces[row + 3], pieces[row + 9]
-    g = rx * c1 + ry * d1
-    g1 = c1 * c1 + d1 * d1 + 2.0 * (rx * c2 + ry * d2)
-    half_g2 = 3.0 * (c1 * c2 + d1 * d2 + rx * c3 + ry * d3)
-    w[_RT * width + j] = -g * g1 / (g1 * g1 - g * half_g2)
+    c1, c2, c3 = w[1 * _BLOCK + j], w[2 * _BLOCK + j], w[3 * _BLOCK + j]
+    d1, d2, d3 = w[7 * _BLOCK + j], w[8 * _BLOCK + j], w[9 * _BLOCK + j]
+    rx, ry = w[j] - w[_X + j], w[6 * _BLOCK + j] - w[_Y + j]
+    g = _fma(rx, c1, ry * d1)
+    g1 = _fma(2.0, _fma(rx, c2, ry * d2), _fma(c1, c1, d1 * d1))
+    half_g2 = 3.0 * _fma(c1, c2, _fma(d1, d2, _fma(rx, c3, ry * d3)))
+    w[_T + j] = -g * g1 / _fma(g1, g1, -g * half_g2)
 
 
 @_inlined
-def _solve(w: Any, held: Any, pieces: Any, j: int, width: int, states: int) -> None:
-    """One Halley step from t, then a Newton step and the results; the state becomes 1 where they are proven."""
-    row = PIECE_WIDTH * max(held[j], 0)
-    c0, c1, c2, c3, c4, c5 = pieces[row], pieces[row + 1], pieces[row + 2], pieces[row + 3], pieces[row + 4], pieces[row + 5]
-    d0, d1, d2, d3, d4, d5 = pieces[row + 6], pieces[row + 7], pieces[row + 8], pieces[row + 9], pieces[row + 10], pieces[row + 11]
-    x, y = w[_RX * width + j], w[_RY * width + j]
-    t = w[_RT * width + j]
-    rx0, ry0 = c0 - x, d0 - y
-
+def _solve(w: Any, q: Any, j: int) -> None:
+    """One Halley step from t, then a Newton step and the results; solved where the step is small and t belongs to the piece."""
+    c0, c1, c2, c3, c4, c5 = w[j], w[_BLOCK + j], w[2 * _BLOCK + j], w[3 * _BLOCK + j], w[4 * _BLOCK + j], w[5 * _BLOCK + j]
+    d0, d1, d2, d3, d4, d5 = w[6 * _BLOCK + j], w[7 * _BLOCK + j], w[8 * _BLOCK + j], w[9 * _BLOCK + j], w[10 * _BLOCK + j], w[11 * _BLOCK + j]
+    x, y, t = w[_X + j], w[_Y + j], w[_T + j]
+    c0 -= x
+    d0 -= y
+    # Taylor coefficients at t by repeated synthetic division: C - M, C', C'' / 2, C''' / 6
     a4, b4 = _fma(c5, t, c4), _fma(d5, t, d4)
     a3, b3 = _fma(a4, t, c3), _fma(b4, t, d3)
     a2, b2 = _fma(a3, t, c2), _fma(b3, t, d2)
     a1, b1 = _fma(a2, t, c1), _fma(b2, t, d1)
-    rx, ry = _fma(a1, t, rx0), _fma(b1, t, ry0)
-    p4, q4 = _fma(c5, t, a4), _fma(d5, t, b4)
-    p3, q3 = _fma(p4, t, a3), _fma(q4, t, b3)
-    p2, q2 = _fma(p3, t, a2), _fma(q3, t, b2)
-    vx, vy = _fma(p2, t, a1), _fma(q2, t, b1)
-    s4, z4 = _fma(c5, t, p4), _fma(d5, t, q4)
-    s3, z3 = _fma(s4, t, p3), _fma(z4, t, q3)
-    hx, hy = _fma(s3, t, p2), _fma(z3, t, q2)  # C'' / 2
-    m4, n4 = _fma(c5, t, s4), _fma(d5, t, z4)
-    kx, ky = _fma(m4, t, s3), _fma(n4, t, z3)  # C''' / 6
+    rx, ry = _fma(a1, t, c0), _fma(b1, t, d0)
+    a4, b4 = _fma(c5, t, a4), _fma(d5, t, b4)
+    a3, b3 = _fma(a4, t, a3), _fma(b4, t, b3)
+    a2, b2 = _fma(a3, t, a2), _fma(b3, t, b2)
+    vx, vy = _fma(a2, t, a1), _fma(b2, t, b1)
+    a4, b4 = _fma(c5, t, a4), _fma(d5, t, b4)
+    a3, b3 = _fma(a4, t, a3), _fma(b4, t, b3)
+    hx, hy = _fma(a3, t, a2), _fma(b3, t, b2)
+    a4, b4 = _fma(c5, t, a4), _fma(d5, t, b4)
+    kx, ky = _fma(a4, t, a3), _fma(b4, t, b3)
     g = _fma(rx, vx, ry * vy)
     g1 = _fma(2.0, _fma(rx, hx, ry * hy), _fma(vx, vx, vy * vy))
     half_g2 = 3.0 * _fma(vx, hx, _fma(vy, hy, _fma(rx, kx, ry * ky)))
     t -= g * g1 / _fma(g1, g1, -g * half_g2)
-
+    # once more, to C''
     a4, b4 = _fma(c5, t, c4), _fma(d5, t, d4)
     a3, b3 = _fma(a4, t, c3), _fma(b4, t, d3)
     a2, b2 = _fma(a3, t, c2), _fma(b3, t, d2)
     a1, b1 = _fma(a2, t, c1), _fma(b2, t, d1)
-    rx, ry = _fma(a1, t, rx0), _fma(b1, t, ry0)
-    p4, q4 = _fma(c5, t, a4), _fma(d5, t, b4)
-    p3, q3 = _fma(p4, t, a3), _fma(q4, t, b3)
-    p2, q2 = _fma(p3, t, a2), _fma(q3, t, b2)
-    vx, vy = _fma(p2, t, a1), _fma(q2, t, b1)
-    s4, z4 = _fma(c5, t, p4), _fma(d5, t, q4)
-    s3, z3 = _fma(s4, t, p3), _fma(z4, t, q3)
-    hx, hy = 2.0 * _fma(s3, t, p2), 2.0 * _fma(z3, t, q2)
-    g = _fma(rx, vx, ry * vy)
+    rx, ry = _fma(a1, t, c0), _fma(b1, t, d0)
+    a4, b4 = _fma(c5, t, a4), _fma(d5, t, b4)
+    a3, b3 = _fma(a4, t, a3), _fma(b4, t, b3)
+    a2, b2 = _fma(a3, t, a2), _fma(b3, t, b2)
+    vx, vy = _fma(a2, t, a1), _fma(b2, t, b1)
+    a4, b4 = _fma(c5, t, a4), _fma(d5, t, b4)
+    a3, b3 = _fma(a4, t, a3), _fma(b4, t, b3)
+    hx, hy = 2.0 * _fma(a3, t, a2), 2.0 * _fma(b3, t, b2)
     g1 = _fma(rx, hx, _fma(ry, hy, _fma(vx, vx, vy * vy)))
-    step = -g / g1
+    step = -_fma(rx, vx, ry * vy) / g1
     t += step
     rx, ry = _fma(vx, step, rx), _fma(vy, step, ry)
     vx, vy = _fma(hx, step, vx), _fma(hy, step, vy)
     slowness = 1.0 / np.sqrt(_fma(vx, vx, vy * vy))
     nx, ny = -vy * slowness, vx * slowness
-    w[_RU * width + j] = _fma(pieces[row + 13], t, pieces[row + 12])
-    w[_RFX * width + j] = x + rx
-    w[_RFY * width + j] = y + ry
-    w[_RE * width + j] = -_fma(rx, nx, ry * ny)
-    w[_RNX * width + j] = nx
-    w[_RNY * width + j] = ny
-    w[_RK * width + j] = (vx * hy - vy * hx) * (slowness * slowness * slowness)
-    w[_RT * width + j] = t
-    good = (abs(step) <= _STEP) & (g1 > 0.0) & (t >= pieces[row + 14]) & (t <= pieces[row + 15]) & (held[j] >= 0)
-    held[states + j] = 1 if good else 0
+    w[_U + j] = _fma(w[13 * _BLOCK + j], t, w[12 * _BLOCK + j])
+    w[_FOOT_X + j] = x + rx
+    w[_FOOT_Y + j] = y + ry
+    w[_E + j] = -_fma(rx, nx, ry * ny)
+    w[_NX + j] = nx
+    w[_NY + j] = ny
+    w[_CURVATURE + j] = _fma(vx, hy, -vy * hx) * (slowness * slowness * slowness)
+    w[_T + j] = t
+    good = (abs(step) <= _STEP) & (g1 > 0.0) & (t >= w[14 * _BLOCK + j]) & (t <= w[15 * _BLOCK + j]) & (q[_CONTENT + j] >= 0)
+    q[_SOLVED + j] = 1 if good else 0
+
+
+@_inlined
+def _store_block(w: Any, numbers: Any, vertex: Any, block: int, k: int) -> None:
+    """Results of all points of a block, solved or not."""
+    m, end = len(vertex), block + k
+    u, e, curvature = numbers[block:end], numbers[3 * m + block : 3 * m + end], numbers[6 * m + block : 6 * m + end]
+    foot, gradient = numbers[m + 2 * block : m + 2 * end], numbers[4 * m + 2 * block : 4 * m + 2 * end]
+    kind = vertex[block:end]
+    for j in range(k):
+        u[j] = w[_U + j]
+    for j in range(k):
+        foot[2 * j] = w[_FOOT_X + j]
+        foot[2 * j + 1] = w[_FOOT_Y + j]
+    for j in range(k):
+        e[j] = w[_E + j]
+    for j in range(k):
+        gradient[2 * j] = w[_NX + j]
+        gradient[2 * j + 1] = w[_NY + j]
+    for j in range(k):
+        curvature[j] = w[_CURVATURE + j]
+    for j in range(k):
+        kind[j] = 0
+
+
+@_compiled
+def _store(best: Any, numbers: Any, vertex: Any, i: int) -> None:
+    """Results of one point."""
+    m = len(vertex)
+    numbers[i] = best[0]
+    numbers[m + 2 * i], numbers[m + 2 * i + 1] = best[1], best[2]
+    numbers[3 * m + i] = best[3]
+    numbers[4 * m + 2 * i], numbers[4 * m + 2 * i + 1] = best[4], best[5]
+    numbers[6 * m + i] = best[6]
+    vertex[i] = np.uint8(best[7])
+
+
+# --- further tries of the few points that the first pass leaves ---------------------------------------------------------
+
+
+@_compiled
+def _queue_unsolved(w: Any, q: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, block: int, k: int, best: Any) -> int:
+    """Queue what the first pass left; the number of items."""
+    solved = 0
+    for j in range(k):
+        solved += q[_SOLVED + j]
+    q[_LOST + _BLOCK] = 0
+    if solved == k:
+        return 0
+    lists = integers[integers[11] :]
+    waiting = 0
+    for j in range(k):
+        q[_POINT + j], q[_TRY + j], q[_LOST + j] = j, 0, 0
+        w[_LEAST + j] = np.inf
+        content = q[_CONTENT + j]
+        if q[_SOLVED + j] == 1:
+            continue
+        if content >= 0:
+            waiting = _advance(w, q, reals, integers, numbers, vertex, block, j, waiting, best)
+        elif content == FAR:
+            q[_LOST + j] = q[_LOST + _BLOCK] = 1
+        else:
+            place = LISTED - content
+            for item in range(lists[place]):
+                waiting = _push(w, q, waiting, j, lists[place + 1 + item], 0, np.nan)
+    return waiting
+
+
+@_compiled
+def _push(w: Any, q: Any, waiting: int, point: int, piece: int, tried: int, t: float) -> int:
+    item = _WAITING + 3 * waiting
+    q[item], q[item + 1], q[item + 2] = point, piece, tried
+    w[_WAITING_T + waiting] = t
+    return waiting + 1
+
+
+@_compiled
+def _take(w: Any, q: Any, here: Any, lanes: int, waiting: int) -> None:
+    """Move the last items of the queue into the lanes."""
+    for j in range(lanes):
+        item = _WAITING + 3 * (waiting + j)
+        point, piece = q[item], q[item + 1]
+        q[_POINT + j], q[_CONTENT + j], q[_ROW + j], q[_TRY + j] = point, piece, PIECE_WIDTH * piece, q[item + 2]
+        w[_X + j], w[_Y + j], w[_RESUME + j] = here[2 * point], here[2 * point + 1], w[_WAITING_T + waiting + j]
+
+
+@_compiled
+def _resume(w: Any, lanes: int) -> None:
+    """Items that have not converged yet go on from where they were."""
+    for j in range(lanes):
+        if not np.isnan(w[_RESUME + j]):
+            w[_T + j] = w[_RESUME + j]
+
+
+@_compiled
+def _settle(w: Any, q: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, block: int, lanes: int, waiting: int, best: Any) -> int:
+    """Offer the solved items to their points, send the others on."""
+    for j in range(lanes):
+        if q[_SOLVED + j] == 1:
+            best[0], best[1], best[2], best[3] = w[_U + j], w[_FOOT_X + j], w[_FOOT_Y + j], w[_E + j]
+            best[4], best[5], best[6], best[7] = w[_NX + j], w[_NY + j], w[_CURVATURE + j], 0.0
+            _offer(w, numbers, vertex, block, q[_POINT + j], best)
+        else:
+            waiting = _advance(w, q, reals, integers, numbers, vertex, block, j, waiting, best)
+    return waiting
+
+
+@_compiled
+def _advance(w: Any, q: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, block: int, j: int, waiting: int, best: Any) -> int:
+    """The next try of an unsolved lane: once to the neighbouring piece, the vertex there, or on from its t; else it is lost.
+
+    Feet are accepted on the certified piece and its two neighbours only, so no try can end on another stretch of curve.
+    """
+    point, piece, tried, t = q[_POINT + j], q[_CONTENT + j], q[_TRY + j], w[_T + j]
+    after = t > w[15 * _BLOCK + j]
+    if after or t < w[14 * _BLOCK + j]:
+        link = integers[integers[8] + 2 * piece + (1 if after else 0)]
+        if link >= 0 and tried < _WALKED:
+            return _push(w, q, waiting, point, link, _WALKED, np.nan)
+        if link < 0:
+            x, y = w[_X + j], w[_Y + j]
+            rx, ry, vx, vy, _, _ = _at(reals[integers[3] :], PIECE_WIDTH * piece, x, y, 0.5 if after else -0.5)
+            along = rx * vx + ry * vy
+            if (along <= 0.0) if after else (along >= 0.0):
+                _finish_vertex(x, y, reals[integers[6] :], VERTEX_WIDTH * (-1 - link), reals[4], best)
+                _offer(w, numbers, vertex, block, point, best)
+                return waiting
+    elif not np.isnan(t) and (tried & (_WALKED - 1)) < _TRIES:
+        return _push(w, q, waiting, point, piece, tried + 1, t)
+    q[_LOST + point] = q[_LOST + _BLOCK] = 1
+    return waiting
+
+
+@_compiled
+def _offer(w: Any, numbers: Any, vertex: Any, block: int, point: int, best: Any) -> None:
+    """Keep the closest foot of a point; of two equally close ones that of the smaller parameter, whatever their order."""
+    distance = abs(best[3])
+    if distance < w[_LEAST + point] or (distance == w[_LEAST + point] and best[0] < w[_LEAST_U + point]):
+        w[_LEAST + point], w[_LEAST_U + point] = distance, best[0]
+        _store(best, numbers, vertex, block + point)
 
 
 # --- any place: search over the whole curve -----------------------------------------------------------------------------
