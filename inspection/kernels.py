@@ -23,9 +23,10 @@ from inspection.foot_grid import BLOCK_LEVEL, FAR, LISTED, MOST_BRANCHES, PIECE_
 Array = NDArray[np.float64]
 
 _BLOCK = 128  # points worked on together: their intermediate values stay in the first-level cache
-_QUEUE = _BLOCK * MOST_BRANCHES
-_REALS = 29 * _BLOCK + _QUEUE
-_INTEGERS = 7 * _BLOCK + 3 * _QUEUE
+_QUEUE = _BLOCK * (MOST_BRANCHES + 1)  # a block is taken while fewer than a block's items wait
+_REALS = 26 * _BLOCK + _QUEUE
+_INTEGERS = 6 * _BLOCK + 3 * _QUEUE
+_FINEST = 26  # halvings of a piece, after which an interval is a point
 _ACROSS = float(1 << BLOCK_LEVEL)
 _TRIES, _WALKED = 2, 4  # further steps on one piece; added to the tries once the neighbouring piece is tried
 _ANY = 0x7FFFFFFF  # tells the compiler that an index is not negative
@@ -147,10 +148,9 @@ def project(points_mm: Array, grid: FootGrid, threads: int | None = None) -> Fee
 
 
 # Where the memory of a block keeps what, _BLOCK numbers each. Reals: the row of the piece (16 columns), then
-_X, _Y, _U, _FOOT_X, _FOOT_Y, _E, _NX, _NY, _CURVATURE, _T, _RESUME, _LEAST, _LEAST_U, _WAITING_T = (_BLOCK * i for i in range(16, 30))
-# Integers: piece (or FAR, LISTED - place) of each lane, its row, whether solved, its point, its tries; which points are lost; the queue
-_CONTENT, _ROW, _SOLVED, _POINT, _TRY, _LOST = (_BLOCK * i for i in range(6))
-_WAITING = 7 * _BLOCK
+_X, _Y, _U, _FOOT_X, _FOOT_Y, _E, _NX, _NY, _CURVATURE, _T, _WAITING_T = (_BLOCK * i for i in range(16, 27))
+# Integers: piece (or FAR, LISTED - place) of each lane, its row, whether solved, its point, its tries; unsolved lanes; the queue
+_CONTENT, _ROW, _SOLVED, _POINT, _TRY, _UNSOLVED, _WAITING = (_BLOCK * i for i in range(7))
 
 
 @_compiled
@@ -158,46 +158,42 @@ def _project(points: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, 
     """Closest points of points[start:stop] into numbers (7 m: parameter, foot, distance, gradient, curvature) and vertex (m,).
 
     points (2 m,) is flat. All points of a block are solved on the piece that their cell holds; those whose foot is not on
-    that piece, or whose cell holds several stretches, queue for further tries; the few left are searched for.
+    that piece, or whose cell holds several stretches, queue until they fill a block of their own.
     """
     pieces, blocks, cells = reals[integers[3] :], integers[integers[9] :], integers[integers[10] :]
     w = carray(_stack_reals(), _REALS)
     q = carray(_stack_integers(), _INTEGERS)
-    best = np.empty(8)
-    for block in range(start, stop, _BLOCK):
-        k = min(_BLOCK, stop - block)
-        here = points[2 * block : 2 * (block + k)]
-        for j in range(k):
-            _locate(w, q, here, blocks, cells, reals[0], reals[1], reals[2], j)
-        lanes, first = k, True
-        while True:
-            for j in range(lanes, (lanes + 7) & ~7):
-                q[_ROW + j] = 0
-            for j in range(0, lanes, 8):
-                _rows_to_columns(pieces, q, _ROW + j, w, j)
-                _rows_to_columns(pieces[8:], q, _ROW + j, w, 8 * _BLOCK + j)
+    best, stack = np.empty(8), np.empty(64, dtype=np.int64)
+    waiting = 0
+    block = start
+    while block < stop or waiting > 0:
+        fresh = block < stop and waiting < _BLOCK
+        if fresh:
+            lanes = min(_BLOCK, stop - block)
+            here = points[2 * block : 2 * (block + lanes)]
             for j in range(lanes):
-                _start(w, j)
-            if not first:
-                _resume(w, lanes)
-            for j in range(lanes):
-                _solve(w, q, j)
-            if first:
-                _store_block(w, numbers, vertex, block, k)
-                waiting = _queue_unsolved(w, q, reals, integers, numbers, vertex, block, k, best)
-                first = False
-            else:
-                waiting = _settle(w, q, reals, integers, numbers, vertex, block, lanes, waiting, best)
-            if waiting == 0:
-                break
+                _locate(w, q, here, blocks, cells, reals[0], reals[1], reals[2], j)
+        else:
             lanes = min(_BLOCK, waiting)
             waiting -= lanes
-            _take(w, q, here, lanes, waiting)
-        if q[_LOST + _BLOCK] == 1:
-            for j in range(k):
-                if q[_LOST + j] == 1:
-                    _search(here[2 * j], here[2 * j + 1], reals, integers, best)
-                    _store(best, numbers, vertex, block + j)
+            _take(w, q, points, lanes, waiting)
+        for j in range(lanes, (lanes + 7) & ~7):
+            q[_ROW + j] = 0
+        for j in range(0, lanes, 8):
+            _rows_to_columns(pieces, q, _ROW + j, w, j)
+            _rows_to_columns(pieces[8:], q, _ROW + j, w, 8 * _BLOCK + j)
+        for j in range(lanes):
+            _start(w, j)
+        if not fresh:
+            _resume(w, lanes, waiting)
+        for j in range(lanes):
+            _solve(w, q, j)
+        if fresh:
+            _store_block(w, numbers, vertex, block, lanes)
+            waiting = _queue_unsolved(w, q, reals, integers, numbers, vertex, block, lanes, waiting, best, stack)
+            block += lanes
+        else:
+            waiting = _settle(w, q, reals, integers, numbers, vertex, lanes, waiting, best, stack)
 
 
 @_inlined
@@ -332,30 +328,29 @@ def _store(best: Any, numbers: Any, vertex: Any, i: int) -> None:
 
 
 @_compiled
-def _queue_unsolved(w: Any, q: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, block: int, k: int, best: Any) -> int:
-    """Queue what the first pass left; the number of items."""
-    solved = 0
-    for j in range(k):
-        solved += q[_SOLVED + j]
-    q[_LOST + _BLOCK] = 0
-    if solved == k:
-        return 0
+def _queue_unsolved(
+    w: Any, q: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, block: int, lanes: int, waiting: int, best: Any, stack: Any
+) -> int:
+    """Queue what the first pass left, or search for it; the number of waiting items."""
+    unsolved = 0
+    for j in range(lanes):
+        q[_UNSOLVED + unsolved] = j
+        unsolved += 1 - q[_SOLVED + j]
     lists = integers[integers[11] :]
-    waiting = 0
-    for j in range(k):
-        q[_POINT + j], q[_TRY + j], q[_LOST + j] = j, 0, 0
-        w[_LEAST + j] = np.inf
-        content = q[_CONTENT + j]
-        if q[_SOLVED + j] == 1:
-            continue
+    for item in range(unsolved):
+        j = q[_UNSOLVED + item]
+        point, content = block + j, q[_CONTENT + j]
+        numbers[3 * len(vertex) + point] = np.inf
         if content >= 0:
-            waiting = _advance(w, q, reals, integers, numbers, vertex, block, j, waiting, best)
+            q[_POINT + j], q[_TRY + j] = point, 0
+            waiting = _advance(w, q, reals, integers, numbers, vertex, j, waiting, best, stack)
         elif content == FAR:
-            q[_LOST + j] = q[_LOST + _BLOCK] = 1
+            _search(w[_X + j], w[_Y + j], reals, integers, best, stack)
+            _store(best, numbers, vertex, point)
         else:
             place = LISTED - content
-            for item in range(lists[place]):
-                waiting = _push(w, q, waiting, j, lists[place + 1 + item], 0, np.nan)
+            for branch in range(lists[place]):
+                waiting = _push(w, q, waiting, point, lists[place + 1 + branch], 0, np.nan)
     return waiting
 
 
@@ -368,76 +363,80 @@ def _push(w: Any, q: Any, waiting: int, point: int, piece: int, tried: int, t: f
 
 
 @_compiled
-def _take(w: Any, q: Any, here: Any, lanes: int, waiting: int) -> None:
+def _take(w: Any, q: Any, points: Any, lanes: int, waiting: int) -> None:
     """Move the last items of the queue into the lanes."""
     for j in range(lanes):
         item = _WAITING + 3 * (waiting + j)
         point, piece = q[item], q[item + 1]
         q[_POINT + j], q[_CONTENT + j], q[_ROW + j], q[_TRY + j] = point, piece, PIECE_WIDTH * piece, q[item + 2]
-        w[_X + j], w[_Y + j], w[_RESUME + j] = here[2 * point], here[2 * point + 1], w[_WAITING_T + waiting + j]
+        w[_X + j], w[_Y + j] = points[2 * point], points[2 * point + 1]
 
 
 @_compiled
-def _resume(w: Any, lanes: int) -> None:
+def _resume(w: Any, lanes: int, waiting: int) -> None:
     """Items that have not converged yet go on from where they were."""
     for j in range(lanes):
-        if not np.isnan(w[_RESUME + j]):
-            w[_T + j] = w[_RESUME + j]
+        if not np.isnan(w[_WAITING_T + waiting + j]):
+            w[_T + j] = w[_WAITING_T + waiting + j]
 
 
 @_compiled
-def _settle(w: Any, q: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, block: int, lanes: int, waiting: int, best: Any) -> int:
+def _settle(
+    w: Any, q: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, lanes: int, waiting: int, best: Any, stack: Any
+) -> int:
     """Offer the solved items to their points, send the others on."""
     for j in range(lanes):
         if q[_SOLVED + j] == 1:
             best[0], best[1], best[2], best[3] = w[_U + j], w[_FOOT_X + j], w[_FOOT_Y + j], w[_E + j]
             best[4], best[5], best[6], best[7] = w[_NX + j], w[_NY + j], w[_CURVATURE + j], 0.0
-            _offer(w, numbers, vertex, block, q[_POINT + j], best)
+            _offer(best, numbers, vertex, q[_POINT + j])
         else:
-            waiting = _advance(w, q, reals, integers, numbers, vertex, block, j, waiting, best)
+            waiting = _advance(w, q, reals, integers, numbers, vertex, j, waiting, best, stack)
     return waiting
 
 
 @_compiled
-def _advance(w: Any, q: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, block: int, j: int, waiting: int, best: Any) -> int:
-    """The next try of an unsolved lane: once to the neighbouring piece, the vertex there, or on from its t; else it is lost.
+def _advance(
+    w: Any, q: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, j: int, waiting: int, best: Any, stack: Any
+) -> int:
+    """The next try of an unsolved lane: once on the neighbouring piece, or the vertex there, or on from its t; else the search.
 
     Feet are accepted on the certified piece and its two neighbours only, so no try can end on another stretch of curve.
     """
     point, piece, tried, t = q[_POINT + j], q[_CONTENT + j], q[_TRY + j], w[_T + j]
+    x, y = w[_X + j], w[_Y + j]
     after = t > w[15 * _BLOCK + j]
     if after or t < w[14 * _BLOCK + j]:
         link = integers[integers[8] + 2 * piece + (1 if after else 0)]
         if link >= 0 and tried < _WALKED:
             return _push(w, q, waiting, point, link, _WALKED, np.nan)
         if link < 0:
-            x, y = w[_X + j], w[_Y + j]
             rx, ry, vx, vy, _, _ = _at(reals[integers[3] :], PIECE_WIDTH * piece, x, y, 0.5 if after else -0.5)
             along = rx * vx + ry * vy
             if (along <= 0.0) if after else (along >= 0.0):
                 _finish_vertex(x, y, reals[integers[6] :], VERTEX_WIDTH * (-1 - link), reals[4], best)
-                _offer(w, numbers, vertex, block, point, best)
+                _offer(best, numbers, vertex, point)
                 return waiting
     elif not np.isnan(t) and (tried & (_WALKED - 1)) < _TRIES:
         return _push(w, q, waiting, point, piece, tried + 1, t)
-    q[_LOST + point] = q[_LOST + _BLOCK] = 1
+    _search(x, y, reals, integers, best, stack)
+    _offer(best, numbers, vertex, point)
     return waiting
 
 
 @_compiled
-def _offer(w: Any, numbers: Any, vertex: Any, block: int, point: int, best: Any) -> None:
+def _offer(best: Any, numbers: Any, vertex: Any, point: int) -> None:
     """Keep the closest foot of a point; of two equally close ones that of the smaller parameter, whatever their order."""
-    distance = abs(best[3])
-    if distance < w[_LEAST + point] or (distance == w[_LEAST + point] and best[0] < w[_LEAST_U + point]):
-        w[_LEAST + point], w[_LEAST_U + point] = distance, best[0]
-        _store(best, numbers, vertex, block + point)
+    distance, least = abs(best[3]), abs(numbers[3 * len(vertex) + point])
+    if distance < least or (distance == least and best[0] < numbers[point]):
+        _store(best, numbers, vertex, point)
 
 
 # --- any place: search over the whole curve -----------------------------------------------------------------------------
 
 
 @_compiled
-def _search(x: float, y: float, reals: Any, integers: Any, best: Any) -> None:
+def _search(x: float, y: float, reals: Any, integers: Any, best: Any, stack: Any) -> None:
     """Closest point of the whole curve by branch and bound over its pieces, into best (8,)."""
     if not (np.isfinite(x) and np.isfinite(y)):
         best[:7] = np.nan
@@ -445,7 +444,6 @@ def _search(x: float, y: float, reals: Any, integers: Any, best: Any) -> None:
         return
     count = integers[2]
     pieces, bounds, boxes = reals[integers[3] :], reals[integers[4] :], reals[integers[5] :]
-    stack = np.empty(64, dtype=np.int64)
     stack[0] = 1
     depth = 1
     least, piece, parameter = np.inf, 0, 0.0
@@ -456,19 +454,14 @@ def _search(x: float, y: float, reals: Any, integers: Any, best: Any) -> None:
             continue
         if node >= count:
             t, square = _closest_on_piece(pieces, bounds, node - count, x, y, least)
-            if square < least:
+            if square < least or (square == least and node - count < piece):
                 least, piece, parameter = square, node - count, t
             continue
-        near, far = 2 * node, 2 * node + 1
-        near_distance, far_distance = _box_distance(boxes, near, x, y), _box_distance(boxes, far, x, y)
-        if far_distance < near_distance:
-            near, far = far, near
-            far_distance = near_distance
-        if far_distance <= least:
-            stack[depth] = far
-            depth += 1
-        stack[depth] = near
-        depth += 1
+        near = 2 * node
+        if _box_distance(boxes, near + 1, x, y) < _box_distance(boxes, near, x, y):
+            near += 1
+        stack[depth], stack[depth + 1] = near ^ 1, near
+        depth += 2
     _finish(x, y, piece, parameter, reals, integers, best)
 
 
@@ -497,37 +490,47 @@ def _at(pieces: Any, row: int, x: float, y: float, t: float) -> tuple[float, ...
 
 @_compiled
 def _closest_on_piece(pieces: Any, bounds: Any, piece: int, x: float, y: float, least: float) -> tuple[float, float]:
-    """Closest t of one piece and the square of the distance; intervals are halved until the tangential distance is monotone."""
+    """Closest t of one piece and the square of the distance, infinite when certainly above `least`.
+
+    Intervals are halved until the tangential distance is monotone in them; near the evolute of the curve, until they are tiny.
+    """
     row = PIECE_WIDTH * piece
     fast, bend, twist = bounds[4 * piece], bounds[4 * piece + 1], bounds[4 * piece + 2]
-    middles, halves = np.empty(64), np.empty(64)
-    middles[0], halves[0] = 0.0, 0.5
-    depth = 1
-    closest = 0.0
-    while depth:
-        depth -= 1
-        middle, half = middles[depth], halves[depth]
+    closest, square_least = 0.0, np.inf
+    level, place = 0, 0  # the interval of number `place` of 2 ** level
+    while True:
+        half = 0.5 / (1 << level)
+        middle = (2 * place + 1) * half - 0.5
         rx, ry, vx, vy, hx, hy = _at(pieces, row, x, y, middle)
         distance = np.sqrt(rx * rx + ry * ry)
         nearer = distance - fast * half
-        if nearer > 0.0 and nearer * nearer > least:
-            continue
-        slope = vx * vx + vy * vy + rx * hx + ry * hy
-        change = half * (3.0 * fast * bend + (distance + fast * half) * twist)
-        if slope > change or half < 1e-8:
-            t, square = _monotone_root(pieces, row, x, y, middle - half, middle + half)
-            if square < least:
-                least, closest = square, t
-        elif slope < -change:
-            for t in (middle - half, middle + half):
-                rx, ry, vx, vy, hx, hy = _at(pieces, row, x, y, t)
-                if rx * rx + ry * ry < least:
-                    least, closest = rx * rx + ry * ry, t
-        else:
-            for side in (-0.5, 0.5):
-                middles[depth], halves[depth] = middle + side * half, 0.5 * half
-                depth += 1
-    return closest, least
+        if nearer <= 0.0 or nearer * nearer <= least:
+            slope = vx * vx + vy * vy + rx * hx + ry * hy
+            change = half * (3.0 * fast * bend + (distance + fast * half) * twist)
+            if abs(slope) <= change and level < _FINEST:
+                level, place = level + 1, 2 * place
+                continue
+            if slope < -change:
+                low, low_square = _end_distance(pieces, row, x, y, middle - half)
+                t, square = _end_distance(pieces, row, x, y, middle + half)
+                if low_square < square:
+                    t, square = low, low_square
+            else:
+                t, square = _monotone_root(pieces, row, x, y, middle - half, middle + half)
+            if square < square_least:
+                square_least, closest = square, t
+                least = min(least, square)
+        while place & 1:
+            level, place = level - 1, place >> 1
+        if level <= 0:
+            return closest, square_least
+        place += 1
+
+
+@_compiled
+def _end_distance(pieces: Any, row: int, x: float, y: float, t: float) -> tuple[float, float]:
+    rx, ry, _, _, _, _ = _at(pieces, row, x, y, t)
+    return t, rx * rx + ry * ry
 
 
 @_compiled
