@@ -89,7 +89,7 @@ class NurbsCurve:
         return np.asarray(self.derivatives(u, 0)[0])
 
     def derivatives(self, u: ArrayLike, order: int) -> Array:
-        """Point and derivatives by u up to `order` (0 to 4): (order + 1, m, 2). At a corner the side of larger u counts."""
+        """Point and derivatives by u up to `order`: (order + 1, m, 2). At a corner the side of larger u counts."""
         parameter = self._inside(np.atleast_1d(np.asarray(u, dtype=np.float64)))
         result = np.zeros((order + 1, len(parameter), 2))
         weight = np.zeros((order + 1, len(parameter)))

@@ -18,6 +18,7 @@ Index = NDArray[np.int64]
 
 FAR, LISTED = -1, -2  # what a cell holds instead of a piece: nothing, or LISTED - (place of its list)
 MOST_BRANCHES = 4  # cells with more stretches than this are left to the search over the whole curve
+LIST_WIDTH = 1 + MOST_BRANCHES
 HEADER = 16  # numbers before the packed tables, in both arrays
 PIECE_WIDTH = 16  # 6 + 6 coefficients, parameter at the middle, parameter per unit of t, valid t from, to
 VERTEX_WIDTH = 8  # x, y, pseudo-normal x, y, parameter, kind, 0, 0
@@ -25,7 +26,7 @@ VERTEX_WIDTH = 8  # x, y, pseudo-normal x, y, parameter, kind, 0, 0
 BLOCK_LEVEL = 6  # the quadtree's root is cut into 64 x 64 blocks, found by one division
 _DEEPEST = 11  # smallest cells: half a thousandth of the size of the curve
 _NEAR = 0.015  # band in which cells may become that small, as a fraction of the size
-_BAND = 0.05  # band of the whole grid: beyond it every point is searched for along the whole curve
+_BAND = 0.08  # band of the whole grid: beyond it every point is searched for along the whole curve
 _PIECE_LENGTH = 1 / 200  # longest piece, as a fraction of the size
 _PIECE_TURN = 1 / 6  # rad; a piece never turns by more, so that one third-order step from its middle comes close
 _OVERLAP = 0.3  # a piece stays valid for this part of its length beyond its borders, within its knot span
@@ -33,7 +34,6 @@ _VERTEX_GRAIN = 2e-13  # part of a piece by which a foot may miss the end of the
 _STEEPEST = 0.9  # a cell is certified where curvature x distance stays below this on the near side of the evolute
 _MOST_PIECES = 200_000
 _NODES = (np.arange(9) + 0.5) / 9  # inside a knot span, never on its borders
-_CHEBYSHEV = np.cos((2 * np.arange(6) + 1) * np.pi / 12)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,8 +68,11 @@ class _Pieces:
     middle_mm, tangent, curvature  : (p, 2), (p, 2), (p,) at the middle
     least, most    : (p,) range of curvature, overlap included
     reach_mm       : (p,) half the arc length, overlap included
+    half_mm        : (p,) half the arc length
     length_mm      : (p,)
     vertices       : (v, VERTEX_WIDTH)
+    cones          : (v, 2, 2) unit tangents before and after each vertex, 0 where there is none: the vertex can be closest to places
+                     that lie ahead of the one and behind the other
     """
 
     rows: Array
@@ -84,8 +87,10 @@ class _Pieces:
     least: Array
     most: Array
     reach_mm: Array
+    half_mm: Array
     length_mm: Array
     vertices: Array
+    cones: Array
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -113,13 +118,13 @@ def _pieces(curve: NurbsCurve) -> _Pieces:
     smooth_before, smooth_after = low > span_low, high < span_high
     first = np.where(smooth_before, np.maximum(-0.5 - _OVERLAP, (span_low - middle) / width), -0.5)
     last = np.where(smooth_after, np.minimum(0.5 + _OVERLAP, (span_high - middle) / width), 0.5)
-    coefficients = _coefficients(curve, middle, width, first, last)
-    before, after, vertices = _links(curve, low, high, size)
+    coefficients = _coefficients(curve, middle, width)
+    before, after, vertices, cones = _links(curve, low)
     is_end = np.append(vertices[:, 5] == 2, False)
     grain = np.where(is_end, _VERTEX_GRAIN, -_VERTEX_GRAIN)
     slack_before, slack_after = (np.where(link < 0, grain[np.where(link < 0, -1 - link, -1)], 1e-9) for link in (before, after))
     rows = np.column_stack([coefficients.reshape(-1, 12), middle, width, first - slack_before, last + slack_after])
-    return _with_geometry(rows, before, after, vertices)
+    return _with_geometry(rows, before, after, vertices, cones)
 
 
 def _cut(curve: NurbsCurve, size: float) -> tuple[Array, Array, Array, Array]:
@@ -161,63 +166,65 @@ def _is_polynomial(curve: NurbsCurve) -> bool:
 
 
 def _is_quintic(curve: NurbsCurve, low: Array, high: Array, span_low: Array, span_high: Array, size: float) -> NDArray[np.bool_]:
-    """Whether the quintic through six points misses the curve by no more than round-off (between the six, where it is worst)."""
+    """Whether a quintic misses the curve by a fraction of round-off, so that its tangent, too, is exact to round-off."""
     if _is_polynomial(curve):
         return np.ones(len(low), dtype=bool)
-    middle, width = (low + high) / 2, high - low
-    first, last = np.maximum(-0.5 - _OVERLAP, (span_low - middle) / width), np.minimum(0.5 + _OVERLAP, (span_high - middle) / width)
-    c = _coefficients(curve, middle, width, first, last)
-    t = (first + last)[:, None] / 2 + (last - first)[:, None] / 2 * np.cos(np.arange(1, 6) * np.pi / 6)  # extrema of the error
-    exact = curve.point((middle[:, None] + width[:, None] * t).ravel()).reshape(*t.shape, 2)
-    powers = t[:, :, None] ** np.arange(6)
-    missed = np.abs(np.einsum("pdk,ptk->ptd", c, powers) - exact).max(axis=(1, 2))
-    scale = max(size, float(np.abs(curve.control_points_mm).max()))
-    return np.asarray(missed <= 4 * np.finfo(float).eps * scale)
+    width = high - low
+    c = _taylor(curve, (low + high) / 2, width, 8)
+    r = 0.5 + _OVERLAP
+    missed = (np.abs(c) * np.array([0, 0, 0, 0, 0, 0, r**6 / 32, r**7 / 64, 2 * r**8])).sum(axis=2).max(axis=1)
+    return np.asarray(missed <= 0.05 * np.finfo(float).eps * max(size, float(np.abs(curve.control_points_mm).max())))
 
 
-def _coefficients(curve: NurbsCurve, middle: Array, width: Array, first: Array, last: Array) -> Array:
-    """Coefficients (p, 2, 6) of C(middle + width t)."""
+def _taylor(curve: NurbsCurve, middle: Array, width: Array, order: int) -> Array:
+    """Coefficients (p, 2, order + 1) of C(middle + width t)."""
+    powers = np.arange(order + 1)
+    factor = width ** powers[:, None] / np.cumprod(np.maximum(powers, 1.0))[:, None]  # (order + 1, p)
+    return np.ascontiguousarray((curve.derivatives(middle, order) * factor[:, :, None]).transpose(1, 2, 0))
+
+
+def _coefficients(curve: NurbsCurve, middle: Array, width: Array) -> Array:
+    """Coefficients (p, 2, 6) of the quintics: the curve's own, or its seventh Taylor polynomial less Chebyshev's of degree 7 and 6."""
     if _is_polynomial(curve):
-        derivative = curve.derivatives(middle, 5)  # (6, p, 2)
-        factor = width ** np.arange(6)[:, None] / np.array([1.0, 1, 2, 6, 24, 120])[:, None]  # (6, p)
-        return np.ascontiguousarray((derivative * factor[:, :, None]).transpose(1, 2, 0))
-    t = (first + last)[:, None] / 2 + (last - first)[:, None] / 2 * _CHEBYSHEV  # (p, 6)
-    centre = curve.point(middle)
-    points = curve.point((middle[:, None] + width[:, None] * t).ravel()).reshape(*t.shape, 2) - centre[:, None, :]
-    solution = np.linalg.solve(t[:, :, None] ** np.arange(6), points).transpose(0, 2, 1)  # (p, 2, 6)
-    solution[:, :, 0] += centre
-    return np.ascontiguousarray(solution)
+        return _taylor(curve, middle, width, 5)
+    c = _taylor(curve, middle, width, 7)
+    r = 0.5 + _OVERLAP
+    seventh, sixth = c[:, :, 7:], c[:, :, 6:7]
+    c[:, :, 1:6:2] += seventh * (np.array([7 * r**6, -56 * r**4, 112 * r**2]) / 64)
+    c[:, :, 0:5:2] += sixth * (np.array([r**6, -18 * r**4, 48 * r**2]) / 32)
+    return np.ascontiguousarray(c[:, :, :6])
 
 
-def _links(curve: NurbsCurve, low: Array, high: Array, size: float) -> tuple[Index, Index, Array]:
-    """The piece before and after each piece, or -1 - vertex; and the vertices: corners, then the ends of an open curve."""
+def _links(curve: NurbsCurve, low: Array) -> tuple[Index, Index, Array, Array]:
+    """The piece before and after each piece, or -1 - vertex; vertices (corners, then the ends of an open curve) and their cones."""
     count = len(low)
     before, after = np.arange(-1, count - 1), np.arange(1, count + 1)
     before[0], after[-1] = count - 1, 0
-    vertices = []
+    made = []
     for corner in curve.corners:
         follower = int(np.argmin(np.abs(low - corner)))
-        vertices.append(_vertex(curve, corner, 1.0))
-        after[before[follower]], before[follower] = -len(vertices), -len(vertices)
+        made.append(_vertex(curve, corner, 1.0))
+        after[before[follower]], before[follower] = -len(made), -len(made)
     if not curve.closed:
-        before[0], after[-1] = -1 - len(vertices), -2 - len(vertices)
-        vertices += [_vertex(curve, curve.domain[0], 2.0), _vertex(curve, curve.domain[1], 2.0)]
-    return before, after, np.array(vertices).reshape(-1, VERTEX_WIDTH)
+        before[0], after[-1] = -1 - len(made), -2 - len(made)
+        made += [_vertex(curve, end, 2.0) for end in curve.domain]
+        made[-2][1][0], made[-1][1][1] = 0.0, 0.0
+    return before, after, np.array([row for row, _ in made]).reshape(-1, VERTEX_WIDTH), np.array([cone for _, cone in made]).reshape(-1, 2, 2)
 
 
-def _vertex(curve: NurbsCurve, u: float, kind: float) -> Array:
-    """One row of the vertices. The pseudo-normal is the bisector of both normals (of a cusp: the later one's)."""
+def _vertex(curve: NurbsCurve, u: float, kind: float) -> tuple[Array, Array]:
+    """One row of the vertices, and the tangents (2, 2) there. The pseudo-normal is the bisector of both normals (of a cusp: the later)."""
     here = np.array([u])
     point, tangent = curve.derivatives(here, 1)[:, 0]
-    tangent = tangent / np.hypot(*tangent)
-    if kind == 1.0:
-        earlier = curve.derivatives(left_of(here, curve), 1)[1, 0]
-        both = tangent + earlier / np.hypot(*earlier)
-        tangent = both / np.hypot(*both) if np.hypot(*both) > 1e-9 else tangent
-    return np.array([point[0], point[1], -tangent[1], tangent[0], u, kind, 0.0, 0.0])
+    later = tangent / np.hypot(*tangent)
+    tangent = curve.derivatives(left_of(here, curve), 1)[1, 0] if kind == 1.0 else later
+    earlier = tangent / np.hypot(*tangent)
+    both = later + earlier
+    both = both / np.hypot(*both) if np.hypot(*both) > 1e-9 else later
+    return np.array([point[0], point[1], -both[1], both[0], u, kind, 0.0, 0.0]), np.array([earlier, later])
 
 
-def _with_geometry(rows: Array, before: Index, after: Index, vertices: Array) -> _Pieces:
+def _with_geometry(rows: Array, before: Index, after: Index, vertices: Array, cones: Array) -> _Pieces:
     """Chords, frames and bounds of the pieces from their coefficients."""
     c = rows[:, :12].reshape(-1, 2, 6)
     first, last = rows[:, 14], rows[:, 15]
@@ -245,8 +252,10 @@ def _with_geometry(rows: Array, before: Index, after: Index, vertices: Array) ->
         least=curvature.min(axis=1) - spread,
         most=curvature.max(axis=1) + spread,
         reach_mm=speed.max(axis=1) * np.maximum(-first, last),
+        half_mm=speed.max(axis=1) / 2,
         length_mm=middle_speed,
         vertices=vertices,
+        cones=cones,
     )
 
 
@@ -286,27 +295,28 @@ def _refine(pieces: _Pieces, origin: Array, root: float, size: float) -> _Leaves
     count = len(pieces)
     pairs = _Pairs(np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros(count, np.int64), np.arange(count))
     done: list[tuple[Index, ...]] = []
-    lists: list[int] = []
+    lists: list[Index] = [np.zeros(0, np.int64)]
     while len(pairs.x):
         side = root / 2**level
         radius = side * np.sqrt(0.5) * (1 + 1e-9)
         centre = origin + (np.column_stack([pairs.x, pairs.y]) + 0.5) * side
-        nearest, lowest = _keep_possible(pairs, pieces, centre, radius)
+        lowest = _keep_near(pairs, pieces, centre, radius)
+        view = _keep_feet(pairs, pieces, centre, radius)
         far = lowest - radius > _BAND * size
         deepest = np.where(lowest - radius > _NEAR * size, _DEEPEST - 2, _DEEPEST)
-        branches, certified, fits = _judge(pairs, pieces, centre, nearest, radius)
-        single = (branches == 1) & certified & (fits | (level >= deepest))
+        branches, certified, fits = _judge(pairs, pieces, centre, view, radius)
+        single = (branches == 1) & certified & (fits | (level >= deepest - 1))
         last = level >= deepest
         ready = ~far & (level >= BLOCK_LEVEL) & (single | last)
-        content = np.where(single, pairs.piece[nearest], FAR)
-        listed = np.flatnonzero(ready & ~single & certified & (branches <= MOST_BRANCHES))
+        content = np.where(single, pairs.piece[view.nearest], FAR)
+        listed = np.flatnonzero(ready & ~single & certified)
         content[listed] = _lists(pairs, pieces, centre, radius, listed, lists)
         rows = np.flatnonzero(ready)
         done.append((np.full(len(rows), level), pairs.x[rows], pairs.y[rows], content[rows]))
         pairs = _split(pairs, ~far & ~ready)
         level += 1
     joined = [np.concatenate([part[i] for part in done]) for i in range(4)]
-    return _Leaves(joined[0], joined[1], joined[2], joined[3], np.array(lists, dtype=np.int64))
+    return _Leaves(joined[0], joined[1], joined[2], joined[3], np.concatenate(lists))
 
 
 def _chord_distance(pairs: _Pairs, pieces: _Pieces, centre: Array) -> Array:
@@ -321,22 +331,72 @@ def _chord_distance(pairs: _Pairs, pieces: _Pieces, centre: Array) -> Array:
     return np.asarray(np.sqrt(x * x + y * y))
 
 
-def _keep_possible(pairs: _Pairs, pieces: _Pieces, centre: Array, radius: float) -> tuple[Index, Array]:
-    """Drop pairs that cannot hold a closest point; the pair of the nearest piece and the least distance of every cell.
+def _keep_near(pairs: _Pairs, pieces: _Pieces, centre: Array, radius: float) -> Array:
+    """Drop pairs too far away to hold a closest point; the least distance (c,) of every cell.
 
     A point of the cell is at most upper + radius from the curve, so its foot is at most upper + 2 radius from the centre.
     """
     distance = _chord_distance(pairs, pieces, centre)
     sagitta = pieces.sagitta_mm[pairs.piece]
     upper = np.minimum.reduceat(distance + sagitta, pairs.first)
-    keep = distance - sagitta <= (upper + 2 * radius)[pairs.cell]
-    distance, sagitta = distance[keep], sagitta[keep]
-    pairs.cell, pairs.piece = pairs.cell[keep], pairs.piece[keep]
-    pairs.first = np.flatnonzero(np.diff(pairs.cell, prepend=-1))
     lowest = np.minimum.reduceat(distance - sagitta, pairs.first)
+    _keep(pairs, distance - sagitta <= (upper + 2 * radius)[pairs.cell])
+    return lowest
+
+
+def _keep(pairs: _Pairs, kept: NDArray[np.bool_]) -> None:
+    pairs.cell, pairs.piece = pairs.cell[kept], pairs.piece[kept]
+    pairs.first = np.flatnonzero(np.diff(pairs.cell, prepend=-1))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _View:
+    """Each pair's piece seen from the centre of the cell.
+
+    along, aside : (k,) coordinates of the centre in the frame at the middle of the piece
+    steepest     : (k,) upper bound of curvature x signed distance over piece and cell: below one, there is one foot at most
+    nearest      : (c,) the pair of the piece nearest to the centre
+    """
+
+    along: Array
+    aside: Array
+    steepest: Array
+    nearest: Index
+
+
+def _keep_feet(pairs: _Pairs, pieces: _Pieces, centre: Array, radius: float) -> _View:
+    """Drop pairs whose piece is no point's foot: the tangential distance keeps its sign, or every foot would be a farthest point."""
+    p = pairs.piece
+    along, aside = _in_frame(pieces, p, centre[pairs.cell])
+    flattest, steepest = _steepness(pieces, p, along, aside, radius)
+    change = np.maximum(np.abs(1 - flattest), np.abs(1 - steepest)) * pieces.half_mm[p] + 2e-6 * (np.abs(aside) + radius)
+    kept = (np.abs(along) - radius <= change) & (flattest <= 1)
+    at_vertex = np.flatnonzero((pieces.after[p] < 0) | (pieces.before[p] < 0))
+    kept[at_vertex] |= _may_end_at_vertex(pieces, p[at_vertex], centre[pairs.cell[at_vertex]], radius)
+    _keep(pairs, kept)
+    along, aside, steepest = along[kept], aside[kept], steepest[kept]
+    distance = _chord_distance(pairs, pieces, centre)
     is_least = np.flatnonzero(distance == np.minimum.reduceat(distance, pairs.first)[pairs.cell])
     nearest = is_least[np.flatnonzero(np.diff(pairs.cell[is_least], prepend=-1))]
-    return nearest, lowest
+    return _View(along, aside, steepest, nearest)
+
+
+def _may_end_at_vertex(pieces: _Pieces, p: Index, place: Array, radius: float) -> NDArray[np.bool_]:
+    """Whether the vertex that the pieces p (k,) answer for can be closest to a point of the cell: that at their end, or an open start."""
+    is_start = (pieces.before[p] < 0) & (pieces.vertices[-1 - np.minimum(pieces.before[p], -1), 5] == 2)
+    vertex = np.where(pieces.after[p] < 0, -1 - pieces.after[p], np.where(is_start, -1 - pieces.before[p], -1))
+    x, y = place[:, 0] - pieces.vertices[vertex, 0], place[:, 1] - pieces.vertices[vertex, 1]
+    cone = pieces.cones[vertex]
+    ahead = x * cone[:, 0, 0] + y * cone[:, 0, 1] >= -radius * (1 + 1e-9)
+    behind = x * cone[:, 1, 0] + y * cone[:, 1, 1] <= radius * (1 + 1e-9)
+    return np.asarray(ahead & behind & (vertex >= 0))
+
+
+def _in_frame(pieces: _Pieces, p: Index, place: Array) -> tuple[Array, Array]:
+    """Coordinates (k,) of places (k, 2) along and to the left of the tangent at the middle of the pieces p (k,)."""
+    x, y = place[:, 0] - pieces.middle_mm[p, 0], place[:, 1] - pieces.middle_mm[p, 1]
+    tx, ty = pieces.tangent[p, 0], pieces.tangent[p, 1]
+    return x * tx + y * ty, y * tx - x * ty
 
 
 def _breaks(pairs: _Pairs, pieces: _Pieces) -> NDArray[np.bool_]:
@@ -348,7 +408,7 @@ def _breaks(pairs: _Pairs, pieces: _Pieces) -> NDArray[np.bool_]:
 
 
 def _judge(
-    pairs: _Pairs, pieces: _Pieces, centre: Array, nearest: Index, radius: float
+    pairs: _Pairs, pieces: _Pieces, centre: Array, view: _View, radius: float
 ) -> tuple[Index, NDArray[np.bool_], NDArray[np.bool_]]:
     """For every cell: stretches of curve, whether each has one foot at most, whether the nearest piece covers all feet of the cell."""
     starts = _breaks(pairs, pieces)
@@ -356,17 +416,12 @@ def _judge(
     final = np.append(pairs.first[1:], len(pairs.piece)) - 1
     around_seam = pieces.before[pairs.piece[pairs.first]] == pairs.piece[final]
     branches -= around_seam & (branches > 1)
-    p = pairs.piece
-    offset = centre[pairs.cell] - pieces.middle_mm[p]
-    tx, ty = pieces.tangent[p, 0], pieces.tangent[p, 1]
-    along, aside = offset[:, 0] * tx + offset[:, 1] * ty, offset[:, 1] * tx - offset[:, 0] * ty
-    steepest = _steepest(pieces, p, along, aside, radius)
-    certified = np.maximum.reduceat(steepest, pairs.first) < _STEEPEST
-    p, along, aside = p[nearest], along[nearest], aside[nearest]
+    certified = np.maximum.reduceat(view.steepest, pairs.first) < _STEEPEST
+    nearest = view.nearest
+    p, along, aside = pairs.piece[nearest], view.along[nearest], view.aside[nearest]
     certified &= _neighbours_certified(pieces, p, centre, radius)
-    shrink = np.maximum(1 - pieces.curvature[p] * aside, 0.1)
-    foot = along / shrink / pieces.length_mm[p]
-    reach = radius / np.clip(1 - steepest[nearest], 0.1, 1.0) / pieces.length_mm[p]
+    foot = along / np.maximum(1 - pieces.curvature[p] * aside, 0.1) / pieces.length_mm[p]
+    reach = radius / np.clip(1 - view.steepest[nearest], 0.1, 1.0) / pieces.length_mm[p]
     fits = (foot - reach >= pieces.rows[p, 14]) | (pieces.before[p] < 0)
     fits &= (foot + reach <= pieces.rows[p, 15]) | (pieces.after[p] < 0)
     return branches, certified, fits
@@ -377,45 +432,50 @@ def _neighbours_certified(pieces: _Pieces, p: Index, centre: Array, radius: floa
     certified = np.ones(len(p), dtype=bool)
     for link in (pieces.before[p], pieces.after[p]):
         neighbour = np.where(link >= 0, link, p)
-        offset = centre - pieces.middle_mm[neighbour]
-        tx, ty = pieces.tangent[neighbour, 0], pieces.tangent[neighbour, 1]
-        along, aside = offset[:, 0] * tx + offset[:, 1] * ty, offset[:, 1] * tx - offset[:, 0] * ty
-        certified &= _steepest(pieces, neighbour, along, aside, radius) < _STEEPEST
+        along, aside = _in_frame(pieces, neighbour, centre)
+        certified &= _steepness(pieces, neighbour, along, aside, radius)[1] < _STEEPEST
     return certified
 
 
-def _steepest(pieces: _Pieces, p: Index, along: Array, aside: Array, radius: float) -> Array:
-    """Upper bound (k,) of curvature x signed distance over a piece and all points of the cell.
+def _steepness(pieces: _Pieces, p: Index, along: Array, aside: Array, radius: float) -> tuple[Array, Array]:
+    """Bounds (k,) of curvature x signed distance over a piece, its overlap, and all points of the cell.
 
-    Below one, the tangential distance grows along the piece, so there is one foot at most.
+    The tangential distance changes by 1 - curvature x signed distance per millimetre of the curve.
     """
     least, most, reach = pieces.least[p], pieces.most[p], pieces.reach_mm[p]
     sharpest = np.maximum(np.abs(least), np.abs(most))
     drift = sharpest * (np.abs(along) + 2 * reach * np.maximum(1.0, sharpest * np.abs(aside))) * reach + radius
     low, high = aside - drift, aside + drift
-    return np.asarray(np.maximum(np.maximum(least * low, least * high), np.maximum(most * low, most * high)))
+    corners = least * low, least * high, most * low, most * high
+    flattest = np.minimum(np.minimum(corners[0], corners[1]), np.minimum(corners[2], corners[3]))
+    return flattest, np.maximum(np.maximum(corners[0], corners[1]), np.maximum(corners[2], corners[3]))
 
 
-def _lists(pairs: _Pairs, pieces: _Pieces, centre: Array, radius: float, cells: Index, lists: list[int]) -> Index:
-    """Append the nearest piece of each stretch of the cells to `lists` (count, pieces...); what the cells hold."""
-    starts = _breaks(pairs, pieces)
+def _lists(pairs: _Pairs, pieces: _Pieces, centre: Array, radius: float, cells: Index, lists: list[Index]) -> Index:
+    """What the cells hold: the place in `lists` (rows of LIST_WIDTH: count, pieces) of the nearest piece of each of their stretches."""
+    if not cells.size:
+        return cells
+    starts = np.flatnonzero(_breaks(pairs, pieces))  # (s,) first pair of each stretch
     distance = _chord_distance(pairs, pieces, centre)
-    final = np.append(pairs.first[1:], len(pairs.piece))
-    content = np.empty(len(cells), dtype=np.int64)
-    known: dict[tuple[int, ...], int] = {}
-    for row, cell in enumerate(cells):
-        stretch = slice(pairs.first[cell], final[cell])
-        piece, reach = pairs.piece[stretch], distance[stretch]
-        borders = np.append(np.flatnonzero(starts[stretch]), len(piece))
-        chosen = [int(piece[a + np.argmin(reach[a:b])]) for a, b in zip(borders[:-1], borders[1:], strict=True)]
-        if not _neighbours_certified(pieces, np.array(chosen), np.tile(centre[cell], (len(chosen), 1)), radius).all():
-            content[row] = FAR
-            continue
-        key = tuple(chosen)
-        if key not in known:
-            known[key] = len(lists)
-            lists.extend([len(chosen), *chosen])
-        content[row] = LISTED - known[key]
+    stretch = np.zeros(len(pairs.cell), dtype=np.int64)
+    stretch[starts[1:]] = 1
+    is_least = np.flatnonzero(distance == np.minimum.reduceat(distance, starts)[np.cumsum(stretch)])
+    chosen = pairs.piece[is_least[np.searchsorted(is_least, starts)]]  # (s,)
+    certified = _neighbours_certified(pieces, chosen, centre[pairs.cell[starts]], radius)
+    first = np.searchsorted(starts, pairs.first[cells])
+    count = np.searchsorted(starts, np.append(pairs.first, len(pairs.cell))[cells + 1]) - first
+    rows = np.zeros((len(cells), LIST_WIDTH), dtype=np.int64)
+    rows[:, 0] = count
+    good = count < LIST_WIDTH
+    for branch in range(LIST_WIDTH - 1):
+        has = good & (branch < count)
+        rows[has, 1 + branch] = chosen[first[has] + branch]
+        good[has] &= certified[first[has] + branch]
+    place = sum(map(len, lists))
+    distinct, which = np.unique(rows[good], axis=0, return_inverse=True)
+    lists.append(distinct.ravel())
+    content = np.full(len(cells), FAR)
+    content[good] = LISTED - (place + LIST_WIDTH * which.ravel())
     return content
 
 
