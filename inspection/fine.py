@@ -27,21 +27,30 @@ _ICP_MOST_STEPS = 2000
 _ICP_TOLERANCE = 1e-6  # relative change of the mean square; the paper states none
 _HALVINGS = 12
 _FREE = 1e-9  # a motion whose eigenvalue is below this share of the largest changes no deviation: it is undetermined
+_OUTLIER_MADS = 6.0  # median absolute deviations beyond which Tukey's weight is zero and a point an outlier
+_ROBUST_STEPS = 40
+_SETTLED_WEIGHTS_MM = 1e-6
 _SCOUTS = 400  # points that rank coarse poses
 _EQUAL_RMS = 1.1  # rivals whose rms is within this factor of the best fit as well
 _SAME_POSE = 0.01  # of the part's size: poses closer than this are one
 
 
 def register(
-    points_mm: ArrayLike, nominal: NominalProfile, method: Method = "exact", scheme: Scheme = "gauss-newton", tip_radius_mm: float = 0.0
+    points_mm: ArrayLike,
+    nominal: NominalProfile,
+    method: Method = "exact",
+    scheme: Scheme = "gauss-newton",
+    tip_radius_mm: float = 0.0,
+    robust: bool = False,
 ) -> Registration:
     """Coarse then fine registration of section points (m, 2): every coarse pose is refined on a few points, the best on all.
 
-    Poses of symmetric parts that fit equally well are reported as `rivals`. Raises RegistrationError for too few points.
+    Poses of symmetric parts that fit equally well are reported as `rivals`. `robust` finds gross outliers first and leaves
+    them out, see register_fine. Raises RegistrationError for too few points.
     """
     points = registrable(points_mm)
     ranked = ranked_poses(points, nominal, tip_radius_mm)
-    result = register_fine(points, nominal, ranked[0][1], method, scheme, tip_radius_mm)
+    result = register_fine(points, nominal, ranked[0][1], method, scheme, tip_radius_mm, robust)
     return replace(result, rivals=tuple(pose for rms, pose in ranked[1:] if rms <= _EQUAL_RMS * ranked[0][0]))
 
 
@@ -84,10 +93,13 @@ def register_fine(
     method: Method = "exact",
     scheme: Scheme = "gauss-newton",
     tip_radius_mm: float = 0.0,
+    robust: bool = False,
 ) -> Registration:
     """Fine registration of section points (m, 2) from a coarse pose. Points beyond open ends take no part.
 
     method : how deviations are found; with "pcp" or "veaw" Gauss-Newton may not settle (`converged` says so), "icp" is theirs
+    robust : detect points farther than 6 median absolute deviations by Tukey weights, then fit the others by least squares
+             (weights alone would bias the pose where form error is systematic); `outliers` of the result says which
     """
     points = registrable(points_mm)
     pose = start.nominal_from_section if isinstance(start, Registration) else start
@@ -95,7 +107,26 @@ def register_fine(
         return _icp(points, nominal, pose, method, tip_radius_mm)
     if scheme != "gauss-newton":
         raise ValueError(f"scheme must be gauss-newton or icp, not {scheme!r}")
-    return _gauss_newton(points, nominal, pose, method, tip_radius_mm)
+    if not robust:
+        return _gauss_newton(points, nominal, pose, method, tip_radius_mm)
+    outliers = _outliers(points, nominal, pose, method, tip_radius_mm)
+    inliers = _gauss_newton(points[~outliers], nominal, pose, method, tip_radius_mm)
+    return replace(inliers, outliers=outliers)
+
+
+def _outliers(points: Array, nominal: NominalProfile, pose: RigidTransform, method: Method, tip_radius_mm: float) -> NDArray[np.bool_]:
+    """Points (m,) whose Tukey weight is zero once the weighted fit has settled."""
+    for _ in range(_ROBUST_STEPS):
+        moved = pose.apply(points)
+        d = deviations(moved, nominal, method, tip_radius_mm)
+        off = np.abs(d.deviation_mm)
+        limit = _OUTLIER_MADS * float(np.median(off[~d.beyond_end])) if not d.beyond_end.all() else np.inf
+        weights = np.where(off < limit, (1 - (off / max(limit, STANDSTILL_MM)) ** 2) ** 2, 0.0)
+        centre, step = newton_step(moved, d, nominal, tip_radius_mm, weights)
+        pose = about(centre, step[2], step[:2]).after(pose)
+        if np.hypot(step[0], step[1]) + abs(step[2]) * _reach(moved - centre) <= _SETTLED_WEIGHTS_MM:
+            break
+    return (off >= limit) & ~d.beyond_end
 
 
 def _gauss_newton(points: Array, nominal: NominalProfile, pose: RigidTransform, method: Method, tip_radius_mm: float) -> Registration:
@@ -121,8 +152,10 @@ def _gauss_newton(points: Array, nominal: NominalProfile, pose: RigidTransform, 
     return _registration(pose, moved, d, iteration, converged)
 
 
-def newton_step(points: Array, d: Deviations, nominal: NominalProfile, tip_radius_mm: float) -> tuple[Array, Array]:
-    """Centre (2,) and step (3,) (shift in mm, rotation in rad about the centre) towards the least mean square deviation.
+def newton_step(
+    points: Array, d: Deviations, nominal: NominalProfile, tip_radius_mm: float, weights: Array | None = None
+) -> tuple[Array, Array]:
+    """Centre (2,) and step (3,) (shift in mm, rotation in rad about the centre) towards the least (weighted) mean square.
 
     Full second derivative where it is positive definite, its Gauss-Newton part otherwise; motions that the points do not
     determine (a circle's rotation) are left alone.
@@ -132,9 +165,11 @@ def newton_step(points: Array, d: Deviations, nominal: NominalProfile, tip_radiu
     centre = x.mean(axis=0) if len(x) else np.zeros(2)
     arm = x - centre
     rows = np.column_stack([g, arm[:, 0] * g[:, 1] - arm[:, 1] * g[:, 0]])  # (m, 3) gradient of each deviation
-    slope = rows.T @ e
-    tangential = rows.T @ rows
-    full = tangential + _second_derivative(arm, e, g, _level_curvature(d, nominal, tip_radius_mm)[used])
+    w = np.ones(len(e)) if weights is None else weights[used]
+    weighted = rows * w[:, None]
+    slope = weighted.T @ e
+    tangential = weighted.T @ rows
+    full = tangential + _second_derivative(arm, w * e, g, _level_curvature(d, nominal, tip_radius_mm)[used])
     positive = np.linalg.eigvalsh(full)[0] > 0.1 * np.linalg.eigvalsh(tangential)[0]
     reach = _reach(arm)
     values, vectors = _motions(full if positive else tangential, reach)

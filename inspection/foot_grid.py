@@ -209,7 +209,12 @@ def _links(curve: NurbsCurve, low: Array) -> tuple[Index, Index, Array, Array]:
         before[0], after[-1] = -1 - len(made), -2 - len(made)
         made += [_vertex(curve, end, 2.0) for end in curve.domain]
         made[-2][1][0], made[-1][1][1] = 0.0, 0.0
-    return before, after, np.array([row for row, _ in made]).reshape(-1, VERTEX_WIDTH), np.array([cone for _, cone in made]).reshape(-1, 2, 2)
+    return (
+        before,
+        after,
+        np.array([row for row, _ in made]).reshape(-1, VERTEX_WIDTH),
+        np.array([cone for _, cone in made]).reshape(-1, 2, 2),
+    )
 
 
 def _vertex(curve: NurbsCurve, u: float, kind: float) -> tuple[Array, Array]:
@@ -407,9 +412,7 @@ def _breaks(pairs: _Pairs, pieces: _Pieces) -> NDArray[np.bool_]:
     return starts
 
 
-def _judge(
-    pairs: _Pairs, pieces: _Pieces, centre: Array, view: _View, radius: float
-) -> tuple[Index, NDArray[np.bool_], NDArray[np.bool_]]:
+def _judge(pairs: _Pairs, pieces: _Pieces, centre: Array, view: _View, radius: float) -> tuple[Index, NDArray[np.bool_], NDArray[np.bool_]]:
     """For every cell: stretches of curve, whether each has one foot at most, whether the nearest piece covers all feet of the cell."""
     starts = _breaks(pairs, pieces)
     branches = np.add.reduceat(starts.astype(np.int64), pairs.first)

@@ -78,9 +78,7 @@ def _rows_to_columns(typing_context: Any, table: Any, rows: Any, first: Any, tar
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         eight = ir.VectorType(ir.DoubleType(), 8)
-        table_data, rows_data, target_data = (
-            context.make_array(signature.args[i])(context, builder, args[i]).data for i in (0, 1, 3)
-        )
+        table_data, rows_data, target_data = (context.make_array(signature.args[i])(context, builder, args[i]).data for i in (0, 1, 3))
         word = ir.IntType(64)
 
         def at(data: Any, offset: Any) -> Any:
@@ -97,7 +95,9 @@ def _rows_to_columns(typing_context: Any, table: Any, rows: Any, first: Any, tar
             for i in range(8):
                 if not i & span:
                     mixed[i] = builder.shuffle_vector(lines[i], lines[i + span], ir.Constant(ir.VectorType(ir.IntType(32), 8), mask_low))
-                    mixed[i + span] = builder.shuffle_vector(lines[i], lines[i + span], ir.Constant(ir.VectorType(ir.IntType(32), 8), mask_high))
+                    mixed[i + span] = builder.shuffle_vector(
+                        lines[i], lines[i + span], ir.Constant(ir.VectorType(ir.IntType(32), 8), mask_high)
+                    )
             lines = mixed
         for q in range(8):
             offset = builder.add(args[4], word(q * _BLOCK))
@@ -143,8 +143,19 @@ def project(points_mm: Array, grid: FootGrid, threads: int | None = None) -> Fee
         _project(points, grid.reals, grid.integers, numbers, vertex, 0, m)
     else:
         with ThreadPoolExecutor(threads) as pool:
-            list(pool.map(lambda at: _project(points, grid.reals, grid.integers, numbers, vertex, at, min(at + _CHUNK, m)), range(0, m, _CHUNK)))
-    return Feet(numbers[:m], numbers[m : 3 * m].reshape(m, 2), numbers[3 * m : 4 * m], numbers[4 * m : 6 * m].reshape(m, 2), numbers[6 * m :], vertex)
+            list(
+                pool.map(
+                    lambda at: _project(points, grid.reals, grid.integers, numbers, vertex, at, min(at + _CHUNK, m)), range(0, m, _CHUNK)
+                )
+            )
+    return Feet(
+        numbers[:m],
+        numbers[m : 3 * m].reshape(m, 2),
+        numbers[3 * m : 4 * m],
+        numbers[4 * m : 6 * m].reshape(m, 2),
+        numbers[6 * m :],
+        vertex,
+    )
 
 
 # Where the memory of a block keeps what, _BLOCK numbers each. Reals: the row of the piece (16 columns), then
@@ -234,7 +245,14 @@ def _start(w: Any, j: int) -> None:
 def _solve(w: Any, q: Any, j: int) -> None:
     """One Halley step from t, then a Newton step and the results; solved where the step is small and t belongs to the piece."""
     c0, c1, c2, c3, c4, c5 = w[j], w[_BLOCK + j], w[2 * _BLOCK + j], w[3 * _BLOCK + j], w[4 * _BLOCK + j], w[5 * _BLOCK + j]
-    d0, d1, d2, d3, d4, d5 = w[6 * _BLOCK + j], w[7 * _BLOCK + j], w[8 * _BLOCK + j], w[9 * _BLOCK + j], w[10 * _BLOCK + j], w[11 * _BLOCK + j]
+    d0, d1, d2, d3, d4, d5 = (
+        w[6 * _BLOCK + j],
+        w[7 * _BLOCK + j],
+        w[8 * _BLOCK + j],
+        w[9 * _BLOCK + j],
+        w[10 * _BLOCK + j],
+        w[11 * _BLOCK + j],
+    )
     x, y, t = w[_X + j], w[_Y + j], w[_T + j]
     c0 -= x
     d0 -= y
@@ -381,9 +399,7 @@ def _resume(w: Any, lanes: int, waiting: int) -> None:
 
 
 @_compiled
-def _settle(
-    w: Any, q: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, lanes: int, waiting: int, best: Any, stack: Any
-) -> int:
+def _settle(w: Any, q: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, lanes: int, waiting: int, best: Any, stack: Any) -> int:
     """Offer the solved items to their points, send the others on."""
     for j in range(lanes):
         if q[_SOLVED + j] == 1:
@@ -396,9 +412,7 @@ def _settle(
 
 
 @_compiled
-def _advance(
-    w: Any, q: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, j: int, waiting: int, best: Any, stack: Any
-) -> int:
+def _advance(w: Any, q: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, j: int, waiting: int, best: Any, stack: Any) -> int:
     """The next try of an unsolved lane: once on the neighbouring piece, or the vertex there, or on from its t; else the search.
 
     Feet are accepted on the certified piece and its two neighbours only, so no try can end on another stretch of curve.

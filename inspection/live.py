@@ -9,7 +9,7 @@ State moves only at fixed point numbers, never at the edges of batches: the same
 """
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,7 +36,8 @@ _BLOCK = 64  # points between two moves of the state
 _SEEK_GROWTH = 1.3  # a further search once the prefix has grown by this factor
 _REFIT_GROWTH = 2.0
 _CLEARLY_BETTER = 0.5  # of the next best pose's rms
-_CORRELATION = 0.05  # share of the length over which form error is taken as one independent value
+_CORRELATION = 0.125  # share of the length over which form error is taken as one independent value: two to four waves around
+_PRIOR_SHARE = 1 / 6  # of the zone's width: standard deviation of the form error expected where nothing is measured yet
 _MISFIT = 0.02  # rms above this share of the nominal's size is no registration of the same part
 _MIRROR_HINT = 0.2  # a mirrored fit must be better by this factor to be named as the cause
 
@@ -89,8 +90,10 @@ class LiveInspection:
         reject_outliers: bool = False,
     ) -> None:
         check_tip_radius(tip_radius_mm, nominal)
-        if fit not in ("best-fit", "minimum-zone", "none"):
-            raise ValueError(f"fit must be best-fit, minimum-zone or none, not {fit!r}")
+        if fit not in get_args(Fit):
+            raise ValueError(f"fit must be one of {', '.join(get_args(Fit))}, not {fit!r}")
+        if method not in get_args(Method):
+            raise ValueError(f"method must be one of {', '.join(get_args(Method))}, not {method!r}")
         self._nominal, self._zone, self._fit, self._method, self._tip = nominal, zone, fit, method, tip_radius_mm
         self._section, self._off_section_max, self._coverage_min = section, off_section_max_mm, coverage_min
         self._reject_outliers = reject_outliers
@@ -211,7 +214,7 @@ class LiveInspection:
         return track if track.can_move_mm() < _MISFIT * size else None
 
     def _fresh_track(self, registration: Registration, points: Array) -> "_PoseTrack":
-        return _PoseTrack(registration, points, self._nominal, self._tip)
+        return _PoseTrack(registration, points, self._nominal, self._tip, _PRIOR_SHARE * (self._zone.upper_mm - self._zone.lower_mm))
 
     def _update(self, first: int) -> LiveUpdate:
         rows, stop = self._rows, self._rows.count
@@ -230,10 +233,11 @@ class LiveInspection:
         )
 
     def _registered(self, points: Array) -> Registration:
-        registration = register(points, self._nominal, tip_radius_mm=self._tip)
+        registration = register(points, self._nominal, tip_radius_mm=self._tip, robust=self._reject_outliers)
         self._check_fit(points, registration)
         if self._fit == "minimum-zone":
-            zone = fit_minimum_zone(points, self._nominal, registration, self._method, self._tip, self._zone.middle_mm)
+            kept = points[~registration.outliers]
+            zone = fit_minimum_zone(kept, self._nominal, registration, self._method, self._tip, self._zone.middle_mm)
             return replace(registration, nominal_from_section=zone.nominal_from_section, iterations=zone.programs, converged=zone.converged)
         return registration
 
@@ -335,7 +339,9 @@ class _PoseTrack:
     without touching earlier points again.
     """
 
-    def __init__(self, registration: Registration, points: Array, nominal: NominalProfile, tip_radius_mm: float) -> None:
+    def __init__(
+        self, registration: Registration, points: Array, nominal: NominalProfile, tip_radius_mm: float, expected_form_mm: float
+    ) -> None:
         self.registration = registration
         self.pose = registration.nominal_from_section
         self.fitted = len(points)
@@ -345,7 +351,8 @@ class _PoseTrack:
         J = self._gradients(self.pose.apply(points), d.normal)[~d.beyond_end]
         e = d.deviation_mm[~d.beyond_end]
         self._normal, self._right = J.T @ J, J.T @ e
-        self._sum_square, self._count = float(e @ e), len(e)
+        self._expected_form_mm = expected_form_mm
+        self._sum_square, self._sum_change, self._count = float(e @ e), _changes(e), len(e)
         self._stations = np.zeros(64, dtype=bool)
         self._reach = float(np.hypot(*(nominal.points_mm - self._centre).T).max())
         self._mark(d.station_mm)
@@ -362,6 +369,7 @@ class _PoseTrack:
         self._normal += J.T @ J
         self._right += J.T @ (e[kept] - J @ self._motion)
         self._sum_square += float(e @ e)
+        self._sum_change += _changes(e)
         self._count += len(e)
         self._mark(rows.station[judged])
         self._motion = np.asarray(-np.linalg.lstsq(self._normal, self._right, rcond=1e-12)[0], dtype=np.float64)
@@ -371,12 +379,16 @@ class _PoseTrack:
     def can_move_mm(self) -> float:
         """Largest 95 % shift of a deviation anywhere on the profile by what the pose is still uncertain.
 
-        Form error is taken as independent only over 5 % of the length, so that a scan of a few patches is not trusted more
-        than its patches.
+        What changes from point to point is noise, independent at every point. The rest is form error, one value for every
+        eighth of the length: a scan of a few such patches is trusted no more than its patches, less those that the pose
+        itself used up. Where nothing is measured yet, form error of a sixth of the zone's width is expected.
         """
-        patches = max(self._stations.mean() / _CORRELATION, 1.0)
-        scatter = self._sum_square / max(self._count, 1)
-        covariance = np.linalg.pinv(self._normal, hermitian=True) * scatter * self._count / patches
+        covered = float(self._stations.mean())
+        patches = max(covered / _CORRELATION, 1.0)
+        noise = self._sum_change / max(self._count, 1)
+        form = max(self._sum_square / max(self._count, 1) - noise, 0.0) * patches / max(patches - 3.0, 0.5)
+        form = max(form, self._expected_form_mm**2 * (1 - covered))
+        covariance = np.linalg.pinv(self._normal, hermitian=True) * (noise + form * self._count / patches)
         J = self._gradients(self._nominal.points_mm[::16], self._nominal.outward * self._nominal.normal[::16])
         return 2.0 * float(np.sqrt(np.maximum(((J @ covariance) * J).sum(axis=1), 0.0).max()))
 
@@ -387,6 +399,12 @@ class _PoseTrack:
     def _mark(self, station_mm: Array) -> None:
         share = station_mm / self._nominal.length_mm * len(self._stations)
         self._stations[np.clip(share.astype(np.int64), 0, len(self._stations) - 1)] = True
+
+
+def _changes(e: Array) -> float:
+    """Half the sum of squared changes from point to point: the sum of squares of what is noise."""
+    steps = np.diff(e)
+    return float(steps @ steps) / 2
 
 
 def _size(nominal: NominalProfile) -> float:

@@ -13,13 +13,16 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from inspection.curve import NurbsCurve, left_of
+from inspection.deviations import Method
 from inspection.errors import NominalError
+from inspection.spacing import LocalPoles, spaced_parameters
 from inspection.voronoi import SitePoles, site_poles
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Material = Literal["left", "right"]
 
+_SCOUT_SAMPLES = 2000  # even samples from which the poles are read before the spacing is chosen
 _MOST_SAMPLES = 400_000  # a refinement beyond this is a step limit set too small, not a profile
 
 
@@ -85,7 +88,13 @@ class NominalProfile:
 
 
 def discretize(
-    curve: NurbsCurve, samples: int = 10_000, pole_angle_min_deg: float = 178.0, step_min: float = 1e-4, material: Material = "left"
+    curve: NurbsCurve,
+    samples: int = 10_000,
+    pole_angle_min_deg: float = 178.0,
+    step_min: float = 1e-4,
+    material: Material = "left",
+    accuracy_mm: float | None = None,
+    method: Method = "exact",
 ) -> NominalProfile:
     """Algorithm 1 of Hari Ganesh & Samuel (2022): sample, build the Voronoi diagram, refine where a pole angle is too small.
 
@@ -93,9 +102,17 @@ def discretize(
     pole_angle_min_deg : refine next to samples whose two poles are seen under a smaller angle (the paper: 178)
     step_min           : never split a step of less than twice this fraction of the parameter range (the paper: 1e-4)
     material           : the side of the curve, seen along its direction, on which the material lies
+    accuracy_mm        : choose the samples by curvature instead, as few as keep the error of `method` below this, for
+                         points nearer than half the local pole radius: with spacing h, curvature k, its change k' and
+                         pole radius r the error is at most |k'| h^3 / 48 for circle, |k| h^2 / 8 for chord, (3/8) |1/r - k| h^2 + (1/2) |k'| h^3 for
+                         pcp and veaw (at corners and sharp edges r falls to zero: no spacing bounds those two there).
+                         `exact` and `inversion` are exact at any spacing. The paper's two limits are then
+                         not applied: they bound no error.
 
     The pole angle alone bounds no error; with the defaults it is the even starting step that does. Raises NominalError.
     """
+    if accuracy_mm is not None:
+        return _accurate(curve, material, accuracy_mm, method)
     if samples < 8 or not 0 < pole_angle_min_deg < 180 or not 0 < step_min < 1 or material not in ("left", "right"):
         raise NominalError(
             f"need samples >= 8, 0 < pole_angle_min_deg < 180, 0 < step_min < 1, material left or right; "
@@ -112,6 +129,31 @@ def discretize(
         if sum(map(len, refined)) > _MOST_SAMPLES:
             raise NominalError(f"more than {_MOST_SAMPLES} samples needed; choose a larger step_min than {step_min:g}")
         pieces = refined
+
+
+def _accurate(curve: NurbsCurve, material: Material, accuracy_mm: float, method: Method) -> NominalProfile:
+    """The fewest samples that meet the accuracy; poles are read off a first, even discretisation."""
+    if not accuracy_mm > 0:
+        raise NominalError(f"the accuracy must be above zero, not {accuracy_mm:g} mm")
+    scout = discretize(curve, _SCOUT_SAMPLES, material=material, step_min=0.5)
+    order = np.argsort(scout.parameter, kind="stable")
+    excess = np.maximum(np.abs(scout.poles.left_curvature - scout.curvature), np.abs(scout.poles.right_curvature + scout.curvature))
+    radius = 1 / np.maximum(scout.poles.left_curvature, scout.poles.right_curvature)
+    start, end = curve.domain
+
+    def poles(u: Array) -> LocalPoles:
+        wrapped = np.where(u > end, u - (end - start), u)
+        return LocalPoles(*(np.interp(wrapped, scout.parameter[order], values[order]) for values in (radius, _widest(excess))))
+
+    ranges = _even_parameters(curve, _SCOUT_SAMPLES)
+    pieces = [spaced_parameters(curve, piece[0], piece[-1], accuracy_mm, method, poles) for piece in ranges]
+    if sum(map(len, pieces)) > _MOST_SAMPLES:
+        raise NominalError(f"{method} needs more than {_MOST_SAMPLES} samples for {accuracy_mm:g} mm; choose circle or exact")
+    return _profile(curve, material, pieces)
+
+
+def _widest(values: Array) -> Array:
+    return np.maximum(values, np.maximum(np.roll(values, 1), np.roll(values, -1)))
 
 
 def _even_parameters(curve: NurbsCurve, samples: int) -> list[Array]:

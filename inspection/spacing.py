@@ -1,0 +1,128 @@
+"""How far apart samples may lie for a method of projection to meet an accuracy.
+
+A point's foot lies within h/2 of its nearest sample, h the spacing. With curvature k, its change k' along the profile and
+the pole radius r there, the methods' errors are bounded by (METHOD; Hu & Wallner 2005 for circles)
+
+    circle       |k'| h^3 / 48, and |jump of k| h^2 / 8 beside a knot where the curvature jumps
+    chord        |k| h^2 / 8
+    pcp, veaw    (3/8) |1/r - k| h^2 + (1/2) |k'| h^3
+
+and they presume that the nearest sample lies on the branch of the foot: the spacing stays below the smaller pole radius, so
+that this holds for points nearer than half of it (a thin edge wants dense samples). `exact` and `inversion` solve on the
+curve itself: no spacing limits their accuracy.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inspection.curve import NurbsCurve, left_of
+from inspection.deviations import Method
+
+Array = NDArray[np.float64]
+
+_GRID_PER_SPAN = 64
+_FEWEST = 64  # samples of a whole profile, however flat
+_TURN = 0.25  # most radians the profile may turn from one sample to the next, for the bounds' leading terms to hold
+_SAFETY = 0.7  # of the bound: room for what a step's unevenness and the terms left out of the bound add
+_SLOPE = 0.15  # mm by which the step may grow per mm of arc length
+_FINEST = 1e-5  # of the length: a sharp edge would ask for ever shorter steps
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LocalPoles:
+    """What a spacing must know of the poles at g places.
+
+    radius_mm : (g,) smaller of the two pole radii
+    excess    : (g,) max |1/r - k| of the two sides, 1/mm
+    """
+
+    radius_mm: Array
+    excess: Array
+
+
+def spaced_parameters(
+    curve: NurbsCurve, low: float, high: float, accuracy_mm: float, method: Method, poles: Callable[[Array], LocalPoles]
+) -> Array:
+    """Rising parameters from low to high of one smooth piece, as few as meet the accuracy; `poles` knows them at any."""
+    u = _grid(curve, low, high)
+    station = np.concatenate([[0.0], np.cumsum(np.abs(_steps_mm(curve, u)))])
+    limit = _largest_step_mm(curve, u, accuracy_mm, method, poles)
+    limit = np.minimum(limit, _beside_jumps(curve, u, station, accuracy_mm) if method == "circle" else np.inf)
+    limit = np.minimum(np.maximum(_narrowed(limit, station), _FINEST * curve.length_mm), curve.length_mm / _FEWEST)
+    count = np.concatenate([[0.0], np.cumsum(np.diff(station) * (1 / limit[1:] + 1 / limit[:-1]) / 2)])
+    steps = max(2, int(np.ceil(count[-1])))
+    even = np.interp(np.linspace(0.0, count[-1], steps + 1), count, u)
+    even[[0, -1]] = low, high
+    return even
+
+
+def _grid(curve: NurbsCurve, low: float, high: float) -> Array:
+    """Parameters (g,) that resolve every knot span between low and high; high may lie past the seam."""
+    start, end = curve.domain
+    knots = np.unique(np.concatenate([curve.knots, curve.knots + (end - start)]))
+    borders = np.concatenate([[low], knots[(knots > low) & (knots < high)], [high]])
+    inner = np.linspace(borders[:-1], borders[1:], _GRID_PER_SPAN, endpoint=False).T.ravel()
+    return np.append(inner, high)
+
+
+def _steps_mm(curve: NurbsCurve, u: Array) -> Array:
+    points = curve.point(np.minimum(u, curve.domain[1]) if not curve.closed else u)
+    return np.asarray(np.hypot(*np.diff(points, axis=0).T))
+
+
+def curvature_and_change(curve: NurbsCurve, u: Array) -> tuple[Array, Array]:
+    """Signed curvature k (m,) and its derivative by arc length k' (m,)."""
+    _, first, second, third = curve.derivatives(u, 3)
+    speed = np.hypot(first[:, 0], first[:, 1])
+    bend = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+    bend_change = first[:, 0] * third[:, 1] - first[:, 1] * third[:, 0]
+    stretch = (first * second).sum(axis=1)
+    return bend / speed**3, (bend_change / speed**3 - 3 * bend * stretch / speed**5) / speed
+
+
+def _largest_step_mm(curve: NurbsCurve, u: Array, accuracy_mm: float, method: Method, poles: Callable[[Array], LocalPoles]) -> Array:
+    before, after = curvature_and_change(curve, left_of(_wrapped(u, curve), curve)), curvature_and_change(curve, u)
+    k, change = (np.maximum(np.abs(a), np.abs(b)) for a, b in zip(before, after, strict=True))  # both sides of every knot
+    tau = _SAFETY * accuracy_mm
+    tiny = np.finfo(float).tiny
+    limit = _TURN / np.maximum(k, tiny)
+    if method in ("exact", "inversion"):
+        return limit
+    local = poles(u)
+    limit = np.minimum(limit, local.radius_mm)
+    if method == "circle":
+        return np.minimum(limit, np.cbrt(48 * tau / np.maximum(change, tiny)))
+    if method == "chord":
+        return np.minimum(limit, np.sqrt(8 * tau / np.maximum(k, tiny)))
+    return np.minimum(limit, np.minimum(np.sqrt(4 * tau / (3 * np.maximum(local.excess, tiny))), np.cbrt(tau / np.maximum(change, tiny))))
+
+
+def _wrapped(u: Array, curve: NurbsCurve) -> Array:
+    start, end = curve.domain
+    return np.where(u > end, u - (end - start), u) if curve.closed else u
+
+
+def _beside_jumps(curve: NurbsCurve, u: Array, station: Array, accuracy_mm: float) -> Array:
+    """Step limits (g,) near knots where the curvature jumps: there the circle of one side is used on the other."""
+    wrapped = _wrapped(u, curve)
+    jump = np.abs(curve.curvature(wrapped) - curve.curvature(left_of(wrapped, curve)))
+    jump[[0, -1]] = jump[[0, -1]] if curve.closed and not curve.corners.size else 0.0
+    limit = np.full(len(u), np.inf)
+    for index in np.flatnonzero(jump > 1e-9):
+        step = np.sqrt(8 * _SAFETY * accuracy_mm / jump[index])
+        near = np.abs(station - station[index]) <= 1.5 * step
+        limit[near] = np.minimum(limit[near], step)
+    return limit
+
+
+def _narrowed(limit: Array, station: Array) -> Array:
+    """Every limit reduced to what its neighbourhood allows: a step may not leap over a place that needs a shorter one."""
+    result = limit.copy()
+    for index in range(1, len(result)):
+        result[index] = min(result[index], result[index - 1] + _SLOPE * (station[index] - station[index - 1]))
+    for index in range(len(result) - 2, -1, -1):
+        result[index] = min(result[index], result[index + 1] + _SLOPE * (station[index + 1] - station[index]))
+    return result
