@@ -29,7 +29,9 @@ class _Curve(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     degree: int = Field(ge=1, le=15, description="the degree, a whole number like 3")
-    knots: list[Annotated[float, Field(ge=-1e9, le=1e9)]] = Field(description="the list of knots: one more than control points plus degree")
+    knots: list[Annotated[float, Field(ge=-1e9, le=1e9)]] = Field(
+        min_length=4, description="the list of knots: one more than control points plus degree"
+    )
     control_points_mm: list[tuple[Coordinate, Coordinate]] = Field(min_length=2, description="the list of control points [x, y]")
     weights: list[Annotated[float, Field(ge=1e-6, le=1e6)]] | None = None
     closed: bool | None = None

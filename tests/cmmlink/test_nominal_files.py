@@ -341,21 +341,29 @@ def test_hostile_dat_and_points_are_read_or_refused(tmp_path: Path, content: byt
     read_or_refused(written(tmp_path, content, "a" + suffix), closed=closed)
 
 
-@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(
-    degree=st.integers(-1, 6),
-    knots=st.lists(st.one_of(st.integers(0, 3), st.floats(allow_nan=True)), max_size=12),
-    points=st.lists(st.lists(st.one_of(st.integers(-2, 2), st.floats()), min_size=2, max_size=2), max_size=8),
-    weights=st.one_of(st.none(), st.lists(st.floats(), max_size=8)),
-    closed=st.sampled_from(["true", "false", "null"]),
-)
-@example(degree=1, knots=[0, 0, 1, 1], points=[[0, 0], [0, 1]], weights=[1.0, 1e-300], closed="null")
-@example(degree=1, knots=[0, 0, 1e-308, 1e-308], points=[[0, 0], [0, 1]], weights=None, closed="null")
-def test_hostile_nurbs_is_read_or_refused(
-    tmp_path: Path, degree: int, knots: list[float], points: list[list[float]], weights: list[float] | None, closed: str
-) -> None:
-    weights_text = "null" if weights is None else str(weights)
-    text = f"degree: {degree}\nknots: {knots}\ncontrol_points_mm: {points}\nclosed: {closed}\nweights: {weights_text}\n"
+NUMBER = st.one_of(st.integers(-2, 2), st.sampled_from([1e-12, 1e-7, 0.5, 1e5, 1e6]), st.floats())
+
+
+@st.composite
+def nurbs_texts(draw: st.DrawFn) -> str:
+    """Curves that are nearly right: counts that mostly fit, knots that mostly rise, numbers of every size."""
+    degree, count = draw(st.integers(0, 5)), draw(st.integers(0, 9))
+    size = max(0, count + degree + 1 + draw(st.sampled_from([0, 0, 0, 0, 1, -1])))
+    knots = draw(st.lists(st.one_of(st.integers(0, 3), st.floats(0, 3), NUMBER), min_size=size, max_size=size))
+    knots = sorted(knots) if draw(st.booleans()) else knots
+    points = draw(st.lists(st.lists(NUMBER, min_size=2, max_size=2), min_size=count, max_size=count))
+    weights = draw(st.one_of(st.just("null"), st.lists(NUMBER, min_size=count, max_size=count)))
+    closed = draw(st.sampled_from(["true", "false", "null"]))
+    return f"degree: {degree}\nknots: {knots}\ncontrol_points_mm: {points}\nclosed: {closed}\nweights: {weights}\n"
+
+
+@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(text=nurbs_texts())
+@example(text="degree: 1\nknots: [0, 0, 1, 1]\ncontrol_points_mm: [[0, 0], [0, 1]]\nweights: [1, 1e-300]\n")
+@example(text="degree: 1\nknots: [0, 0, 1e-308, 1e-308]\ncontrol_points_mm: [[0, 0], [0, 1]]\n")
+@example(text="degree: 1\nknots: []\ncontrol_points_mm: [[0, 0], [0, 1]]\n")
+@example(text="degree: 1\nknots: [0, 0, 1, 1]\ncontrol_points_mm: []\n")
+def test_hostile_nurbs_is_read_or_refused(tmp_path: Path, text: str) -> None:
     read_or_refused(written(tmp_path, text, "a.yaml"))
 
 
