@@ -30,6 +30,7 @@ _IN_OUR_WORDS = {
     "bool_type": "true or false",
     "string_too_short": "some text",
     "string_type": "text",
+    "too_short": "a longer list",
     "path_type": "a path",
     "tuple_type": "a list in brackets",
     "list_type": "a list in brackets",

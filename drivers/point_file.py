@@ -130,8 +130,6 @@ def read_points(path: Path, scale: float = 1.0) -> PointFile:
 def read_text(path: Path) -> str:
     """Text of a file in UTF-8, UTF-16 with a byte order mark, or Latin-1. Raises PointFileError, also when it is no text."""
     data = _read_bytes(path)
-    if not data.strip():
-        raise PointFileError(f"{path}: the file is empty")
     try:
         text = data.decode("utf-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
     except UnicodeDecodeError:
@@ -141,6 +139,8 @@ def read_text(path: Path) -> str:
     if strange:
         line = text.count("\n", 0, strange.start()) + 1
         raise PointFileError(f"{path}: line {line}: not a text file (byte {ord(strange[0]):#04x}); expected plain text")
+    if not text.strip():
+        raise PointFileError(f"{path}: the file is empty")
     return text
 
 

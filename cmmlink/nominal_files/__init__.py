@@ -64,9 +64,12 @@ def load_nominal(path: Path, scale: float = 1.0, closed: bool | None = None) -> 
     except PointFileError as error:
         raise NominalError(str(error)) from None
     try:
-        return reader.read(text, scale, closed)
+        with np.errstate(over="raise", divide="raise", invalid="raise"):
+            return reader.read(text, scale, closed)
     except (PointFileError, YamlError, NominalError) as error:
         raise NominalError(f"{path}: {error}") from None
+    except FloatingPointError:
+        raise NominalError(f"{path}: the numbers leave the range a curve can be computed in; expected a profile in mm") from None
 
 
 def known_suffixes() -> list[str]:

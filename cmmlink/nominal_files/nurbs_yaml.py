@@ -21,6 +21,7 @@ SUFFIXES = (".yaml", ".yml")
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]  # mm: beyond a kilometre the unit or the scale is wrong
 
 _SAME_END = 1e-9  # of the size: the gap up to which a curve ends where it begins
+_SHORTEST_SPAN = 1e-12
 _RESOLVED = 1e-6  # of the distance from the origin: a smaller curve drowns in round-off
 
 
@@ -28,7 +29,9 @@ class _Curve(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     degree: int = Field(ge=1, le=15, description="the degree, a whole number like 3")
-    knots: list[Annotated[float, Field(ge=-1e9, le=1e9)]] = Field(description="the list of knots: one more than control points plus degree")
+    knots: list[Annotated[float, Field(ge=-1e9, le=1e9)]] = Field(
+        min_length=4, description="the list of knots: one more than control points plus degree"
+    )
     control_points_mm: list[tuple[Coordinate, Coordinate]] = Field(min_length=2, description="the list of control points [x, y]")
     weights: list[Annotated[float, Field(ge=1e-6, le=1e6)]] | None = None
     closed: bool | None = None
@@ -41,6 +44,7 @@ def read(text: str, scale: float, closed: bool | None) -> NominalFile:
     _require_size(points)
     weights = None if given.weights is None else np.array(given.weights)
     knots = np.array(given.knots)
+    _require_spans(knots)
     said = given.closed if closed is None else closed
     curve = NurbsCurve(given.degree, points, knots, weights, closed=bool(said))
     if said is None and _ends_where_it_begins(curve):
@@ -69,6 +73,15 @@ def _require_size(points: NDArray[np.float64]) -> None:
     if not (size > 0 and size >= _RESOLVED * farthest and 1e-6 <= farthest <= 1e6):
         found = f"the control points lie within {size:g} mm, up to {farthest:g} mm from the origin"
         raise NominalError(f"{found}; expected a profile in mm: give the scale")
+
+
+def _require_spans(knots: NDArray[np.float64]) -> None:
+    """Refuse knots that differ by round-off only: meant as one, they would be spans of no length."""
+    spans = np.diff(knots)
+    short = (spans > 0) & (spans < _SHORTEST_SPAN * max(1.0, float(np.ptp(knots))))
+    if short.any():
+        i = int(np.argmax(short))
+        raise NominalError(f"knots[{i}] and knots[{i + 1}] differ by {spans[i]:g} only; expected equal knots or a longer span")
 
 
 def _ends_where_it_begins(curve: NurbsCurve) -> bool:
