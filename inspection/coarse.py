@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from inspection.errors import RegistrationError
 from inspection.frame import Frame, arc_length_weights, dominant_points, principal_frame
+from inspection.kernels import project, strides
 from inspection.nominal import NominalProfile
 from inspection.profile_error import checked_points
 from inspection.registration import Registration
@@ -28,16 +29,23 @@ _SCORED_POINTS = 500
 
 
 def register_coarse(points_mm: ArrayLike, nominal: NominalProfile) -> Registration:
-    """The best of all coarse poses of points (m, 2), by the trimmed mean square distance to the nearest samples.
+    """The best of all coarse poses of points (m, 2), by the trimmed mean square distance to the nominal.
 
     Raises RegistrationError for fewer than 8 points or points all in one place.
     """
     points = registrable(points_mm)
     poses = coarse_poses(points, nominal)
     scores = [trimmed_mean_square(points, pose, nominal) for pose in poses]
-    best = int(np.argmin(scores))
+    pose = poses[int(np.argmin(scores))]
     return Registration(
-        poses[best], float(np.sqrt(scores[best])), 0, False, np.zeros((3, 3)), np.zeros(2), (), np.zeros(len(points), dtype=bool)
+        pose,
+        float(np.sqrt(mean_square(points, pose, nominal))),
+        0,
+        False,
+        np.zeros((3, 3)),
+        np.zeros(2),
+        (),
+        np.zeros(len(points), dtype=bool),
     )
 
 
@@ -97,14 +105,14 @@ def tuned_on_dominant_points(points_mm: Array, pose: RigidTransform, nominal: No
 
 
 def mean_square(points_mm: Array, pose: RigidTransform, nominal: NominalProfile) -> float:
-    """Mean square distance to the nearest samples, mm^2 (the paper's MSD)."""
-    return float(np.mean(np.square(nominal.tree.query(pose.apply(points_mm))[0])))
+    """Mean square distance to the nominal, mm^2 (the paper's MSD)."""
+    return float(np.mean(np.square(project(pose.apply(points_mm), nominal.grid).distance_mm)))
 
 
 def trimmed_mean_square(points_mm: Array, pose: RigidTransform, nominal: NominalProfile) -> float:
     """Mean square distance of the nearer 80 % of at most 500 points, so that outliers do not choose the pose."""
     few = points_mm[:: max(1, len(points_mm) // _SCORED_POINTS)]
-    distance = np.sort(np.atleast_1d(nominal.tree.query(pose.apply(few))[0]))
+    distance = np.sort(np.abs(project(pose.apply(few), nominal.grid).distance_mm))
     return float((distance[: max(1, int(0.8 * len(distance)))] ** 2).mean())
 
 
@@ -166,12 +174,7 @@ def _without_spikes(points_mm: Array) -> Array:
 
 def _even_walk(points_mm: Array, step: float) -> Array:
     """Points (k, 2) about one `step` apart along the scan; noise between them does not lengthen the walk."""
-    picked = [0]
-    for index in range(1, len(points_mm)):
-        dx, dy = points_mm[index] - points_mm[picked[-1]]
-        if dx * dx + dy * dy >= step * step:
-            picked.append(index)
-    corners = points_mm[picked]
+    corners = points_mm[strides(points_mm, step)]
     travelled = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
     even = np.arange(0.0, travelled[-1], step)
     return np.column_stack([np.interp(even, travelled, corners[:, axis]) for axis in (0, 1)])

@@ -5,6 +5,7 @@ second derivative (METHOD: tangent distance plus curvature; Pottmann et al. 2006
 `icp` is the published scheme: feet by the method of choice, best motion onto the feet, until the mean square settles.
 """
 
+import math
 from dataclasses import replace
 from typing import Literal
 
@@ -12,9 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inspection.coarse import coarse_poses, registrable, trimmed_mean_square
-from inspection.deviations import Deviations, Method
+from inspection.deviations import Method
+from inspection.kernels import NormalEquations, normal_equations
 from inspection.nominal import NominalProfile
-from inspection.profile_error import deviations
+from inspection.profile_error import feet_on
+from inspection.projection import OPEN_END
 from inspection.registration import Registration
 from inspection.rigid import RigidTransform, about, best_motion
 
@@ -30,6 +33,9 @@ _FREE = 1e-9  # a motion whose eigenvalue is below this share of the largest cha
 _OUTLIER_MADS = 6.0  # median absolute deviations beyond which Tukey's weight is zero and a point an outlier
 _ROBUST_STEPS = 40
 _SETTLED_WEIGHTS_MM = 1e-6
+_TRUSTED = 1e-6  # least eigenvalue of the full second derivative, as a share of the largest, for it to be used
+_LEAST_REACH_MM = 1e-9
+_NO_WEIGHTS = np.empty(0)
 _SCOUTS = 400  # points that rank coarse poses
 _EQUAL_RMS = 1.1  # rivals whose rms is within this factor of the best fit as well
 _SAME_POSE = 0.01  # of the part's size: poses closer than this are one
@@ -81,8 +87,7 @@ def _promising(few: Array, points: Array, nominal: NominalProfile) -> list[Rigid
 
 def _scout(few: Array, nominal: NominalProfile, pose: RigidTransform, tip_radius_mm: float) -> tuple[float, RigidTransform]:
     refined = register_fine(few, nominal, pose, tip_radius_mm=tip_radius_mm).nominal_from_section
-    d = deviations(refined.apply(few), nominal, tip_radius_mm=tip_radius_mm)
-    off = np.sort(np.abs(d.deviation_mm))
+    off = np.sort(np.abs(_Placed(few, refined, nominal, "exact", tip_radius_mm).deviation_mm))
     return float(np.sqrt((off[: max(1, int(0.8 * len(off)))] ** 2).mean())), refined
 
 
@@ -117,128 +122,104 @@ def register_fine(
 def _outliers(points: Array, nominal: NominalProfile, pose: RigidTransform, method: Method, tip_radius_mm: float) -> NDArray[np.bool_]:
     """Points (m,) whose Tukey weight is zero once the weighted fit has settled."""
     for _ in range(_ROBUST_STEPS):
-        moved = pose.apply(points)
-        d = deviations(moved, nominal, method, tip_radius_mm)
-        off = np.abs(d.deviation_mm)
-        limit = _OUTLIER_MADS * float(np.median(off[~d.beyond_end])) if not d.beyond_end.all() else np.inf
+        here = _Placed(points, pose, nominal, method, tip_radius_mm)
+        off, used = np.abs(here.deviation_mm), here.feet.vertex != OPEN_END
+        limit = _OUTLIER_MADS * float(np.median(off[used])) if used.any() else np.inf
         weights = np.where(off < limit, (1 - (off / max(limit, STANDSTILL_MM)) ** 2) ** 2, 0.0)
-        centre, step = newton_step(moved, d, nominal, tip_radius_mm, weights)
+        centre, step, moves_mm = here.newton_step(weights)
         pose = about(centre, step[2], step[:2]).after(pose)
-        if np.hypot(step[0], step[1]) + abs(step[2]) * _reach(moved - centre) <= _SETTLED_WEIGHTS_MM:
+        if moves_mm <= _SETTLED_WEIGHTS_MM:
             break
-    return (off >= limit) & ~d.beyond_end
+    return np.asarray((off >= limit) & used)
+
+
+class _Placed:
+    """Points at a trial pose: their feet, and the normal equations there."""
+
+    def __init__(self, points: Array, pose: RigidTransform, nominal: NominalProfile, method: Method, tip_radius_mm: float) -> None:
+        self.moved = pose.apply(points)
+        self.feet = feet_on(self.moved, nominal, method)
+        self._outward, self._tip = nominal.outward, tip_radius_mm
+        self._centre = self.moved.mean(axis=0)
+        self.sums = self._summed(_NO_WEIGHTS)
+
+    @property
+    def deviation_mm(self) -> Array:
+        return self._outward * self.feet.distance_mm - self._tip
+
+    @property
+    def mean_square(self) -> float:
+        return self.sums.sum_square / self.sums.count if self.sums.count else np.inf
+
+    def _summed(self, weights: Array) -> NormalEquations:
+        return normal_equations(self.moved, self.feet, self._outward, self._tip, self._centre, weights)
+
+    def newton_step(self, weights: Array | None = None) -> tuple[Array, Array, float]:
+        """Centre (2,), step (3,) (shift in mm, rotation in rad about it), and how far that moves the farthest point.
+
+        The step leads to the least (weighted) mean square of the second-order model.
+        Full second derivative where it is positive definite, its Gauss-Newton part otherwise; motions that the points do not
+        determine (a circle's rotation) are left alone.
+        """
+        sums = self.sums if weights is None else self._summed(weights)
+        reach = max(sums.reach_mm, _LEAST_REACH_MM)
+        scale = np.array([1.0, 1.0, reach])
+        values, vectors = _motions(sums.tangential + sums.bending, scale)
+        if values[0] <= _TRUSTED * values[-1]:
+            values, vectors = _motions(sums.tangential, scale)
+        known = values > _FREE * values[-1]
+        share = np.where(known, vectors.T @ (sums.slope / scale) / np.where(known, values, 1.0), 0.0)
+        step = -(vectors @ share) / scale
+        return self._centre, step, math.hypot(step[0], step[1]) + abs(step[2]) * reach
+
+    def registration(self, pose: RigidTransform, iterations: int, converged: bool) -> Registration:
+        sums = self.sums
+        scale = np.array([1.0, 1.0, max(sums.reach_mm, _LEAST_REACH_MM)])
+        values, vectors = _motions(sums.tangential, scale)
+        known = values > _FREE * values[-1]
+        scatter = sums.sum_square / max(sums.count - 3, 1)
+        variances = np.where(known, scatter / np.where(known, values, 1.0), scale[2] ** 2)
+        spread = vectors / scale[:, None]
+        nothing = np.zeros(len(self.moved), dtype=bool)
+        covariance = (spread * variances) @ spread.T
+        return Registration(pose, math.sqrt(self.mean_square), iterations, converged, covariance, self._centre, (), nothing)
 
 
 def _gauss_newton(points: Array, nominal: NominalProfile, pose: RigidTransform, method: Method, tip_radius_mm: float) -> Registration:
-    moved = pose.apply(points)
-    d = deviations(moved, nominal, method, tip_radius_mm)
+    here = _Placed(points, pose, nominal, method, tip_radius_mm)
     converged = False
     for iteration in range(1, _MOST_STEPS + 1):  # noqa: B007 - the count is part of the result
-        centre, step = newton_step(moved, d, nominal, tip_radius_mm)
-        reach = _reach(moved - centre)
-        best = _mean_square(d)
+        centre, step, moves_mm = here.newton_step()
+        now = here.mean_square
         for _ in range(_HALVINGS):
-            motion = about(centre, step[2], step[:2])
-            trial = motion.after(pose)
-            trial_moved = trial.apply(points)
-            trial_d = deviations(trial_moved, nominal, method, tip_radius_mm)
-            if _mean_square(trial_d) <= best * (1 + 1e-12):
+            trial_pose = about(centre, step[2], step[:2]).after(pose)
+            trial = _Placed(points, trial_pose, nominal, method, tip_radius_mm)
+            if trial.mean_square <= now * (1 + 1e-12) or moves_mm <= STANDSTILL_MM:
                 break
-            step = step / 2
-        pose, moved, d = trial, trial_moved, trial_d
-        if np.hypot(step[0], step[1]) + abs(step[2]) * reach <= STANDSTILL_MM:
+            step, moves_mm = step / 2, moves_mm / 2
+        pose, here = trial_pose, trial
+        if moves_mm <= STANDSTILL_MM:
             converged = True
             break
-    return _registration(pose, moved, d, iteration, converged)
-
-
-def newton_step(
-    points: Array, d: Deviations, nominal: NominalProfile, tip_radius_mm: float, weights: Array | None = None
-) -> tuple[Array, Array]:
-    """Centre (2,) and step (3,) (shift in mm, rotation in rad about the centre) towards the least (weighted) mean square.
-
-    Full second derivative where it is positive definite, its Gauss-Newton part otherwise; motions that the points do not
-    determine (a circle's rotation) are left alone.
-    """
-    used = ~d.beyond_end
-    x, e, g = points[used], d.deviation_mm[used], d.normal[used]
-    centre = x.mean(axis=0) if len(x) else np.zeros(2)
-    arm = x - centre
-    rows = np.column_stack([g, arm[:, 0] * g[:, 1] - arm[:, 1] * g[:, 0]])  # (m, 3) gradient of each deviation
-    w = np.ones(len(e)) if weights is None else weights[used]
-    weighted = rows * w[:, None]
-    slope = weighted.T @ e
-    tangential = weighted.T @ rows
-    full = tangential + _second_derivative(arm, w * e, g, _level_curvature(d, nominal, tip_radius_mm)[used])
-    positive = np.linalg.eigvalsh(full)[0] > 0.1 * np.linalg.eigvalsh(tangential)[0]
-    reach = _reach(arm)
-    values, vectors = _motions(full if positive else tangential, reach)
-    known = values > _FREE * values[-1]
-    share = np.where(known, vectors.T @ (slope / [1, 1, reach]) / np.where(known, values, 1.0), 0.0)
-    return centre, -(vectors @ share) / [1, 1, reach]
-
-
-def _second_derivative(arm: Array, e: Array, g: Array, bend: Array) -> Array:
-    """Sum of e times the second derivative of e by the pose: curvature of the distance field, and of the rotation."""
-    t = np.column_stack([-g[:, 1], g[:, 0]])
-    along = np.column_stack([t, arm[:, 0] * t[:, 1] - arm[:, 1] * t[:, 0]])
-    result = (along * (e * bend)[:, None]).T @ along
-    result[2, 2] -= (e * (arm * g).sum(axis=1)).sum()
-    return np.asarray(result)
-
-
-def _level_curvature(d: Deviations, nominal: NominalProfile, tip_radius_mm: float) -> Array:
-    """Second derivative of the deviation across its gradient (m,): that of the distance field, 1 / distance at a vertex."""
-    distance = d.deviation_mm + tip_radius_mm  # signed, outward
-    outward = nominal.outward
-    across = -outward * d.curvature / np.maximum(1 - outward * d.curvature * distance, 1e-3)
-    return np.where(d.at_vertex, 1.0 / np.where(np.abs(distance) > 1e-9, distance, np.inf), across)
-
-
-def _motions(matrix: Array, reach: float) -> tuple[Array, Array]:
-    """Rising eigenvalues and eigenvectors of a normal matrix, its rotation counted in mm at the farthest point."""
-    scale = np.array([1.0, 1.0, reach])
-    values, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
-    return values, vectors
-
-
-def _reach(arm: Array) -> float:
-    return max(float(np.hypot(arm[:, 0], arm[:, 1]).max(initial=0.0)), 1e-9)
+    return here.registration(pose, iteration, converged)
 
 
 def _icp(points: Array, nominal: NominalProfile, pose: RigidTransform, method: Method, tip_radius_mm: float) -> Registration:
     previous, converged = np.inf, False
     for iteration in range(1, _ICP_MOST_STEPS + 1):  # noqa: B007 - the count is part of the result
-        moved = pose.apply(points)
-        d = deviations(moved, nominal, method, tip_radius_mm)
-        now = _mean_square(d)
+        here = _Placed(points, pose, nominal, method, tip_radius_mm)
+        now = here.mean_square
         if abs(previous - now) <= _ICP_TOLERANCE * now:
             converged = True
             break
         previous = now
-        used = ~d.beyond_end
-        feet = moved[used] - (d.deviation_mm[:, None] * d.normal)[used]
-        pose = best_motion(moved[used], feet).after(pose)
-    return _registration(pose, moved, d, iteration, converged)
+        used = here.feet.vertex != OPEN_END
+        feet = here.moved - (nominal.outward * here.deviation_mm)[:, None] * here.feet.gradient
+        pose = best_motion(here.moved[used], feet[used]).after(pose)
+    return here.registration(pose, iteration, converged)
 
 
-def _mean_square(d: Deviations) -> float:
-    used = d.deviation_mm[~d.beyond_end]
-    return float((used**2).mean()) if used.size else np.inf
-
-
-def _registration(pose: RigidTransform, moved: Array, d: Deviations, iterations: int, converged: bool) -> Registration:
-    used = ~d.beyond_end
-    mean_square = _mean_square(d)
-    x, g = moved[used], d.normal[used]
-    centre = x.mean(axis=0) if len(x) else np.zeros(2)
-    arm = x - centre
-    rows = np.column_stack([g, arm[:, 0] * g[:, 1] - arm[:, 1] * g[:, 0]])
-    reach = _reach(arm)
-    values, vectors = _motions(rows.T @ rows, reach)
-    known = values > _FREE * values[-1]
-    scatter = mean_square * len(x) / max(len(x) - 3, 1)
-    variances = np.where(known, scatter / np.where(known, values, 1.0), reach**2)
-    spread = vectors / np.array([1, 1, reach])[:, None]
-    covariance = (spread * variances) @ spread.T
-    return Registration(pose, float(np.sqrt(mean_square)), iterations, converged, covariance, centre, (), np.zeros(len(moved), dtype=bool))
+def _motions(matrix: Array, scale: Array) -> tuple[Array, Array]:
+    """Rising eigenvalues and eigenvectors of a normal matrix, its rotation counted in mm at the farthest point."""
+    values, vectors = np.linalg.eigh(matrix / (scale[:, None] * scale))
+    return values, vectors

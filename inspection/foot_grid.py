@@ -20,15 +20,17 @@ FAR, LISTED = -1, -2  # what a cell holds instead of a piece: nothing, or LISTED
 MOST_BRANCHES = 4  # cells with more stretches than this are left to the search over the whole curve
 LIST_WIDTH = 1 + MOST_BRANCHES
 HEADER = 16  # numbers before the packed tables, in both arrays
-PIECE_WIDTH = 16  # 6 + 6 coefficients, parameter at the middle, parameter per unit of t, valid t from, to
-VERTEX_WIDTH = 8  # x, y, pseudo-normal x, y, parameter, kind, 0, 0
+PIECE_WIDTH = (
+    24  # 6 + 6 coefficients of x and y, parameter at the middle and per unit of t, valid t from and to, 8 coefficients of the arc length
+)
+VERTEX_WIDTH = 8  # x, y, pseudo-normal x, y, parameter, kind, arc length, 0
 
 BLOCK_LEVEL = 6  # the quadtree's root is cut into 64 x 64 blocks, found by one division
 _DEEPEST = 11  # smallest cells: half a thousandth of the size of the curve
 _NEAR = 0.015  # band in which cells may become that small, as a fraction of the size
 _BAND = 0.08  # band of the whole grid: beyond it every point is searched for along the whole curve
 _PIECE_LENGTH = 1 / 200  # longest piece, as a fraction of the size
-_PIECE_TURN = 1 / 6  # rad; a piece never turns by more, so that one third-order step from its middle comes close
+_PIECE_TURN = 1 / 8  # rad; a piece never turns by more, so that one third-order step from its middle comes close
 _OVERLAP = 0.3  # a piece stays valid for this part of its length beyond its borders, within its knot span
 _VERTEX_GRAIN = 2e-13  # part of a piece by which a foot may miss the end of the curve through round-off
 _STEEPEST = 0.9  # a cell is certified where curvature x distance stays below this on the near side of the evolute
@@ -124,6 +126,7 @@ def _pieces(curve: NurbsCurve) -> _Pieces:
     grain = np.where(is_end, _VERTEX_GRAIN, -_VERTEX_GRAIN)
     slack_before, slack_after = (np.where(link < 0, grain[np.where(link < 0, -1 - link, -1)], 1e-9) for link in (before, after))
     rows = np.column_stack([coefficients.reshape(-1, 12), middle, width, first - slack_before, last + slack_after])
+    rows = np.column_stack([rows, _arc_length(rows, curve.station_mm(low))])
     return _with_geometry(rows, before, after, vertices, cones)
 
 
@@ -143,7 +146,7 @@ def _cut(curve: NurbsCurve, size: float) -> tuple[Array, Array, Array, Array]:
         with np.errstate(divide="ignore", invalid="ignore"):
             turn = (cross / speed**2).max(axis=1) * (high - low)
             uneven = speed.max(axis=1) / speed.min(axis=1)
-        good = (length <= _PIECE_LENGTH * size) & (turn <= _PIECE_TURN) & (uneven <= 1.5)
+        good = (length <= _PIECE_LENGTH * size) & (turn <= _PIECE_TURN) & (uneven <= 1.25)
         good &= _is_quintic(curve, low, high, span_low, span_high, size)
         done.append((low[good], high[good], span_low[good], span_high[good]))
         middle = (low + high) / 2
@@ -195,6 +198,17 @@ def _coefficients(curve: NurbsCurve, middle: Array, width: Array) -> Array:
     return np.ascontiguousarray(c[:, :, :6])
 
 
+def _arc_length(rows: Array, start_mm: Array) -> Array:
+    """Coefficients (p, 8) of the arc length from the start of the curve: the speed, a sextic through seven of its values, integrated."""
+    c = rows[:, :12].reshape(-1, 2, 6)
+    first, last = rows[:, 14:15], rows[:, 15:16]
+    t = (first + last) / 2 + (last - first) / 2 * np.cos((2 * np.arange(7) + 1) * np.pi / 14)  # (p, 7)
+    velocity = np.einsum("pdk,ptk->ptd", c[:, :, 1:] * np.arange(1, 6), t[:, :, None] ** np.arange(5))
+    speed = np.hypot(velocity[..., 0], velocity[..., 1])
+    fitted = np.linalg.solve(t[:, :, None] ** np.arange(7), speed[:, :, None])[:, :, 0] / np.arange(1, 8)
+    return np.column_stack([start_mm - fitted @ (-0.5) ** np.arange(1, 8), fitted])
+
+
 def _links(curve: NurbsCurve, low: Array) -> tuple[Index, Index, Array, Array]:
     """The piece before and after each piece, or -1 - vertex; vertices (corners, then the ends of an open curve) and their cones."""
     count = len(low)
@@ -226,7 +240,8 @@ def _vertex(curve: NurbsCurve, u: float, kind: float) -> tuple[Array, Array]:
     earlier = tangent / np.hypot(*tangent)
     both = later + earlier
     both = both / np.hypot(*both) if np.hypot(*both) > 1e-9 else later
-    return np.array([point[0], point[1], -both[1], both[0], u, kind, 0.0, 0.0]), np.array([earlier, later])
+    station = float(curve.station_mm(here)[0])
+    return np.array([point[0], point[1], -both[1], both[0], u, kind, station, 0.0]), np.array([earlier, later])
 
 
 def _with_geometry(rows: Array, before: Index, after: Index, vertices: Array, cones: Array) -> _Pieces:

@@ -7,8 +7,9 @@ foot on the branch of that sample, which at thin edges need not be the closest o
 import numpy as np
 from numpy.typing import NDArray
 
+from inspection.kernels import Feet
 from inspection.nominal import NominalProfile
-from inspection.projection import Projection, dot, merged, nearest_sites, on_vertices
+from inspection.projection import INSIDE, dot, merged, nearest_sites, on_vertices
 
 Array = NDArray[np.float64]
 
@@ -16,7 +17,7 @@ _MOST_STEPS = 20
 _STANDSTILL_MM = 1e-13
 
 
-def inversion(points_mm: Array, nominal: NominalProfile) -> Projection:
+def inversion(points_mm: Array, nominal: NominalProfile) -> Feet:
     """Project by Newton steps in the parameter until none moves the foot by more than 1e-13 mm."""
     curve = nominal.curve
     start, end = curve.domain
@@ -41,14 +42,13 @@ def inversion(points_mm: Array, nominal: NominalProfile) -> Projection:
     speed = np.sqrt(dot(first, first))
     normal = np.column_stack([-first[:, 1], first[:, 0]]) / speed[:, None]
     reach = points_mm - point
-    near = Projection(
-        left_mm=np.copysign(np.hypot(reach[:, 0], reach[:, 1]), dot(reach, normal)),
-        foot_mm=point,
+    near = Feet(
         parameter=u,
-        station_mm=curve.station_mm(u),
+        foot_mm=point,
+        distance_mm=np.copysign(np.hypot(reach[:, 0], reach[:, 1]), dot(reach, normal)),
         gradient=normal,
         curvature=(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / speed**3,
-        at_vertex=np.zeros(len(u), dtype=bool),
-        open_end=np.zeros(len(u), dtype=bool),
+        station_mm=curve.station_mm(u),
+        vertex=np.full(len(u), INSIDE, dtype=np.uint8),
     )
     return merged(faces_none, on_vertices(points_mm, site, nominal), near)

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 _BLOCK = 128  # points worked on together: their intermediate values stay in the first-level cache
 _QUEUE = _BLOCK * (MOST_BRANCHES + 1)  # a block is taken while fewer than a block's items wait
-_REALS = 26 * _BLOCK + _QUEUE
+_REALS = 35 * _BLOCK + _QUEUE
 _INTEGERS = 6 * _BLOCK + 3 * _QUEUE
 _FINEST = 26  # halvings of a piece, after which an interval is a point
 _ACROSS = float(1 << BLOCK_LEVEL)
@@ -38,7 +38,7 @@ _inlined: Callable[..., Any] = njit(cache=True, nogil=True, error_model="numpy",
 
 @intrinsic  # type: ignore[untyped-decorator]
 def _fma(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
-    """a b + c with one rounding."""
+    """A b + c with one rounding."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.fma(*args)
@@ -116,6 +116,7 @@ class Feet:
     distance_mm : (m,) positive to the left of the direction of travel
     gradient    : (m, 2) unit direction in which `distance_mm` grows; on the curve its left normal
     curvature   : (m,) 1/mm at the foot, positive where the curve turns left; 0 at vertices
+    station_mm  : (m,) arc length from the start of the curve
     vertex      : (m,) 0 a foot inside, 1 a corner, 2 an open end
     """
 
@@ -124,6 +125,7 @@ class Feet:
     distance_mm: Array
     gradient: Array
     curvature: Array
+    station_mm: Array
     vertex: NDArray[np.uint8]
 
 
@@ -135,7 +137,7 @@ def project(points_mm: Array, grid: FootGrid, threads: int | None = None) -> Fee
     points = np.ascontiguousarray(points_mm, dtype=np.float64).reshape(-1).view()
     points.flags.writeable = False  # one type for the compiler, whatever the caller's flags
     m = len(points) // 2
-    numbers = np.empty(7 * m)
+    numbers = np.empty(8 * m)
     vertex = np.empty(m, dtype=np.uint8)
     if threads is None:
         threads = 1 if m < 4 * _CHUNK else os.cpu_count() or 1
@@ -153,20 +155,21 @@ def project(points_mm: Array, grid: FootGrid, threads: int | None = None) -> Fee
         numbers[m : 3 * m].reshape(m, 2),
         numbers[3 * m : 4 * m],
         numbers[4 * m : 6 * m].reshape(m, 2),
-        numbers[6 * m :],
+        numbers[6 * m : 7 * m],
+        numbers[7 * m :],
         vertex,
     )
 
 
-# Where the memory of a block keeps what, _BLOCK numbers each. Reals: the row of the piece (16 columns), then
-_X, _Y, _U, _FOOT_X, _FOOT_Y, _E, _NX, _NY, _CURVATURE, _T, _WAITING_T = (_BLOCK * i for i in range(16, 27))
+# Where the memory of a block keeps what, _BLOCK numbers each. Reals: the row of the piece (24 columns), then
+_X, _Y, _U, _FOOT_X, _FOOT_Y, _E, _NX, _NY, _CURVATURE, _T, _STATION, _WAITING_T = (_BLOCK * i for i in range(24, 36))
 # Integers: piece (or FAR, LISTED - place) of each lane, its row, whether solved, its point, its tries; unsolved lanes; the queue
 _CONTENT, _ROW, _SOLVED, _POINT, _TRY, _UNSOLVED, _WAITING = (_BLOCK * i for i in range(7))
 
 
 @_compiled
 def _project(points: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, start: int, stop: int) -> None:
-    """Closest points of points[start:stop] into numbers (7 m: parameter, foot, distance, gradient, curvature) and vertex (m,).
+    """Closest points of points[start:stop] into numbers (8 m: parameter, foot, distance, gradient, curvature, station) and vertex (m,).
 
     points (2 m,) is flat. All points of a block are solved on the piece that their cell holds; those whose foot is not on
     that piece, or whose cell holds several stretches, queue until they fill a block of their own.
@@ -174,7 +177,7 @@ def _project(points: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, 
     pieces, blocks, cells = reals[integers[3] :], integers[integers[9] :], integers[integers[10] :]
     w = carray(_stack_reals(), _REALS)
     q = carray(_stack_integers(), _INTEGERS)
-    best, stack = np.empty(8), np.empty(64, dtype=np.int64)
+    best, stack = np.empty(9), np.empty(64, dtype=np.int64)
     waiting = 0
     block = start
     while block < stop or waiting > 0:
@@ -193,12 +196,15 @@ def _project(points: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, 
         for j in range(0, lanes, 8):
             _rows_to_columns(pieces, q, _ROW + j, w, j)
             _rows_to_columns(pieces[8:], q, _ROW + j, w, 8 * _BLOCK + j)
+            _rows_to_columns(pieces[16:], q, _ROW + j, w, 16 * _BLOCK + j)
         for j in range(lanes):
             _start(w, j)
         if not fresh:
             _resume(w, lanes, waiting)
         for j in range(lanes):
             _solve(w, q, j)
+        for j in range(lanes):
+            w[_STATION + j] = _station(w, j, w[_T + j])
         if fresh:
             _store_block(w, numbers, vertex, block, lanes)
             waiting = _queue_unsolved(w, q, reals, integers, numbers, vertex, block, lanes, waiting, best, stack)
@@ -308,10 +314,23 @@ def _solve(w: Any, q: Any, j: int) -> None:
 
 
 @_inlined
+def _station(w: Any, j: int, t: float) -> float:
+    """Arc length from the start of the curve."""
+    s = _fma(w[23 * _BLOCK + j], t, w[22 * _BLOCK + j])
+    s = _fma(s, t, w[21 * _BLOCK + j])
+    s = _fma(s, t, w[20 * _BLOCK + j])
+    s = _fma(s, t, w[19 * _BLOCK + j])
+    s = _fma(s, t, w[18 * _BLOCK + j])
+    s = _fma(s, t, w[17 * _BLOCK + j])
+    return _fma(s, t, w[16 * _BLOCK + j])
+
+
+@_inlined
 def _store_block(w: Any, numbers: Any, vertex: Any, block: int, k: int) -> None:
     """Results of all points of a block, solved or not."""
     m, end = len(vertex), block + k
     u, e, curvature = numbers[block:end], numbers[3 * m + block : 3 * m + end], numbers[6 * m + block : 6 * m + end]
+    station = numbers[7 * m + block : 7 * m + end]
     foot, gradient = numbers[m + 2 * block : m + 2 * end], numbers[4 * m + 2 * block : 4 * m + 2 * end]
     kind = vertex[block:end]
     for j in range(k):
@@ -327,6 +346,8 @@ def _store_block(w: Any, numbers: Any, vertex: Any, block: int, k: int) -> None:
     for j in range(k):
         curvature[j] = w[_CURVATURE + j]
     for j in range(k):
+        station[j] = w[_STATION + j]
+    for j in range(k):
         kind[j] = 0
 
 
@@ -338,7 +359,7 @@ def _store(best: Any, numbers: Any, vertex: Any, i: int) -> None:
     numbers[m + 2 * i], numbers[m + 2 * i + 1] = best[1], best[2]
     numbers[3 * m + i] = best[3]
     numbers[4 * m + 2 * i], numbers[4 * m + 2 * i + 1] = best[4], best[5]
-    numbers[6 * m + i] = best[6]
+    numbers[6 * m + i], numbers[7 * m + i] = best[6], best[8]
     vertex[i] = np.uint8(best[7])
 
 
@@ -404,7 +425,7 @@ def _settle(w: Any, q: Any, reals: Any, integers: Any, numbers: Any, vertex: Any
     for j in range(lanes):
         if q[_SOLVED + j] == 1:
             best[0], best[1], best[2], best[3] = w[_U + j], w[_FOOT_X + j], w[_FOOT_Y + j], w[_E + j]
-            best[4], best[5], best[6], best[7] = w[_NX + j], w[_NY + j], w[_CURVATURE + j], 0.0
+            best[4], best[5], best[6], best[7], best[8] = w[_NX + j], w[_NY + j], w[_CURVATURE + j], 0.0, w[_STATION + j]
             _offer(best, numbers, vertex, q[_POINT + j])
         else:
             waiting = _advance(w, q, reals, integers, numbers, vertex, j, waiting, best, stack)
@@ -451,9 +472,9 @@ def _offer(best: Any, numbers: Any, vertex: Any, point: int) -> None:
 
 @_compiled
 def _search(x: float, y: float, reals: Any, integers: Any, best: Any, stack: Any) -> None:
-    """Closest point of the whole curve by branch and bound over its pieces, into best (8,)."""
+    """Closest point of the whole curve by branch and bound over its pieces, into best (9,)."""
     if not (np.isfinite(x) and np.isfinite(y)):
-        best[:7] = np.nan
+        best[:] = np.nan
         best[7] = 0.0
         return
     count = integers[2]
@@ -577,7 +598,7 @@ def _monotone_root(pieces: Any, row: int, x: float, y: float, low: float, high: 
 
 @_compiled
 def _finish(x: float, y: float, piece: int, t: float, reals: Any, integers: Any, best: Any) -> None:
-    """Results for the foot at t of a piece: best = parameter, foot, distance, gradient, curvature, kind of vertex."""
+    """Results for the foot at t of a piece: best = parameter, foot, distance, gradient, curvature, kind of vertex, station."""
     pieces, vertices, links = reals[integers[3] :], reals[integers[6] :], integers[integers[8] :]
     row = PIECE_WIDTH * piece
     link = 0
@@ -601,6 +622,10 @@ def _finish(x: float, y: float, piece: int, t: float, reals: Any, integers: Any,
     best[4], best[5] = nx, ny
     best[6] = (vx * hy - vy * hx) * slowness * slowness * slowness
     best[7] = 0.0
+    s = 0.0
+    for power in range(23, 15, -1):
+        s = _fma(s, t, pieces[row + power])
+    best[8] = s
 
 
 @_compiled
@@ -614,4 +639,93 @@ def _finish_vertex(x: float, y: float, vertices: Any, row: int, grain: float, be
     best[3] = sign * distance
     if distance > grain:
         nx, ny = sign * dx / distance, sign * dy / distance
-    best[4], best[5], best[6], best[7] = nx, ny, 0.0, vertices[row + 5]
+    best[4], best[5], best[6], best[7], best[8] = nx, ny, 0.0, vertices[row + 5], vertices[row + 6]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NormalEquations:
+    """Sums over points for one step of the pose p = (shift in mm, rotation in rad about the centre), e the deviations.
+
+    slope        : (3,) sum of J e;  tangential : (3, 3) sum of J J';  bending : (3, 3) sum of e times the second derivative of e
+    sum_square   : sum of e^2;  count : points that took part, open ends left out;  reach_mm : farthest from the centre
+    """
+
+    slope: Array
+    tangential: Array
+    bending: Array
+    sum_square: float
+    count: int
+    reach_mm: float
+
+
+def normal_equations(
+    points_mm: Array, feet: Feet, outward: float, tip_radius_mm: float, centre_mm: Array, weights: Array
+) -> NormalEquations:
+    """Normal equations of points (m, 2) projected on `feet`; `weights` (m,), or empty for all one."""
+    out = np.zeros(3 + 9 + 9 + 3)
+    _normal_equations(
+        points_mm, feet.distance_mm, feet.gradient, feet.curvature, feet.vertex, weights, outward, tip_radius_mm, centre_mm, out
+    )
+    return NormalEquations(
+        out[:3], out[3:12].reshape(3, 3), out[12:21].reshape(3, 3), float(out[21]), int(out[22]), float(np.sqrt(out[23]))
+    )
+
+
+@_compiled
+def _normal_equations(
+    points: Any, distance: Any, gradient: Any, curvature: Any, vertex: Any, weights: Any, outward: float, tip: float, centre: Any, out: Any
+) -> None:
+    """Tangent distance plus curvature: e(p) = e + J p + p' H p / 2, with the curvature of the distance field across its gradient."""
+    for i in range(len(points)):
+        if vertex[i] == 2:
+            continue
+        w = weights[i] if len(weights) > 0 else 1.0
+        e = outward * distance[i] - tip
+        gx, gy = outward * gradient[i, 0], outward * gradient[i, 1]
+        ax, ay = points[i, 0] - centre[0], points[i, 1] - centre[1]
+        turn = ax * gy - ay * gx
+        radial = ax * gx + ay * gy
+        if vertex[i] == 1:
+            bend = 1.0 / (e + tip) if abs(e + tip) > 1e-9 else 0.0
+        else:
+            bend = -outward * curvature[i] / max(1.0 - curvature[i] * distance[i], 1e-3)
+        we = w * e
+        out[0] += we * gx
+        out[1] += we * gy
+        out[2] += we * turn
+        out[3] += w * gx * gx
+        out[4] += w * gx * gy
+        out[5] += w * gx * turn
+        out[7] += w * gy * gy
+        out[8] += w * gy * turn
+        out[11] += w * turn * turn
+        across = we * bend
+        out[12] += across * gy * gy
+        out[13] -= across * gx * gy
+        out[14] -= across * gy * radial
+        out[16] += across * gx * gx
+        out[17] += across * gx * radial
+        out[20] += across * radial * radial - we * radial
+        out[21] += we * e
+        out[22] += 1.0
+        out[23] = max(out[23], ax * ax + ay * ay)
+    out[6], out[9], out[10] = out[4], out[5], out[8]
+    out[15], out[18], out[19] = out[13], out[14], out[17]
+
+
+def strides(points_mm: Array, step_mm: float) -> NDArray[np.int64]:
+    """Indices of points (m, 2) at which a walk along them has come at least one step from the point picked before."""
+    picked = np.empty(len(points_mm), dtype=np.int64)
+    return picked[: _strides(points_mm, step_mm * step_mm, picked)]
+
+
+@_compiled
+def _strides(points: Any, least: float, picked: Any) -> int:
+    count, last = 1, 0
+    picked[0] = 0
+    for i in range(1, len(points)):
+        dx, dy = points[i, 0] - points[last, 0], points[i, 1] - points[last, 1]
+        if dx * dx + dy * dy >= least:
+            picked[count] = last = i
+            count += 1
+    return count

@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 from inspection.curve import NurbsCurve, left_of
 from inspection.deviations import Method
 from inspection.errors import NominalError
+from inspection.foot_grid import FootGrid, build_foot_grid
 from inspection.spacing import LocalPoles, spaced_parameters
 from inspection.voronoi import SitePoles, site_poles
 
@@ -41,6 +42,7 @@ class NominalProfile:
     twin            : (n,) the sample of the adjoining piece at the same corner, -1 elsewhere
     is_open_end     : (n,) the two ends of an open curve
     poles           : left and right poles of every sample
+    tree, grid      : where the nearest sample and the closest point of the curve are looked up
     unmet           : samples, other than ends and corners, whose pole angle stays below the limit at the smallest step
     """
 
@@ -60,6 +62,7 @@ class NominalProfile:
     poles: SitePoles
     unmet: int
     tree: cKDTree
+    grid: FootGrid
 
     def __post_init__(self) -> None:
         for name in self.__slots__:
@@ -104,24 +107,26 @@ def discretize(
     material           : the side of the curve, seen along its direction, on which the material lies
     accuracy_mm        : choose the samples by curvature instead, as few as keep the error of `method` below this, for
                          points nearer than half the local pole radius: with spacing h, curvature k, its change k' and
-                         pole radius r the error is at most |k'| h^3 / 48 for circle, |k| h^2 / 8 for chord, (3/8) |1/r - k| h^2 + (1/2) |k'| h^3 for
-                         pcp and veaw (at corners and sharp edges r falls to zero: no spacing bounds those two there).
-                         `exact` and `inversion` are exact at any spacing. The paper's two limits are then
-                         not applied: they bound no error.
+                         pole radius r the error is at most |k'| h^3 / 48 for circle, |k| h^2 / 8 for chord,
+                         (3/8) |1/r - k| h^2 + (1/2) |k'| h^3 for pcp and veaw (at corners and sharp edges r falls to
+                         zero: no spacing bounds those two there). `exact` and `inversion` are exact at any spacing.
+                         The paper's two limits are then not applied: they bound no error.
 
     The pole angle alone bounds no error; with the defaults it is the even starting step that does. Raises NominalError.
     """
     if accuracy_mm is not None:
-        return _accurate(curve, material, accuracy_mm, method)
+        grid = build_foot_grid(curve)
+        return _profile(curve, material, _accurate(curve, grid, accuracy_mm, method), grid)
     if samples < 8 or not 0 < pole_angle_min_deg < 180 or not 0 < step_min < 1 or material not in ("left", "right"):
         raise NominalError(
             f"need samples >= 8, 0 < pole_angle_min_deg < 180, 0 < step_min < 1, material left or right; "
             f"got {samples}, {pole_angle_min_deg}, {step_min}, {material}"
         )
+    grid = build_foot_grid(curve)
     pieces = _even_parameters(curve, samples)
     smallest = step_min * (curve.domain[1] - curve.domain[0])
     while True:
-        profile = _profile(curve, material, pieces)
+        profile = _profile(curve, material, pieces, grid)
         below = (profile.poles.angle_deg < pole_angle_min_deg) & (profile.next_site >= 0) & (profile.previous_site >= 0)
         refined = _refine(pieces, below, smallest)
         if sum(map(len, refined)) == sum(map(len, pieces)):
@@ -131,25 +136,26 @@ def discretize(
         pieces = refined
 
 
-def _accurate(curve: NurbsCurve, material: Material, accuracy_mm: float, method: Method) -> NominalProfile:
-    """The fewest samples that meet the accuracy; poles are read off a first, even discretisation."""
+def _accurate(curve: NurbsCurve, grid: FootGrid, accuracy_mm: float, method: Method) -> list[Array]:
+    """Parameters of the fewest samples that meet the accuracy; poles are read off a first, even discretisation."""
     if not accuracy_mm > 0:
         raise NominalError(f"the accuracy must be above zero, not {accuracy_mm:g} mm")
-    scout = discretize(curve, _SCOUT_SAMPLES, material=material, step_min=0.5)
-    order = np.argsort(scout.parameter, kind="stable")
-    excess = np.maximum(np.abs(scout.poles.left_curvature - scout.curvature), np.abs(scout.poles.right_curvature + scout.curvature))
-    radius = 1 / np.maximum(scout.poles.left_curvature, scout.poles.right_curvature)
+    even = _even_parameters(curve, _SCOUT_SAMPLES)
+    scout = _profile(curve, "left", even, grid)
+    u, curvature, poles_there = scout.parameter, scout.curvature, scout.poles
+    excess = np.maximum(np.abs(poles_there.left_curvature - curvature), np.abs(poles_there.right_curvature + curvature))
+    radius = 1 / np.maximum(poles_there.left_curvature, poles_there.right_curvature)
+    order = np.argsort(u, kind="stable")
     start, end = curve.domain
 
-    def poles(u: Array) -> LocalPoles:
-        wrapped = np.where(u > end, u - (end - start), u)
-        return LocalPoles(*(np.interp(wrapped, scout.parameter[order], values[order]) for values in (radius, _widest(excess))))
+    def poles(at: Array) -> LocalPoles:
+        wrapped = np.where(at > end, at - (end - start), at)
+        return LocalPoles(*(np.interp(wrapped, u[order], values[order]) for values in (radius, _widest(excess))))
 
-    ranges = _even_parameters(curve, _SCOUT_SAMPLES)
-    pieces = [spaced_parameters(curve, piece[0], piece[-1], accuracy_mm, method, poles) for piece in ranges]
+    pieces = [spaced_parameters(curve, piece[0], piece[-1], accuracy_mm, method, poles) for piece in even]
     if sum(map(len, pieces)) > _MOST_SAMPLES:
         raise NominalError(f"{method} needs more than {_MOST_SAMPLES} samples for {accuracy_mm:g} mm; choose circle or exact")
-    return _profile(curve, material, pieces)
+    return pieces
 
 
 def _widest(values: Array) -> Array:
@@ -178,7 +184,7 @@ def _refine(pieces: list[Array], below: NDArray[np.bool_], smallest: float) -> l
     return refined
 
 
-def _profile(curve: NurbsCurve, material: Material, pieces: list[Array]) -> NominalProfile:
+def _profile(curve: NurbsCurve, material: Material, pieces: list[Array], grid: FootGrid) -> NominalProfile:
     """Evaluate the curve at the parameters and take the poles from the Voronoi diagram of the samples."""
     smooth_loop = curve.closed and not curve.corners.size
     u = pieces[0][:-1] if smooth_loop else np.concatenate([np.append(piece[:-1], _last_of(piece, curve)) for piece in pieces])
@@ -209,6 +215,7 @@ def _profile(curve: NurbsCurve, material: Material, pieces: list[Array]) -> Nomi
         poles=site_poles(point, normal, following, at_end),
         unmet=0,
         tree=cKDTree(point),
+        grid=grid,
     )
 
 

@@ -14,11 +14,11 @@ from typing import get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inspection.closest_point import exact
 from inspection.deviations import Deviations, Method
 from inspection.inversion import inversion
+from inspection.kernels import Feet, project
 from inspection.nominal import NominalProfile
-from inspection.projection import Projection, dot, merged, nearest_sites, on_vertices, unit
+from inspection.projection import INSIDE, OPEN_END, dot, merged, nearest_sites, on_vertices, unit
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -34,17 +34,22 @@ def deviations(points_mm: ArrayLike, nominal: NominalProfile, method: Method = "
     check_tip_radius(tip_radius_mm, nominal)
     if method not in get_args(Method):
         raise ValueError(f"method must be one of {', '.join(get_args(Method))}, not {method!r}")
-    foot = _PROJECTIONS[method](points, nominal)
+    feet = feet_on(points, nominal, method)
     return Deviations(
-        deviation_mm=nominal.outward * foot.left_mm - tip_radius_mm,
-        foot_mm=foot.foot_mm,
-        parameter=foot.parameter,
-        station_mm=foot.station_mm,
-        normal=nominal.outward * foot.gradient,
-        curvature=foot.curvature,
-        beyond_end=foot.open_end,
-        at_vertex=foot.at_vertex,
+        deviation_mm=nominal.outward * feet.distance_mm - tip_radius_mm,
+        foot_mm=feet.foot_mm,
+        parameter=feet.parameter,
+        station_mm=feet.station_mm,
+        normal=nominal.outward * feet.gradient,
+        curvature=feet.curvature,
+        beyond_end=feet.vertex == OPEN_END,
+        at_vertex=feet.vertex != INSIDE,
     )
+
+
+def feet_on(points_mm: Array, nominal: NominalProfile, method: Method) -> Feet:
+    """Feet of points (m, 2) on the nominal by a method; points that are not finite give NaN."""
+    return _PROJECTIONS[method](points_mm, nominal)
 
 
 def checked_points(points_mm: ArrayLike) -> Array:
@@ -67,21 +72,26 @@ def check_tip_radius(tip_radius_mm: float, nominal: NominalProfile) -> None:
         )
 
 
-def circle(points_mm: Array, nominal: NominalProfile) -> Projection:
+def exact(points_mm: Array, nominal: NominalProfile) -> Feet:
+    """The globally closest point of the curve itself."""
+    return project(points_mm, nominal.grid)
+
+
+def circle(points_mm: Array, nominal: NominalProfile) -> Feet:
     """Projection on the osculating circle of the nearest sample: third order, |error| <= |curvature'| h^3 / 48."""
     site, faces_none = nearest_sites(points_mm, nominal)
     left, gradient = _on_circle(points_mm - nominal.points_mm[site], nominal.tangent[site], nominal.normal[site], nominal.curvature[site])
     return _from_sites(points_mm, nominal, site, faces_none, left, gradient)
 
 
-def pcp(points_mm: Array, nominal: NominalProfile) -> Projection:
+def pcp(points_mm: Array, nominal: NominalProfile) -> Feet:
     """Pole circle projection: second order, |error| <= (3/8) |1/r - curvature| h^2 + (1/2) |curvature'| h^3."""
     site, faces_none = nearest_sites(points_mm, nominal)
     left, gradient = _on_pole_circle(points_mm, nominal, site)
     return _from_sites(points_mm, nominal, site, faces_none, left, gradient)
 
 
-def veaw(points_mm: Array, nominal: NominalProfile) -> Projection:
+def veaw(points_mm: Array, nominal: NominalProfile) -> Feet:
     """Voronoi edge assisted weighting: pole circles of the nearest sample and its neighbour, blended by angles at their edge."""
     site, faces_none = nearest_sites(points_mm, nominal)
     reach = points_mm - nominal.points_mm[site]
@@ -102,7 +112,7 @@ def veaw(points_mm: Array, nominal: NominalProfile) -> Projection:
     return _from_sites(points_mm, nominal, site, faces_none, left, unit(gradient))
 
 
-def chord(points_mm: Array, nominal: NominalProfile) -> Projection:
+def chord(points_mm: Array, nominal: NominalProfile) -> Feet:
     """Projection on the polygon of the samples, on the nearer of the two chords that meet at the nearest sample."""
     site, faces_none = nearest_sites(points_mm, nominal)
     left, gradient = _on_chord(points_mm, nominal, site, nominal.next_site[site])
@@ -163,7 +173,7 @@ def _on_chord(points_mm: Array, nominal: NominalProfile, site: Index, neighbour:
 
 def _from_sites(
     points_mm: Array, nominal: NominalProfile, site: Index, faces_none: NDArray[np.bool_], left_mm: Array, gradient: Array
-) -> Projection:
+) -> Feet:
     """Complete a projection made at the nearest samples; where the point faces no piece the sample itself is its foot.
 
     The foot's arc length from the sample is that along the osculating circle.
@@ -175,15 +185,14 @@ def _from_sites(
     turn = np.arctan2(curvature * ahead, 1 - curvature * dot(reach, nominal.normal[site]))
     travel = np.where(bent, turn / np.where(bent, curvature, 1.0), ahead)
     start, end = nominal.curve.domain
-    near = Projection(
-        left_mm=left_mm,
-        foot_mm=foot,
+    near = Feet(
         parameter=_on_curve(nominal.parameter[site] + travel / nominal.speed[site], start, end, nominal.curve.closed),
-        station_mm=_on_curve(nominal.station_mm[site] + travel, 0.0, nominal.length_mm, nominal.curve.closed),
+        foot_mm=foot,
+        distance_mm=left_mm,
         gradient=gradient,
         curvature=curvature,
-        at_vertex=np.zeros(len(site), dtype=bool),
-        open_end=np.zeros(len(site), dtype=bool),
+        station_mm=_on_curve(nominal.station_mm[site] + travel, 0.0, nominal.length_mm, nominal.curve.closed),
+        vertex=np.full(len(site), INSIDE, dtype=np.uint8),
     )
     return merged(faces_none, on_vertices(points_mm, site, nominal), near) if faces_none.any() else near
 
@@ -192,7 +201,7 @@ def _on_curve(value: Array, start: float, end: float, closed: bool) -> Array:
     return start + np.mod(value - start, end - start) if closed else np.clip(value, start, end)
 
 
-_PROJECTIONS: dict[Method, Callable[[Array, NominalProfile], Projection]] = {
+_PROJECTIONS: dict[Method, Callable[[Array, NominalProfile], Feet]] = {
     "exact": exact,
     "circle": circle,
     "chord": chord,

@@ -1,39 +1,16 @@
-"""Feet of points on the profile: the record that every method of projection fills, and the nearest sample they start from."""
-
-from dataclasses import dataclass
+"""The nearest sample, from which the published methods of projection start, and feet that are samples themselves."""
 
 import numpy as np
 from numpy.typing import NDArray
 
+from inspection.kernels import Feet
 from inspection.nominal import NominalProfile
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Projection:
-    """Feet of m points, signed by side and not yet by material.
-
-    left_mm    : (m,) distance to the profile, positive to the left of its direction of travel
-    foot_mm    : (m, 2)
-    parameter  : (m,) curve parameter of the foot
-    station_mm : (m,) arc length of the foot
-    gradient   : (m, 2) unit direction in which left_mm grows
-    curvature  : (m,) of the curve at the foot; 0 at a vertex
-    at_vertex  : (m,) the foot is a corner or an open end, the distance that to a point
-    open_end   : (m,) the foot is an open end
-    """
-
-    left_mm: Array
-    foot_mm: Array
-    parameter: Array
-    station_mm: Array
-    gradient: Array
-    curvature: Array
-    at_vertex: Mask
-    open_end: Mask
+INSIDE, CORNER, OPEN_END = 0, 1, 2  # kinds of feet, as `Feet.vertex` holds them
 
 
 def nearest_sites(points_mm: Array, nominal: NominalProfile) -> tuple[Index, Mask]:
@@ -60,7 +37,7 @@ def _faced(points_mm: Array, site: Index, nominal: NominalProfile) -> tuple[Mask
     return faced, np.abs(dot(reach, nominal.normal[site]))
 
 
-def on_vertices(points_mm: Array, site: Index, nominal: NominalProfile) -> Projection:
+def on_vertices(points_mm: Array, site: Index, nominal: NominalProfile) -> Feet:
     """Projection onto the samples themselves (ends and corners), signed by the sum of the normals that meet there."""
     twin = np.where(nominal.twin[site] >= 0, nominal.twin[site], site)
     bisector = unit(nominal.normal[site] + nominal.normal[twin])
@@ -69,26 +46,25 @@ def on_vertices(points_mm: Array, site: Index, nominal: NominalProfile) -> Proje
     side = np.where(dot(reach, bisector) >= 0, 1.0, -1.0)
     apart = distance > 0
     gradient = np.where(apart[:, None], reach * (side / np.where(apart, distance, 1.0))[:, None], bisector)
-    return Projection(
-        left_mm=side * distance,
-        foot_mm=nominal.points_mm[site],
+    return Feet(
         parameter=nominal.parameter[site],
-        station_mm=nominal.station_mm[site],
+        foot_mm=nominal.points_mm[site],
+        distance_mm=side * distance,
         gradient=gradient,
         curvature=np.zeros(len(site)),
-        at_vertex=np.ones(len(site), dtype=bool),
-        open_end=nominal.is_open_end[site],
+        station_mm=nominal.station_mm[site],
+        vertex=np.where(nominal.is_open_end[site], OPEN_END, CORNER).astype(np.uint8),
     )
 
 
-def merged(chosen: Mask, if_chosen: Projection, otherwise: Projection) -> Projection:
-    """Row by row from one projection or the other."""
+def merged(chosen: Mask, if_chosen: Feet, otherwise: Feet) -> Feet:
+    """Row by row from one set of feet or the other."""
 
     def pick(name: str) -> NDArray[np.generic]:
         a, b = getattr(if_chosen, name), getattr(otherwise, name)
         return np.asarray(np.where(chosen[:, None] if a.ndim == 2 else chosen, a, b))
 
-    return Projection(*(pick(name) for name in Projection.__slots__))  # type: ignore[arg-type]
+    return Feet(*(pick(name) for name in Feet.__slots__))  # type: ignore[arg-type]
 
 
 def dot(a: Array, b: Array) -> Array:

@@ -1,5 +1,6 @@
 """Rigid motions of the plane, and the best one between paired points."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,7 +37,8 @@ class RigidTransform:
         """Moved points (m, 2). Written out by element, so that a point's result does not depend on its batch."""
         points = np.asarray(points_mm, dtype=np.float64)
         turned = rotated(points, self.rotation_rad)
-        return np.asarray(turned + self.translation_mm)
+        turned += self.translation_mm
+        return turned
 
     def inverse(self) -> "RigidTransform":
         """The motion back."""
@@ -50,8 +52,12 @@ class RigidTransform:
 
 def rotated(vectors: Array, angle_rad: float) -> Array:
     """Vectors (m, 2) turned anticlockwise about the origin."""
-    c, s = np.cos(angle_rad), np.sin(angle_rad)
-    return np.column_stack([c * vectors[:, 0] - s * vectors[:, 1], s * vectors[:, 0] + c * vectors[:, 1]])
+    c, s = math.cos(angle_rad), math.sin(angle_rad)
+    turned = np.empty((len(vectors), 2))
+    x, y = vectors[:, 0], vectors[:, 1]
+    np.subtract(c * x, s * y, out=turned[:, 0])
+    np.add(s * x, c * y, out=turned[:, 1])
+    return turned
 
 
 def about(centre_mm: Array, angle_rad: float, shift_mm: Array) -> RigidTransform:

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from inspection.curve import NurbsCurve
 from inspection.nominal import NominalProfile
-from inspection.projection import Projection, dot, merged, on_vertices
+from inspection.kernels import Feet
+from inspection.projection import INSIDE, dot, merged, on_vertices
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -18,7 +19,7 @@ Index = NDArray[np.int64]
 _MOST_STEPS = 80
 
 
-def exact(points_mm: Array, nominal: NominalProfile) -> Projection:
+def exact(points_mm: Array, nominal: NominalProfile) -> Feet:
     """Project on the globally closest point of the curve; the error is that of rounding (about 1e-13 mm)."""
     row, site = _candidates(points_mm, nominal)
     parameter, at_end = _solve(points_mm[row], site, nominal)
@@ -98,19 +99,17 @@ def _in_normal_cone(points_mm: Array, site: Index, nominal: NominalProfile) -> N
     return beyond
 
 
-def _at_parameters(points_mm: Array, u: Array, curve: NurbsCurve) -> Projection:
+def _at_parameters(points_mm: Array, u: Array, curve: NurbsCurve) -> Feet:
     point, first, second = curve.derivatives(u, 2)
     speed = np.hypot(first[:, 0], first[:, 1])
     normal = np.column_stack([-first[:, 1], first[:, 0]]) / speed[:, None]
     reach = points_mm - point
-    nothing = np.zeros(len(u), dtype=bool)
-    return Projection(
-        left_mm=np.copysign(np.hypot(reach[:, 0], reach[:, 1]), dot(reach, normal)),
-        foot_mm=point,
+    return Feet(
         parameter=u,
-        station_mm=curve.station_mm(u),
+        foot_mm=point,
+        distance_mm=np.copysign(np.hypot(reach[:, 0], reach[:, 1]), dot(reach, normal)),
         gradient=normal,
         curvature=(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / speed**3,
-        at_vertex=nothing,
-        open_end=nothing,
+        station_mm=curve.station_mm(u),
+        vertex=np.full(len(u), INSIDE, dtype=np.uint8),
     )
