@@ -19,6 +19,7 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from inspection.foot_grid import BLOCK_LEVEL, FAR, LISTED, MOST_BRANCHES, PIECE_WIDTH, VERTEX_WIDTH, FootGrid
+from inspection.sample_table import LEAF, LINK_WIDTH, SAMPLE_WIDTH, SampleTable
 
 Array = NDArray[np.float64]
 
@@ -32,13 +33,15 @@ _TRIES, _WALKED = 2, 4  # further steps on one piece; added to the tries once th
 _ANY = 0x7FFFFFFF  # tells the compiler that an index is not negative
 _STEP = 3e-9  # largest last step, in pieces, after which the square of the error is below round-off
 _CHUNK = 16_384  # points per task when several threads share a large batch
-_compiled: Callable[..., Any] = njit(cache=True, nogil=True, error_model="numpy")
-_inlined: Callable[..., Any] = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+SAMPLE_METHODS = ("circle", "chord", "pcp", "veaw")
+_CIRCLE, _CHORD, _PCP = range(3)
+_compiled: Any = njit(cache=True, nogil=True, error_model="numpy")
+_inlined: Any = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 
 
 @intrinsic  # type: ignore[untyped-decorator]
 def _fma(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
-    """A b + c with one rounding."""
+    """a b + c with one rounding."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.fma(*args)
@@ -78,7 +81,9 @@ def _rows_to_columns(typing_context: Any, table: Any, rows: Any, first: Any, tar
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         eight = ir.VectorType(ir.DoubleType(), 8)
-        table_data, rows_data, target_data = (context.make_array(signature.args[i])(context, builder, args[i]).data for i in (0, 1, 3))
+        table_data, rows_data, target_data = (
+            context.make_array(signature.args[i])(context, builder, args[i]).data for i in (0, 1, 3)
+        )
         word = ir.IntType(64)
 
         def at(data: Any, offset: Any) -> Any:
@@ -95,9 +100,7 @@ def _rows_to_columns(typing_context: Any, table: Any, rows: Any, first: Any, tar
             for i in range(8):
                 if not i & span:
                     mixed[i] = builder.shuffle_vector(lines[i], lines[i + span], ir.Constant(ir.VectorType(ir.IntType(32), 8), mask_low))
-                    mixed[i + span] = builder.shuffle_vector(
-                        lines[i], lines[i + span], ir.Constant(ir.VectorType(ir.IntType(32), 8), mask_high)
-                    )
+                    mixed[i + span] = builder.shuffle_vector(lines[i], lines[i + span], ir.Constant(ir.VectorType(ir.IntType(32), 8), mask_high))
             lines = mixed
         for q in range(8):
             offset = builder.add(args[4], word(q * _BLOCK))
@@ -134,31 +137,53 @@ def project(points_mm: Array, grid: FootGrid, threads: int | None = None) -> Fee
 
     threads : None chooses by the number of points; the result is the same.
     """
+    points = _flat(points_mm)
+    numbers, vertex = _results(len(points) // 2)
+    _share(lambda start, stop: _project(points, grid.reals, grid.integers, numbers, vertex, start, stop), len(vertex), threads)
+    return _feet(numbers, vertex)
+
+
+def _flat(points_mm: Array) -> Array:
     points = np.ascontiguousarray(points_mm, dtype=np.float64).reshape(-1).view()
     points.flags.writeable = False  # one type for the compiler, whatever the caller's flags
-    m = len(points) // 2
-    numbers = np.empty(8 * m)
-    vertex = np.empty(m, dtype=np.uint8)
+    return points
+
+
+def _results(m: int) -> tuple[Array, NDArray[np.uint8]]:
+    return np.empty(8 * m), np.empty(m, dtype=np.uint8)
+
+
+def _feet(numbers: Array, vertex: NDArray[np.uint8]) -> Feet:
+    m = len(vertex)
+    return Feet(
+        parameter=numbers[:m],
+        foot_mm=numbers[m : 3 * m].reshape(m, 2),
+        distance_mm=numbers[3 * m : 4 * m],
+        gradient=numbers[4 * m : 6 * m].reshape(m, 2),
+        curvature=numbers[6 * m : 7 * m],
+        station_mm=numbers[7 * m :],
+        vertex=vertex,
+    )
+
+
+def _share(work: Callable[[int, int], None], m: int, threads: int | None) -> None:
+    """Run work(start, stop) over all of range(m): at once, or in chunks on threads when there are many points."""
     if threads is None:
         threads = 1 if m < 4 * _CHUNK else os.cpu_count() or 1
     if threads == 1 or m <= _CHUNK:
-        _project(points, grid.reals, grid.integers, numbers, vertex, 0, m)
-    else:
-        with ThreadPoolExecutor(threads) as pool:
-            list(
-                pool.map(
-                    lambda at: _project(points, grid.reals, grid.integers, numbers, vertex, at, min(at + _CHUNK, m)), range(0, m, _CHUNK)
-                )
-            )
-    return Feet(
-        numbers[:m],
-        numbers[m : 3 * m].reshape(m, 2),
-        numbers[3 * m : 4 * m],
-        numbers[4 * m : 6 * m].reshape(m, 2),
-        numbers[6 * m : 7 * m],
-        numbers[7 * m :],
-        vertex,
-    )
+        work(0, m)
+        return
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(work, range(0, m, _CHUNK), range(_CHUNK, m + _CHUNK, _CHUNK)))
+
+
+def compile_kernels() -> None:
+    """Compile every kernel, or load it from the cache: seconds on the first use after installation, milliseconds later."""
+    real, whole = types.Array(types.float64, 1, "C"), types.Array(types.uint8, 1, "C")
+    fixed, index32, index64 = (types.Array(kind, 1, "C", readonly=True) for kind in (types.float64, types.int32, types.int64))
+    word = types.int64
+    _project.compile((fixed, fixed, index32, real, whole, word, word))
+    _project_on_samples.compile((fixed, fixed, index64, fixed, index64, fixed, word, real, whole, word, word))
 
 
 # Where the memory of a block keeps what, _BLOCK numbers each. Reals: the row of the piece (24 columns), then
@@ -171,9 +196,10 @@ _CONTENT, _ROW, _SOLVED, _POINT, _TRY, _UNSOLVED, _WAITING = (_BLOCK * i for i i
 def _project(points: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, start: int, stop: int) -> None:
     """Closest points of points[start:stop] into numbers (8 m: parameter, foot, distance, gradient, curvature, station) and vertex (m,).
 
-    points (2 m,) is flat. All points of a block are solved on the piece that their cell holds; those whose foot is not on
+    `points` is flat; a `stop` beyond the last point is the last point. All points of a block are solved on the piece that their cell holds; those whose foot is not on
     that piece, or whose cell holds several stretches, queue until they fill a block of their own.
     """
+    stop = min(stop, len(vertex))
     pieces, blocks, cells = reals[integers[3] :], integers[integers[9] :], integers[integers[10] :]
     w = carray(_stack_reals(), _REALS)
     q = carray(_stack_integers(), _INTEGERS)
@@ -251,14 +277,7 @@ def _start(w: Any, j: int) -> None:
 def _solve(w: Any, q: Any, j: int) -> None:
     """One Halley step from t, then a Newton step and the results; solved where the step is small and t belongs to the piece."""
     c0, c1, c2, c3, c4, c5 = w[j], w[_BLOCK + j], w[2 * _BLOCK + j], w[3 * _BLOCK + j], w[4 * _BLOCK + j], w[5 * _BLOCK + j]
-    d0, d1, d2, d3, d4, d5 = (
-        w[6 * _BLOCK + j],
-        w[7 * _BLOCK + j],
-        w[8 * _BLOCK + j],
-        w[9 * _BLOCK + j],
-        w[10 * _BLOCK + j],
-        w[11 * _BLOCK + j],
-    )
+    d0, d1, d2, d3, d4, d5 = w[6 * _BLOCK + j], w[7 * _BLOCK + j], w[8 * _BLOCK + j], w[9 * _BLOCK + j], w[10 * _BLOCK + j], w[11 * _BLOCK + j]
     x, y, t = w[_X + j], w[_Y + j], w[_T + j]
     c0 -= x
     d0 -= y
@@ -420,7 +439,9 @@ def _resume(w: Any, lanes: int, waiting: int) -> None:
 
 
 @_compiled
-def _settle(w: Any, q: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, lanes: int, waiting: int, best: Any, stack: Any) -> int:
+def _settle(
+    w: Any, q: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, lanes: int, waiting: int, best: Any, stack: Any
+) -> int:
     """Offer the solved items to their points, send the others on."""
     for j in range(lanes):
         if q[_SOLVED + j] == 1:
@@ -433,7 +454,9 @@ def _settle(w: Any, q: Any, reals: Any, integers: Any, numbers: Any, vertex: Any
 
 
 @_compiled
-def _advance(w: Any, q: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, j: int, waiting: int, best: Any, stack: Any) -> int:
+def _advance(
+    w: Any, q: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, j: int, waiting: int, best: Any, stack: Any
+) -> int:
     """The next try of an unsolved lane: once on the neighbouring piece, or the vertex there, or on from its t; else the search.
 
     Feet are accepted on the certified piece and its two neighbours only, so no try can end on another stretch of curve.
@@ -640,6 +663,239 @@ def _finish_vertex(x: float, y: float, vertices: Any, row: int, grain: float, be
     if distance > grain:
         nx, ny = sign * dx / distance, sign * dy / distance
     best[4], best[5], best[6], best[7], best[8] = nx, ny, 0.0, vertices[row + 5], vertices[row + 6]
+
+
+# --- the paper's methods: projections made at the nearest sample ---------------------------------------------------------
+
+
+def project_on_samples(points_mm: Array, grid: FootGrid, table: SampleTable, method: str, threads: int | None = None) -> Feet:
+    """Feet of points (m, 2) by a method that looks at samples only: circle, chord, pcp or veaw (see profile_error).
+
+    The grid merely says where to begin the search for the nearest sample. Points that are not finite give NaN.
+    """
+    points = _flat(points_mm)
+    numbers, vertex = _results(len(points) // 2)
+    tables = (table.samples.reshape(-1), table.links.reshape(-1), table.boxes.reshape(-1), table.starts, table.domain)
+
+    def work(start: int, stop: int) -> None:
+        _project(points, grid.reals, grid.integers, numbers, vertex, start, stop)
+        _project_on_samples(points, *tables, SAMPLE_METHODS.index(method), numbers, vertex, start, stop)
+
+    _share(work, len(vertex), threads)
+    return _feet(numbers, vertex)
+
+
+@_compiled
+def _project_on_samples(
+    points: Any, samples: Any, links: Any, boxes: Any, starts: Any, domain: Any, method: int, numbers: Any, vertex: Any, start: int, stop: int
+) -> None:
+    """Projections of points[start:stop]; numbers and vertex hold the exact ones and take the new ones in their place."""
+    stop = min(stop, len(vertex))
+    stack, best = np.empty(64, dtype=np.int64), np.empty(9)
+    for point in range(start, stop):
+        x, y, u = points[2 * point], points[2 * point + 1], numbers[point]
+        if np.isnan(u):
+            continue
+        site = int((u - domain[0]) / (domain[1] - domain[0]) * len(starts))
+        site = _nearest_sample(x, y, starts[min(max(site, 0), len(starts) - 1)], samples, boxes, stack)
+        site, facing = _facing_sample(x, y, site, samples, links)
+        if not facing:
+            _on_sample(x, y, site, samples, links, best)
+        else:
+            if method == _CIRCLE:
+                left, gx, gy = _on_osculating_circle(x, y, site, samples)
+            elif method == _CHORD:
+                left, gx, gy = _on_chords(x, y, site, samples, links)
+            elif method == _PCP:
+                left, gx, gy = _on_pole_circle(x, y, site, samples)
+            else:
+                left, gx, gy = _between_pole_circles(x, y, site, samples, links)
+            _from_sample(x, y, site, left, gx, gy, samples, domain, best)
+        _store(best, numbers, vertex, point)
+
+
+@_compiled
+def _nearest_sample(x: float, y: float, site: int, samples: Any, boxes: Any, stack: Any) -> int:
+    """Nearest of all samples, the first of several; `site` is where the search begins and does not change its result."""
+    n = len(samples) // SAMPLE_WIDTH
+    least = _sample_distance(samples, site, x, y)
+    leaves = len(boxes) // 8
+    stack[0] = 1
+    depth = 1
+    while depth:
+        depth -= 1
+        node = stack[depth]
+        if node >= leaves:
+            first = (node - leaves) * LEAF
+            for i in range(first, min(first + LEAF, n)):
+                distance = _sample_distance(samples, i, x, y)
+                if distance < least or (distance == least and i < site):
+                    least, site = distance, i
+            continue
+        near = 2 * node
+        near_distance, far_distance = _box_distance(boxes, near, x, y), _box_distance(boxes, near + 1, x, y)
+        if far_distance < near_distance:
+            near, near_distance, far_distance = near + 1, far_distance, near_distance
+        if far_distance <= least:
+            stack[depth] = near ^ 1
+            depth += 1
+        if near_distance <= least:
+            stack[depth] = near
+            depth += 1
+    return site
+
+
+@_compiled
+def _sample_distance(samples: Any, site: int, x: float, y: float) -> float:
+    dx, dy = x - samples[SAMPLE_WIDTH * site], y - samples[SAMPLE_WIDTH * site + 1]
+    return dx * dx + dy * dy
+
+
+@_compiled
+def _reach(x: float, y: float, site: int, samples: Any) -> tuple[float, float]:
+    """Coordinates of a point along the tangent and the normal of a sample."""
+    row = SAMPLE_WIDTH * site
+    dx, dy = x - samples[row], y - samples[row + 1]
+    return dx * samples[row + 2] + dy * samples[row + 3], dx * samples[row + 4] + dy * samples[row + 5]
+
+
+@_compiled
+def _facing_sample(x: float, y: float, site: int, samples: Any, links: Any) -> tuple[int, bool]:
+    """The sample, or its twin on the other side of a corner, on a piece that the point faces; the nearer tangent wins."""
+    ahead, off = _reach(x, y, site, samples)
+    faced = _faced(ahead, site, links)
+    twin = links[LINK_WIDTH * site + 2]
+    if twin >= 0:
+        twin_ahead, twin_off = _reach(x, y, twin, samples)
+        twin_faced = _faced(twin_ahead, twin, links)
+        if twin_faced and (not faced or abs(twin_off) < abs(off)):
+            return twin, True
+    return site, faced
+
+
+@_compiled
+def _faced(ahead: float, site: int, links: Any) -> bool:
+    return (links[LINK_WIDTH * site + 1] >= 0 or ahead >= 0.0) and (links[LINK_WIDTH * site] >= 0 or ahead <= 0.0)
+
+
+@_compiled
+def _on_sample(x: float, y: float, site: int, samples: Any, links: Any, best: Any) -> None:
+    """The sample itself as the foot, signed by the sum of the normals that meet there."""
+    row, twin = SAMPLE_WIDTH * site, links[LINK_WIDTH * site + 2]
+    other = SAMPLE_WIDTH * (twin if twin >= 0 else site)
+    nx, ny = samples[row + 4] + samples[other + 4], samples[row + 5] + samples[other + 5]
+    length = np.hypot(nx, ny)
+    nx, ny = nx / length, ny / length
+    dx, dy = x - samples[row], y - samples[row + 1]
+    distance = np.hypot(dx, dy)
+    side = 1.0 if dx * nx + dy * ny >= 0.0 else -1.0
+    if distance > 0.0:
+        nx, ny = dx * (side / distance), dy * (side / distance)
+    best[0], best[1], best[2], best[3] = samples[row + 7], samples[row], samples[row + 1], side * distance
+    best[4], best[5], best[6], best[8] = nx, ny, 0.0, samples[row + 8]
+    best[7] = 2.0 if links[LINK_WIDTH * site + 3] else 1.0
+
+
+@_compiled
+def _on_circle(a: float, b: float, curvature: float) -> tuple[float, float, float]:
+    """Signed distance of (a, b) to a circle through the origin with its centre on the second axis, and its gradient."""
+    s = curvature * (a * a + b * b) - 2.0 * b
+    root = np.sqrt(max(1.0 + curvature * s, 0.0))
+    if root == 0.0:
+        return -s, -curvature * a, 1.0
+    return -s / (1.0 + root), -curvature * a / root, (1.0 - curvature * b) / root
+
+
+@_compiled
+def _on_osculating_circle(x: float, y: float, site: int, samples: Any) -> tuple[float, float, float]:
+    row = SAMPLE_WIDTH * site
+    a, b = _reach(x, y, site, samples)
+    left, along, across = _on_circle(a, b, samples[row + 6])
+    return left, along * samples[row + 2] + across * samples[row + 4], along * samples[row + 3] + across * samples[row + 5]
+
+
+@_compiled
+def _on_pole_circle(x: float, y: float, site: int, samples: Any) -> tuple[float, float, float]:
+    """Left-signed distance to the pole circle on the point's side (equations 2 and 3, the reading `side`), and its gradient."""
+    row = SAMPLE_WIDTH * site
+    dx, dy = x - samples[row], y - samples[row + 1]
+    if dx * samples[row + 4] + dy * samples[row + 5] >= 0.0:
+        px, py, curvature, side = samples[row + 10], samples[row + 11], samples[row + 14], 1.0
+    else:
+        px, py, curvature, side = samples[row + 12], samples[row + 13], samples[row + 15], -1.0
+    distance, along, across = _on_circle(dx * py - dy * px, dx * px + dy * py, curvature)
+    return side * distance, side * (along * py + across * px), side * (across * py - along * px)
+
+
+@_compiled
+def _between_pole_circles(x: float, y: float, site: int, samples: Any, links: Any) -> tuple[float, float, float]:
+    """Pole circles of the sample and its neighbour, blended by angles at the end of their Voronoi edge (equations 4 to 6)."""
+    ahead, off = _reach(x, y, site, samples)
+    left, gx, gy = _on_pole_circle(x, y, site, samples)
+    other = links[LINK_WIDTH * site] if ahead >= 0.0 else links[LINK_WIDTH * site + 1]
+    if other < 0:
+        return left, gx, gy
+    edge = SAMPLE_WIDTH * (site if ahead >= 0.0 else other) + (16 if off > 0.0 else 18)
+    vx, vy = samples[edge], samples[edge + 1]
+    row, other_row = SAMPLE_WIDTH * site, SAMPLE_WIDTH * other
+    at_site = _angle(samples[row] - vx, samples[row + 1] - vy, x - vx, y - vy)
+    at_other = _angle(x - vx, y - vy, samples[other_row] - vx, samples[other_row + 1] - vy)
+    total = at_site + at_other
+    if not total > 0.0:  # also where the two cells share no edge (NaN)
+        return left, gx, gy
+    share = at_other / total
+    left_other, gx_other, gy_other = _on_pole_circle(x, y, other, samples)
+    gx, gy = share * gx + (1.0 - share) * gx_other, share * gy + (1.0 - share) * gy_other
+    length = np.hypot(gx, gy)
+    return share * left + (1.0 - share) * left_other, gx / length, gy / length
+
+
+@_compiled
+def _angle(ax: float, ay: float, bx: float, by: float) -> float:
+    return abs(np.arctan2(ax * by - ay * bx, ax * bx + ay * by))
+
+
+@_compiled
+def _on_chords(x: float, y: float, site: int, samples: Any, links: Any) -> tuple[float, float, float]:
+    """Projection on the nearer of the two chords that meet at the sample, signed by the side of its normal."""
+    row = SAMPLE_WIDTH * site
+    left, gx, gy = np.inf, samples[row + 4], samples[row + 5]
+    for side in range(2):
+        other = links[LINK_WIDTH * site + side]
+        if other < 0:
+            continue
+        sx, sy = samples[SAMPLE_WIDTH * other] - samples[row], samples[SAMPLE_WIDTH * other + 1] - samples[row + 1]
+        dx, dy = x - samples[row], y - samples[row + 1]
+        share = min(max((dx * sx + dy * sy) / (sx * sx + sy * sy), 0.0), 1.0)
+        dx, dy = dx - share * sx, dy - share * sy
+        distance = np.hypot(dx, dy)
+        if distance < abs(left):
+            sign = 1.0 if dx * samples[row + 4] + dy * samples[row + 5] >= 0.0 else -1.0
+            left, gx, gy = sign * distance, samples[row + 4], samples[row + 5]
+            if distance > 0.0:
+                gx, gy = dx * (sign / distance), dy * (sign / distance)
+    return left, gx, gy
+
+
+@_compiled
+def _from_sample(x: float, y: float, site: int, left: float, gx: float, gy: float, samples: Any, domain: Any, best: Any) -> None:
+    """Complete a projection; the foot's arc length from the sample is that along the osculating circle."""
+    row = SAMPLE_WIDTH * site
+    foot_x, foot_y = x - left * gx, y - left * gy
+    ahead, off = _reach(foot_x, foot_y, site, samples)
+    curvature = samples[row + 6]
+    travel = ahead
+    if abs(curvature * ahead) > 1e-9:
+        travel = np.arctan2(curvature * ahead, 1.0 - curvature * off) / curvature
+    closed = domain[3] != 0.0
+    best[0] = _on_curve(samples[row + 7] + travel / samples[row + 9], domain[0], domain[1], closed)
+    best[1], best[2], best[3], best[4], best[5], best[6], best[7] = foot_x, foot_y, left, gx, gy, curvature, 0.0
+    best[8] = _on_curve(samples[row + 8] + travel, 0.0, domain[2], closed)
+
+
+@_compiled
+def _on_curve(value: float, start: float, end: float, closed: bool) -> float:
+    return start + (value - start) % (end - start) if closed else min(max(value, start), end)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,0 +1,67 @@
+"""The samples of a nominal profile packed for the compiled methods of the paper, with a search tree for the nearest one."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inspection.nominal import NominalProfile
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+SAMPLE_WIDTH = 20  # place, tangent, normal (2 each), curvature, parameter, station, speed, left and right pole direction (2 each) and curvature, edge ends
+LINK_WIDTH = 4  # next, previous, twin, 1 at an open end
+LEAF = 16  # samples in a leaf of the search tree
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SampleTable:
+    """Packed tables of n samples for `kernels.project_on_samples`.
+
+    samples  : (n, SAMPLE_WIDTH)
+    links    : (n, LINK_WIDTH)
+    boxes    : (2 q, 4) binary tree of bounding boxes: node 1 is the root, leaf q + i holds the samples from i LEAF on; low x, y, high x, y
+    starts   : (b,) a sample near each of b even steps of the parameter
+    domain   : (start, end, length_mm, 1 when closed)
+    """
+
+    samples: Array
+    links: Index
+    boxes: Array
+    starts: Index
+    domain: Array
+
+    def __post_init__(self) -> None:
+        for name in self.__slots__:
+            getattr(self, name).setflags(write=False)
+
+
+def build_sample_table(nominal: NominalProfile) -> SampleTable:
+    """Tables of the samples of `nominal`."""
+    poles = nominal.poles
+    columns = [nominal.points_mm, nominal.tangent, nominal.normal, nominal.curvature, nominal.parameter, nominal.station_mm, nominal.speed]
+    columns += [poles.left, poles.right, poles.left_curvature, poles.right_curvature, poles.edge_left_mm, poles.edge_right_mm]
+    samples = np.column_stack(columns)
+    links = np.column_stack([nominal.next_site, nominal.previous_site, nominal.twin, nominal.is_open_end]).astype(np.int64)
+    start, end = nominal.curve.domain
+    order = np.argsort(nominal.parameter, kind="stable")
+    middles = start + (np.arange(len(nominal)) + 0.5) / len(nominal) * (end - start)
+    nearest = np.minimum(np.searchsorted(nominal.parameter[order], middles), len(nominal) - 1)
+    domain = np.array([start, end, nominal.length_mm, float(nominal.curve.closed)])
+    return SampleTable(samples, links, _boxes(nominal.points_mm), order[nearest], domain)
+
+
+def _boxes(points_mm: Array) -> Array:
+    leaves = -(-len(points_mm) // LEAF)
+    q = 1 << max(0, (leaves - 1).bit_length())
+    boxes = np.full((2 * q, 4), np.inf)
+    boxes[:, 2:] = -np.inf
+    first = np.arange(0, len(points_mm), LEAF)
+    boxes[q : q + leaves, :2] = np.minimum.reduceat(points_mm, first)
+    boxes[q : q + leaves, 2:] = np.maximum.reduceat(points_mm, first)
+    while q > 1:
+        children = boxes[q : 2 * q].reshape(q // 2, 2, 4)
+        boxes[q // 2 : q] = np.hstack([children[:, :, :2].min(axis=1), children[:, :, 2:].max(axis=1)])
+        q //= 2
+    return boxes
