@@ -91,6 +91,7 @@ def _closest(curve: NurbsCurve, start: Array, end: Array, points: Array) -> Clos
 
 def _roots(curve: NurbsCurve, points: Array, row: Index, a: Array, b: Array) -> tuple[Index, Array]:
     """Parameters at which the tangential component turns from minus to plus: Newton kept inside a shrinking bracket."""
+    row, a, b = _monotone(curve, points, row, a, b)
     inside = np.nextafter(b, a)
     at_start, at_end = _tangential(curve, points[row], a)[0], _tangential(curve, points[row], inside)[0]
     turn = (at_start <= 0) & (at_end >= 0)
@@ -106,6 +107,17 @@ def _roots(curve: NurbsCurve, points: Array, row: Index, a: Array, b: Array) -> 
             break
         u = new
     return row, u
+
+
+def _monotone(curve: NurbsCurve, points: Array, row: Index, a: Array, b: Array) -> tuple[Index, Array, Array]:
+    """Intervals near a centre of curvature, where one could hide two roots, cut into forty; the others as they are."""
+    rising = np.minimum(_tangential(curve, points[row], a)[1], _tangential(curve, points[row], np.nextafter(b, a))[1])
+    doubtful = rising <= 0.1 * np.square(curve.derivatives((a + b) / 2, 1)[1]).sum(axis=1)
+    cuts = a[doubtful, None] + (b - a)[doubtful, None] * np.linspace(0.0, 1.0, 41)
+    cuts[:, -1] = b[doubtful]
+    plain = ~doubtful
+    row = np.concatenate([row[plain], np.repeat(row[doubtful], 40)])
+    return row, np.concatenate([a[plain], cuts[:, :-1].ravel()]), np.concatenate([b[plain], cuts[:, 1:].ravel()])
 
 
 def _tangential(curve: NurbsCurve, points: Array, u: Array) -> tuple[Array, Array]:

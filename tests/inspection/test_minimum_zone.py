@@ -124,7 +124,7 @@ def test_a_lobed_circle_has_twice_its_amplitude(lobes: int) -> None:
     radius = 25.0 + 0.03 * np.cos(lobes * angle)
     points = radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
     nominal = discretize(profiles.circle(25.0), samples=1000)
-    found = fit_minimum_zone((*points, 0.02, -0.01), nominal, RigidTransform.identity())
+    found = fit_minimum_zone(points + np.array([0.02, -0.01]), nominal, RigidTransform.identity())
     assert found.zone_mm == pytest.approx(0.06, abs=1e-10)
     assert np.abs(found.nominal_from_section.apply([[0.02, -0.01]])).max() < 1e-6
 

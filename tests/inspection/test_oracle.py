@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from inspection import NurbsCurve
 from tests.inspection import profiles
 from tests.inspection.oracle import Array, closest_point
 
@@ -87,3 +88,18 @@ def test_no_sample_of_the_curve_is_closer_than_the_foot(name: str) -> None:
     step = np.linalg.norm(np.diff(samples, axis=0), axis=1).max()
     assert (np.abs(found.left_mm) >= np.sqrt(np.maximum(brute**2 - brute * step - step**2, 0))).all()
     assert np.abs(np.linalg.norm(points - found.foot_mm, axis=1) - np.abs(found.left_mm)).max() < 1e-12
+
+
+def test_two_minima_closer_than_an_interval_are_both_seen() -> None:
+    # at a simple knot of degree 2 the curvature jumps from 5 to 103 per mm; brute force at a millionth of the range decides
+    control = np.array([(0.0, 0.0), (20.0, 0.0), (20.2, 0.0), (24.0, 2.9)])
+    curve = NurbsCurve(2, control, np.array([0, 0, 0, 0.459, 1, 1, 1]))
+    rng = np.random.default_rng(7)
+    u = 0.459 + rng.normal(0, 3e-4, 60)
+    radius = 1 / np.abs(curve.curvature(np.array([0.459]))[0])
+    points = profiles.offset_points(curve, u, rng.uniform(0.9, 1.2, 60) * radius)
+    samples = curve.point(np.linspace(0.44, 0.48, 100_001))
+    brute = np.array([np.linalg.norm(samples - p, axis=1).min() for p in points])
+    found = np.abs(closest_point(curve, points).left_mm)
+    assert (found <= brute + 1e-13).all()
+    assert (brute - found).max() < 1e-9

@@ -101,6 +101,22 @@ def test_exact_needs_no_dense_samples() -> None:
         assert_exact(deviations(points, nominal), closest_point(curve_of(name), points), points, nominal)
 
 
+@pytest.mark.parametrize("samples", [50, 300, 2000, 10_000])
+def test_exact_holds_where_the_curvature_jumps(samples: int) -> None:
+    # Degree 2, one simple knot: tangents meet, curvatures do not. Off the knot by about the smaller radius there are two
+    # local minima within a step of the samples, and the nearest sample may lead to the wrong one or to neither.
+    for seed, (lift, last) in enumerate([(0.05, 4.7), (-0.12, 2.5), (0.16, 7.9), (-0.04, 3.6)]):
+        curve = NurbsCurve(
+            2, np.array([(0, 0), (20, 0), (20.9 + 0.3 * seed, lift), (24, last)]), np.array([0, 0, 0, 0.35 + 0.15 * seed, 1, 1, 1])
+        )
+        knot, rng = curve.knots[3], np.random.default_rng(seed)
+        radius = 1 / np.abs(curve.curvature(np.array([np.nextafter(knot, 0), knot]))).max()
+        u = np.clip(knot + rng.normal(0, 3 / samples, 400), 0.001, 0.999)
+        points = profiles.offset_points(curve, u, rng.uniform(-1.3, 1.3, 400) * min(radius, 3.0))
+        nominal = discretize(curve, samples=samples, step_min=1 / samples)
+        assert_exact(deviations(points, nominal), closest_point(curve, points), points, nominal)
+
+
 # ---- closed forms
 
 
