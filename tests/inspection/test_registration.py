@@ -359,6 +359,29 @@ def test_forty_percent_of_a_profile_is_found_in_either_direction(name: str) -> N
     assert not failures
 
 
+@pytest.mark.parametrize("name", ["P1", "P3", "GOE404", "NACA 2412 sharp"])
+def test_robust_registration_finds_outliers_and_fits_the_others(name: str) -> None:
+    curve, nominal, rng = curve_of(name), nominal_of(name), np.random.default_rng(40)
+    u = profiles.even_in_arc_length(curve, 800)
+    form = 0.02 * np.sin(8 * np.pi * curve.station_mm(u) / curve.length_mm) + rng.normal(0, 0.005, 800)
+    truth = profiles.offset_points(curve, u, form)
+    bad = np.zeros(800, dtype=bool)
+    bad[rng.choice(np.arange(10, 790), 80, replace=False)] = True
+    truth[bad] += rng.choice([-1.0, 1.0], (80, 1)) * rng.uniform(0.4, 3.0, (80, 1)) * profiles.left_normal(curve, u)[bad]
+    points = profiles.rotated(truth, 200.0, (9.0, 9.0))
+    found = register(points, nominal, robust=True)
+    # thrown through a thin edge a point may come to lie on the other side
+    plain = np.abs(closest_point(curve, truth).left_mm) > 0.2
+    assert found.outliers[bad & plain].mean() >= 0.99
+    assert not found.outliers[~bad].any()
+    best, _ = optimum(curve, truth[~bad])
+    assert farthest_mm(found.nominal_from_section, points[~bad], best) < 2e-3
+    assert found.rms_mm == pytest.approx(np.sqrt(np.mean(form[~bad] ** 2)), rel=0.1)
+    # nothing is thrown away where nothing is wrong, though the form error is systematic
+    clean = profiles.rotated(profiles.offset_points(curve, u, form), 10.0)
+    assert not register(clean, nominal, robust=True).outliers.any()
+
+
 # ---- what cannot be registered
 
 ONE_PLACE = np.full((50, 2), 3.0)
