@@ -101,7 +101,7 @@ def test_exact_needs_no_dense_samples() -> None:
         assert_exact(deviations(points, nominal), closest_point(curve_of(name), points), points, nominal)
 
 
-@pytest.mark.parametrize("samples", [50, 300, 2000, 10_000])
+@pytest.mark.parametrize("samples", [50, 300, 2000])
 def test_exact_holds_where_the_curvature_jumps(samples: int) -> None:
     # Degree 2, one simple knot: tangents meet, curvatures do not. Off the knot by about the smaller radius there are two
     # local minima within a step of the samples, and the nearest sample may lead to the wrong one or to neither.
