@@ -17,10 +17,10 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
-import click
 import typer
 from rich.console import Console
 
+from cmmlink import __version__
 from cmmlink.demo import plan_file as demo_plan_file
 from cmmlink.demo import write_part_path
 from cmmlink.errors import PlanError, StoreError
@@ -40,7 +40,10 @@ from drivers.source import ScanSource
 from inspection import InspectionError, LiveInspection, NominalProfile, ToleranceZone, Verdict
 
 app = typer.Typer(
-    add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help="Inspect profiles while they are scanned."
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 120},
 )
 
 _EXIT = {Verdict.CONFORM: 0, Verdict.NONCONFORM: 1, Verdict.UNCERTAIN: 3}
@@ -49,6 +52,7 @@ _BUFFER_POINTS = 500_000
 _SIMULATOR_STARTS_S = 20.0
 _DEMO_RATE_HZ, _DEMO_POINTS = 2000, 4000
 
+PlanFile = Annotated[Path, typer.Argument(metavar="PLAN.yaml", help="The inspection plan.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of words.")]
 Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for deviations.csv, result.json and profile.png.")]
 Headless = Annotated[bool, typer.Option("--headless", help="No page, no live table.")]
@@ -92,12 +96,9 @@ class Telling:
 def main() -> None:
     """Run the command line; every error a user can cause ends as one message and an exit code."""
     try:
-        code = app(standalone_mode=False)
-    except click.ClickException as error:
-        error.show()
-        code = error.exit_code
-    except click.Abort:
-        code = _fail("aborted", 130)
+        code = app(prog_name="cmmlink", standalone_mode=False)
+    except typer.TyperException as error:
+        code = _fail(_usage(error), _UNUSABLE)
     except (PlanError, InspectionError, PointFileError) as error:
         code = _fail(str(error), _UNUSABLE)
     except DeviceError as error:
@@ -107,15 +108,40 @@ def main() -> None:
     sys.exit(code or 0)
 
 
+def _usage(error: typer.TyperException) -> str:
+    """What is wrong with the arguments, and where to read what is right."""
+    context = getattr(error, "ctx", None)
+    command = context.command_path if context else "cmmlink"
+    problem = " ".join(error.format_message().replace("Value error, ", "").rstrip(".").split())
+    return f"{problem}; `{command} --help` shows what is allowed"
+
+
 def _fail(message: str, code: int) -> int:
     sys.stderr.write(f"cmmlink: {message}\n")
     return code
 
 
+@app.callback(invoke_without_command=True)
+def cmmlink(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Show the version and exit.")] = False,
+) -> None:
+    """Acquire points from coordinate measuring machines and scanners and judge every one against the nominal profile as it arrives.
+
+    Exit status: 0 conform, 1 nonconform, 3 uncertain; 2 unusable input or plan, 4 device or link failure, 5 the record could not be kept.
+    """
+    if version:
+        typer.echo(f"cmmlink {__version__}")
+        raise typer.Exit
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+        raise typer.Exit(_UNUSABLE)
+
+
 @app.command()
 def demo(
     headless: Headless = False,
-    seed: Annotated[int, typer.Option(min=0, help="Another seed is another part.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, metavar="N", help="Another seed is another part.")] = 1,
     defect: Annotated[str | None, typer.Option(metavar="MM@STATION", help="A local defect, like 0.12@40.")] = None,
     out: Out = Path("demo-result"),
     as_json: Json = False,
@@ -182,7 +208,7 @@ def _simulator(device: str, arguments: Sequence[str]) -> Iterator[str]:
 
 @app.command()
 def run(
-    plan_file: Annotated[Path, typer.Argument(metavar="PLAN.yaml")],
+    plan_file: PlanFile,
     headless: Headless = False,
     out: Out = None,
     as_json: Json = False,
@@ -250,7 +276,7 @@ def _print_json(facts: dict[str, Any]) -> None:
 
 @app.command()
 def inspect(
-    points: Annotated[Path, typer.Argument(metavar="POINTS")],
+    points: Annotated[Path, typer.Argument(metavar="POINTS", help="Measured points: csv, txt, asc, xyz or npy.")],
     nominal: Annotated[Path, typer.Option(metavar="FILE", help="The nominal profile.")],
     tolerance: Annotated[tuple[float, float], typer.Option(metavar="LO HI", help="Deviations allowed, mm, positive out of material.")],
     method: Annotated[MethodName, typer.Option(help="How deviations are found.")] = MethodName.EXACT,
@@ -260,7 +286,9 @@ def inspect(
     scale: Annotated[float, typer.Option(metavar="S", help="Units of the nominal file to mm (a chord, for airfoils).")] = 1.0,
     closed: Annotated[bool | None, typer.Option("--closed/--open", help="Close the nominal, or leave it open.")] = None,
     material: Annotated[Side | None, typer.Option(help="Side of the material, seen along the nominal.")] = None,
-    coverage_min: Annotated[float, typer.Option(min=0, max=1, help="Share of the nominal to be measured before conform is proven.")] = 0.0,
+    coverage_min: Annotated[
+        float, typer.Option(min=0, max=1, metavar="SHARE", help="Share of the nominal to be measured before conform is proven.")
+    ] = 0.0,
     out: Out = None,
     as_json: Json = False,
 ) -> int:
@@ -287,9 +315,9 @@ def _zone(tolerance: tuple[float, float], uncertainty: float) -> ToleranceZone:
 
 @app.command()
 def nominal(
-    file: Annotated[Path, typer.Argument(metavar="FILE")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The nominal profile: UIUC dat, points, or nurbs yaml.")],
     scale: Annotated[float, typer.Option(metavar="S", help="Units of the file to mm.")] = 1.0,
-    closed: Annotated[bool | None, typer.Option("--closed/--open")] = None,
+    closed: Annotated[bool | None, typer.Option("--closed/--open", help="Close the nominal, or leave it open.")] = None,
     as_json: Json = False,
 ) -> int:
     """Show what was understood of a nominal file."""
@@ -323,8 +351,8 @@ def _nominal_facts(understood: NominalFile) -> dict[str, Any]:
 
 
 @app.command()
-def check(plan_file: Annotated[Path, typer.Argument(metavar="PLAN.yaml")]) -> int:
-    """Check a plan and everything it names, without touching the device."""
+def check(plan_file: PlanFile) -> int:
+    """Check a plan and what it names, not the device."""
     plan = load_plan(plan_file)
     profile = planned_profile(plan)
     try:
