@@ -376,14 +376,20 @@ def list_ports() -> int:
     return 0
 
 
-@app.command(context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
-def simulate(context: typer.Context, device: Annotated[str, typer.Argument(metavar="DEVICE")]) -> int:
-    """Serve a simulated device: cmmlink simulate serial --address A --path POINTS [--rate HZ] [--fault SPEC ...]."""
-    from simulators import serial_scanner  # noqa: PLC0415 - only this command knows simulators
+@app.command(add_help_option=False, context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
+def simulate(context: typer.Context, device: Annotated[str, typer.Argument(metavar="DEVICE")] = "") -> int:
+    """Serve a simulated device."""
+    from simulators.settings import devices, say, settings_from  # noqa: PLC0415 - only this command knows simulators
 
-    devices = {"serial": serial_scanner}
-    if device not in devices:
-        raise PlanError(f"no simulated device is called {device}; known: {', '.join(devices)}")
-    simulator = devices[device]
-    simulator.serve(simulator.settings_from(context.args), simulator.say)
+    known = devices()
+    if device in ("-h", "--help"):
+        settings_from(["--help"], f"cmmlink simulate {{{','.join(sorted(known))}}}")
+    if device not in known:
+        problem = f"no simulated device is called {device}" if device else "name the device to simulate"
+        raise PlanError(f"{problem}; known: {', '.join(sorted(known))}; `cmmlink simulate --help` shows their options")
+    settings = settings_from(context.args, f"cmmlink simulate {device}")
+    try:
+        known[device](settings, say)
+    except (ValueError, OSError) as error:
+        raise LinkError(f"the simulated device cannot serve {settings.address}: {error}") from None
     return 0
