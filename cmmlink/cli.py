@@ -4,6 +4,7 @@
 """
 
 import json
+import math
 import signal
 import subprocess
 import sys
@@ -11,8 +12,8 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
@@ -28,9 +29,9 @@ from cmmlink.events import RunStarted, Sink
 from cmmlink.nominal_files import NominalFile, load_nominal, material_side
 from cmmlink.parts import planned_inspection, planned_profile, profile_of
 from cmmlink.pipeline import RunOutcome, run_inspection
-from cmmlink.plan import FileDevice, Plan, load_plan
-from cmmlink.report.folder import write_results
-from cmmlink.report.summary import summary
+from cmmlink.plan import FileDevice, Plan, load_plan, place_of
+from cmmlink.report.folder import prepare, write_results
+from cmmlink.report.summary import identity, summary
 from cmmlink.terminal import LiveTable, print_summary
 from drivers.ascii_frames import AsciiDecoder
 from drivers.errors import DeviceError, LinkError, PointFileError
@@ -48,6 +49,7 @@ app = typer.Typer(
 
 _EXIT = {Verdict.CONFORM: 0, Verdict.NONCONFORM: 1, Verdict.UNCERTAIN: 3}
 _UNUSABLE, _DEVICE_FAILED, _NO_RECORD = 2, 4, 5
+_STOPPED = 130  # Ctrl-C outside a run, as shells and typer have it
 _BUFFER_POINTS = 500_000
 _SIMULATOR_STARTS_S = 20.0
 _DEMO_RATE_HZ, _DEMO_POINTS = 2000, 4000
@@ -97,6 +99,8 @@ def main() -> None:
     """Run the command line; every error a user can cause ends as one message and an exit code."""
     try:
         code = app(prog_name="cmmlink", standalone_mode=False)
+        if code == _STOPPED:
+            _fail("stopped by the operator", _STOPPED)
     except typer.TyperException as error:
         code = _fail(_usage(error), _UNUSABLE)
     except (PlanError, InspectionError, PointFileError) as error:
@@ -148,16 +152,18 @@ def demo(
 ) -> int:
     """Run the whole chain on a simulated device, no set-up."""
     plan = load_plan(demo_plan_file())
-    profile = planned_profile(plan)
+    profile = _checked_profile(plan, demo_plan_file())
+    bump = None if defect is None else _defect(defect, profile.length_mm)
+    prepare(out)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "path.csv"
         write_part_path(profile.curve, path)
-        arguments = ["--path", str(path), *_demo_motion(plan, profile, seed, defect)]
+        arguments = ["--path", str(path), *_demo_motion(plan, profile, seed, bump)]
         with _simulator("serial", arguments) as address:
             return _run(plan.with_address(address), profile, Telling(headless, as_json, out), simulated=True)
 
 
-def _demo_motion(plan: Plan, profile: NominalProfile, seed: int, defect: str | None) -> list[str]:
+def _demo_motion(plan: Plan, profile: NominalProfile, seed: int, defect: tuple[float, float] | None) -> list[str]:
     """Arguments of the simulator: form error and noise well inside the tolerance, an arbitrary pose on the table."""
     zone = plan.tolerance.zone
     speed = profile.length_mm * _DEMO_RATE_HZ / _DEMO_POINTS
@@ -174,17 +180,21 @@ def _demo_motion(plan: Plan, profile: NominalProfile, seed: int, defect: str | N
     arguments = [text for name, value in motion.items() for text in (f"--{name}", f"{value:.17g}")]
     arguments += ["--translation-mm", "210", "145", "60"]
     if defect is not None:
-        height, station = _defect(defect)
-        arguments += ["--defect-mm", str(height), "--defect-station-mm", str(station)]
+        arguments += ["--defect-mm", str(defect[0]), "--defect-station-mm", str(defect[1])]
     return arguments
 
 
-def _defect(text: str) -> tuple[float, float]:
+def _defect(text: str, length_mm: float) -> tuple[float, float]:
+    """Height and station of a defect, both in mm."""
     height, _, station = text.partition("@")
     try:
-        return float(height), float(station)
+        bump = float(height), float(station)
     except ValueError:
-        raise PlanError(f"--defect {text}: expected MM@STATION, like 0.12@40 for 0.12 mm of excess at station 40 mm") from None
+        bump = math.nan, math.nan
+    if not (math.isfinite(bump[0]) and 0 <= bump[1] <= length_mm):
+        meaning = f"expected MM@STATION, a station between 0 and {length_mm:.1f} mm"
+        raise PlanError(f"--defect {text}: {meaning}, like 0.12@40 for 0.12 mm of excess at station 40 mm")
+    return bump
 
 
 @contextmanager
@@ -192,7 +202,8 @@ def _simulator(device: str, arguments: Sequence[str]) -> Iterator[str]:
     """A simulated device as a process of its own; gives the address it serves."""
     address = "127.0.0.1:0" if sys.platform == "win32" else "pty"
     command = [sys.executable, "-m", "cmmlink", "simulate", device, "--address", address, *arguments]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    # In a session of its own: Ctrl-C is for the run, which then stops the device.
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
     assert process.stdout is not None
     assert process.stderr is not None
     with process.stdout, process.stderr:
@@ -215,8 +226,27 @@ def run(
 ) -> int:
     """Acquire and inspect with the device of a plan."""
     plan = load_plan(plan_file)
-    profile = planned_profile(plan)
+    profile = _checked_profile(plan, plan_file)
+    prepare(out or plan.out)
     return _run(plan, profile, Telling(headless, as_json, out or plan.out))
+
+
+def _checked_profile(plan: Plan, plan_file: Path) -> NominalProfile:
+    """The profile of a plan whose other values, too, are fit for it; a PlanError names file, line and key."""
+    with _naming(plan_file, "nominal.file"):
+        profile = planned_profile(plan)
+    with _naming(plan_file, "probe.tip_radius_mm"):
+        planned_inspection(plan, profile)
+    return profile
+
+
+@contextmanager
+def _naming(plan_file: Path, key: str) -> Iterator[None]:
+    """Put the place in the plan before what is wrong with a value."""
+    try:
+        yield
+    except ValueError as error:
+        raise PlanError(f"{place_of(plan_file, key)}: {error}") from None
 
 
 def _run(plan: Plan, profile: NominalProfile, telling: Telling, simulated: bool = False) -> int:
@@ -224,10 +254,11 @@ def _run(plan: Plan, profile: NominalProfile, telling: Telling, simulated: bool 
     live = planned_inspection(plan, profile)
     source, device = _source_of(plan)
     started = RunStarted(plan.part.name, plan.part.serial_number or "", plan.operator or "", device, simulated)
-    table = LiveTable(Console(stderr=True), plan.tolerance.zone, profile.length_mm)
+    table = LiveTable(Console(stderr=True), plan.tolerance.zone)
     quiet = telling.headless or telling.as_json or not sys.stderr.isatty()
-    outcome = _carry_out(source, live, started, [] if quiet else [table], plan.buffer_points)
-    return _tell(outcome, profile, telling, plan.part.name)
+    with nullcontext() if quiet else table:
+        outcome = _carry_out(source, live, started, [] if quiet else [table], plan.buffer_points)
+    return _tell(outcome, profile, telling, started)
 
 
 def _source_of(plan: Plan) -> tuple[ScanSource, str]:
@@ -240,34 +271,47 @@ def _source_of(plan: Plan) -> tuple[ScanSource, str]:
 
 
 def _carry_out(source: ScanSource, live: LiveInspection, started: RunStarted, sinks: Sequence[Sink], buffer_points: int) -> RunOutcome:
-    """Run to the end, or to Ctrl-C."""
+    """Run to the end, or to Ctrl-C; a second one ends at once."""
     stop = threading.Event()
-    before = signal.signal(signal.SIGINT, lambda *_: stop.set())
+
+    def interrupted(*_: object) -> None:
+        stop.set()
+        signal.signal(signal.SIGINT, before)
+
+    before = signal.signal(signal.SIGINT, interrupted)
     try:
         return run_inspection(source, live, sinks, started, buffer_points=buffer_points, clock=time.monotonic, stop=stop)
     finally:
         signal.signal(signal.SIGINT, before)
 
 
-def _tell(outcome: RunOutcome, profile: NominalProfile, telling: Telling, title: str) -> int:
-    """Print and write the outcome; the exit code."""
-    facts = summary(outcome.result, outcome.counts)
-    if telling.out is not None:
-        write_results(telling.out, facts, outcome.result, profile, title)
+def _tell(outcome: RunOutcome, profile: NominalProfile, telling: Telling, started: RunStarted) -> int:
+    """Print and write the outcome, the verdict first, whatever happens to the files; the exit code."""
+    facts = summary(outcome.result, outcome.counts) | identity(started)
     message = str(outcome.failure or outcome.refusal or "")
     if outcome.ending == "aborted":
-        message = message or "aborted by the operator"
+        message = message or "stopped by the operator: the scan is not complete"
+    if message:
+        sys.stderr.write(f"cmmlink: {message}\n")
     if telling.as_json:
         _print_json(facts)
     else:
-        print_summary(Console(highlight=False, soft_wrap=True), outcome.result, outcome.counts, "")
-        if telling.out is not None:
-            typer.echo(f"results in {telling.out}")
-    if message:
-        sys.stderr.write(f"cmmlink: {message}\n")
+        print_summary(Console(highlight=False, soft_wrap=not sys.stdout.isatty()), outcome.result, outcome.counts, _heading(started))
+    if telling.out is not None:
+        written = write_results(telling.out, facts, outcome.result, profile, _title(started))
+        if not telling.as_json:
+            typer.echo(f"results in {telling.out}: {', '.join(written)}")
     if outcome.failure is not None:
         return _DEVICE_FAILED
     return _UNUSABLE if outcome.result is None else _EXIT[outcome.result.verdict]
+
+
+def _title(started: RunStarted) -> str:
+    return " ".join(filter(None, [started.part, started.serial_number]))
+
+
+def _heading(started: RunStarted) -> str:
+    return f"{_title(started)}, {'SIMULATED device, ' if started.simulated else ''}{started.device}"
 
 
 def _print_json(facts: dict[str, Any]) -> None:
@@ -299,18 +343,22 @@ def inspect(
     try:
         live = LiveInspection(profile, zone, fit=fit.value, method=method.value, tip_radius_mm=tip_radius, coverage_min=coverage_min)
     except ValueError as error:
-        raise PlanError(str(error)) from None
-    outcome = _carry_out(source, live, RunStarted(points.stem, "", "", f"file {points.name}", False), [], _BUFFER_POINTS)
+        raise PlanError(f"--tip-radius {tip_radius:g}: {error}") from None
+    prepare(out)
+    started = RunStarted(points.stem, "", "", f"file {points.name}", False)
+    outcome = _carry_out(source, live, started, [], _BUFFER_POINTS)
     if outcome.refusal is not None:
         raise PlanError(f"{points}: {outcome.refusal}")
-    return _tell(outcome, profile, Telling(True, as_json, out), points.stem)
+    return _tell(outcome, profile, Telling(True, as_json, out), started)
 
 
 def _zone(tolerance: tuple[float, float], uncertainty: float) -> ToleranceZone:
+    limits = f"--tolerance {tolerance[0]:g} {tolerance[1]:g}"
     try:
-        return ToleranceZone(*tolerance, uncertainty)
+        return replace(ToleranceZone(*tolerance), uncertainty_mm=uncertainty)
     except ValueError as error:
-        raise PlanError(f"--tolerance {tolerance[0]:g} {tolerance[1]:g}: {error}") from None
+        option = f"{limits} --uncertainty {uncertainty:g}" if uncertainty else limits
+        raise PlanError(f"{option}: {error}") from None
 
 
 @app.command()
@@ -354,13 +402,11 @@ def _nominal_facts(understood: NominalFile) -> dict[str, Any]:
 def check(plan_file: PlanFile) -> int:
     """Check a plan and what it names, not the device."""
     plan = load_plan(plan_file)
-    profile = planned_profile(plan)
-    try:
-        planned_inspection(plan, profile)
-    except ValueError as error:
-        raise PlanError(f"{plan_file}: {error}") from None
+    profile = _checked_profile(plan, plan_file)
+    with _naming(plan_file, "device"):
+        _, device = _source_of(plan)
     zone = plan.tolerance.zone
-    typer.echo(f"{plan_file} can be run: {plan.part.name}, zone {zone.lower_mm:+g} .. {zone.upper_mm:+g} mm")
+    typer.echo(f"{plan_file} can be run: {plan.part.name}, zone {zone.lower_mm:+g} .. {zone.upper_mm:+g} mm, {device}")
     typer.echo(f"nominal {profile.length_mm:.3f} mm long, {len(profile)} samples, material on the {profile.material}")
     return 0
 
