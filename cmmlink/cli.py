@@ -4,6 +4,7 @@
 """
 
 import json
+import math
 import signal
 import subprocess
 import sys
@@ -11,16 +12,16 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
-import click
 import typer
 from rich.console import Console
 
+from cmmlink import __version__
 from cmmlink.demo import plan_file as demo_plan_file
 from cmmlink.demo import write_part_path
 from cmmlink.errors import PlanError, StoreError
@@ -28,9 +29,9 @@ from cmmlink.events import RunStarted, Sink
 from cmmlink.nominal_files import NominalFile, load_nominal, material_side
 from cmmlink.parts import planned_inspection, planned_profile, profile_of
 from cmmlink.pipeline import RunOutcome, run_inspection
-from cmmlink.plan import FileDevice, Plan, load_plan
-from cmmlink.report.folder import write_results
-from cmmlink.report.summary import summary
+from cmmlink.plan import FileDevice, Plan, load_plan, place_of
+from cmmlink.report.folder import prepare, write_results
+from cmmlink.report.summary import identity, summary
 from cmmlink.terminal import LiveTable, print_summary
 from drivers.ascii_frames import AsciiDecoder
 from drivers.errors import DeviceError, LinkError, PointFileError
@@ -40,15 +41,20 @@ from drivers.source import ScanSource
 from inspection import InspectionError, LiveInspection, NominalProfile, ToleranceZone, Verdict
 
 app = typer.Typer(
-    add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help="Inspect profiles while they are scanned."
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 120},
 )
 
 _EXIT = {Verdict.CONFORM: 0, Verdict.NONCONFORM: 1, Verdict.UNCERTAIN: 3}
 _UNUSABLE, _DEVICE_FAILED, _NO_RECORD = 2, 4, 5
+_STOPPED = 130  # Ctrl-C outside a run, as shells and typer have it
 _BUFFER_POINTS = 500_000
 _SIMULATOR_STARTS_S = 20.0
 _DEMO_RATE_HZ, _DEMO_POINTS = 2000, 4000
 
+PlanFile = Annotated[Path, typer.Argument(metavar="PLAN.yaml", help="The inspection plan.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of words.")]
 Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for deviations.csv, result.json and profile.png.")]
 Headless = Annotated[bool, typer.Option("--headless", help="No page, no live table.")]
@@ -92,12 +98,11 @@ class Telling:
 def main() -> None:
     """Run the command line; every error a user can cause ends as one message and an exit code."""
     try:
-        code = app(standalone_mode=False)
-    except click.ClickException as error:
-        error.show()
-        code = error.exit_code
-    except click.Abort:
-        code = _fail("aborted", 130)
+        code = app(prog_name="cmmlink", standalone_mode=False)
+        if code == _STOPPED:
+            _fail("stopped by the operator", _STOPPED)
+    except typer.TyperException as error:
+        code = _fail(_usage(error), _UNUSABLE)
     except (PlanError, InspectionError, PointFileError) as error:
         code = _fail(str(error), _UNUSABLE)
     except DeviceError as error:
@@ -107,31 +112,58 @@ def main() -> None:
     sys.exit(code or 0)
 
 
+def _usage(error: typer.TyperException) -> str:
+    """What is wrong with the arguments, and where to read what is right."""
+    context = getattr(error, "ctx", None)
+    command = context.command_path if context else "cmmlink"
+    problem = " ".join(error.format_message().replace("Value error, ", "").rstrip(".").split())
+    return f"{problem}; `{command} --help` shows what is allowed"
+
+
 def _fail(message: str, code: int) -> int:
     sys.stderr.write(f"cmmlink: {message}\n")
     return code
 
 
+@app.callback(invoke_without_command=True)
+def cmmlink(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Show the version and exit.")] = False,
+) -> None:
+    """Acquire points from coordinate measuring machines and scanners and judge every one against the nominal profile as it arrives.
+
+    Exit status: 0 conform, 1 nonconform, 3 uncertain; 2 unusable input or plan, 4 device or link failure, 5 the record could not be kept.
+    """
+    if version:
+        typer.echo(f"cmmlink {__version__}")
+        raise typer.Exit
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+        raise typer.Exit(_UNUSABLE)
+
+
 @app.command()
 def demo(
     headless: Headless = False,
-    seed: Annotated[int, typer.Option(min=0, help="Another seed is another part.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, metavar="N", help="Another seed is another part.")] = 1,
     defect: Annotated[str | None, typer.Option(metavar="MM@STATION", help="A local defect, like 0.12@40.")] = None,
     out: Out = Path("demo-result"),
     as_json: Json = False,
 ) -> int:
     """Run the whole chain on a simulated device, no set-up."""
     plan = load_plan(demo_plan_file())
-    profile = planned_profile(plan)
+    profile = _checked_profile(plan, demo_plan_file())
+    bump = None if defect is None else _defect(defect, profile.length_mm)
+    prepare(out)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "path.csv"
         write_part_path(profile.curve, path)
-        arguments = ["--path", str(path), *_demo_motion(plan, profile, seed, defect)]
+        arguments = ["--path", str(path), *_demo_motion(plan, profile, seed, bump)]
         with _simulator("serial", arguments) as address:
             return _run(plan.with_address(address), profile, Telling(headless, as_json, out), simulated=True)
 
 
-def _demo_motion(plan: Plan, profile: NominalProfile, seed: int, defect: str | None) -> list[str]:
+def _demo_motion(plan: Plan, profile: NominalProfile, seed: int, defect: tuple[float, float] | None) -> list[str]:
     """Arguments of the simulator: form error and noise well inside the tolerance, an arbitrary pose on the table."""
     zone = plan.tolerance.zone
     speed = profile.length_mm * _DEMO_RATE_HZ / _DEMO_POINTS
@@ -148,17 +180,21 @@ def _demo_motion(plan: Plan, profile: NominalProfile, seed: int, defect: str | N
     arguments = [text for name, value in motion.items() for text in (f"--{name}", f"{value:.17g}")]
     arguments += ["--translation-mm", "210", "145", "60"]
     if defect is not None:
-        height, station = _defect(defect)
-        arguments += ["--defect-mm", str(height), "--defect-station-mm", str(station)]
+        arguments += ["--defect-mm", str(defect[0]), "--defect-station-mm", str(defect[1])]
     return arguments
 
 
-def _defect(text: str) -> tuple[float, float]:
+def _defect(text: str, length_mm: float) -> tuple[float, float]:
+    """Height and station of a defect, both in mm."""
     height, _, station = text.partition("@")
     try:
-        return float(height), float(station)
+        bump = float(height), float(station)
     except ValueError:
-        raise PlanError(f"--defect {text}: expected MM@STATION, like 0.12@40 for 0.12 mm of excess at station 40 mm") from None
+        bump = math.nan, math.nan
+    if not (math.isfinite(bump[0]) and 0 <= bump[1] <= length_mm):
+        meaning = f"expected MM@STATION, a station between 0 and {length_mm:.1f} mm"
+        raise PlanError(f"--defect {text}: {meaning}, like 0.12@40 for 0.12 mm of excess at station 40 mm")
+    return bump
 
 
 @contextmanager
@@ -166,7 +202,8 @@ def _simulator(device: str, arguments: Sequence[str]) -> Iterator[str]:
     """A simulated device as a process of its own; gives the address it serves."""
     address = "127.0.0.1:0" if sys.platform == "win32" else "pty"
     command = [sys.executable, "-m", "cmmlink", "simulate", device, "--address", address, *arguments]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    # In a session of its own: Ctrl-C is for the run, which then stops the device.
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
     assert process.stdout is not None
     assert process.stderr is not None
     with process.stdout, process.stderr:
@@ -182,15 +219,34 @@ def _simulator(device: str, arguments: Sequence[str]) -> Iterator[str]:
 
 @app.command()
 def run(
-    plan_file: Annotated[Path, typer.Argument(metavar="PLAN.yaml")],
+    plan_file: PlanFile,
     headless: Headless = False,
     out: Out = None,
     as_json: Json = False,
 ) -> int:
     """Acquire and inspect with the device of a plan."""
     plan = load_plan(plan_file)
-    profile = planned_profile(plan)
+    profile = _checked_profile(plan, plan_file)
+    prepare(out or plan.out)
     return _run(plan, profile, Telling(headless, as_json, out or plan.out))
+
+
+def _checked_profile(plan: Plan, plan_file: Path) -> NominalProfile:
+    """The profile of a plan whose other values, too, are fit for it; a PlanError names file, line and key."""
+    with _naming(plan_file, "nominal.file"):
+        profile = planned_profile(plan)
+    with _naming(plan_file, "probe.tip_radius_mm"):
+        planned_inspection(plan, profile)
+    return profile
+
+
+@contextmanager
+def _naming(plan_file: Path, key: str) -> Iterator[None]:
+    """Put the place in the plan before what is wrong with a value."""
+    try:
+        yield
+    except ValueError as error:
+        raise PlanError(f"{place_of(plan_file, key)}: {error}") from None
 
 
 def _run(plan: Plan, profile: NominalProfile, telling: Telling, simulated: bool = False) -> int:
@@ -198,10 +254,11 @@ def _run(plan: Plan, profile: NominalProfile, telling: Telling, simulated: bool 
     live = planned_inspection(plan, profile)
     source, device = _source_of(plan)
     started = RunStarted(plan.part.name, plan.part.serial_number or "", plan.operator or "", device, simulated)
-    table = LiveTable(Console(stderr=True), plan.tolerance.zone, profile.length_mm)
+    table = LiveTable(Console(stderr=True), plan.tolerance.zone)
     quiet = telling.headless or telling.as_json or not sys.stderr.isatty()
-    outcome = _carry_out(source, live, started, [] if quiet else [table], plan.buffer_points)
-    return _tell(outcome, profile, telling, plan.part.name)
+    with nullcontext() if quiet else table:
+        outcome = _carry_out(source, live, started, [] if quiet else [table], plan.buffer_points)
+    return _tell(outcome, profile, telling, started)
 
 
 def _source_of(plan: Plan) -> tuple[ScanSource, str]:
@@ -214,34 +271,47 @@ def _source_of(plan: Plan) -> tuple[ScanSource, str]:
 
 
 def _carry_out(source: ScanSource, live: LiveInspection, started: RunStarted, sinks: Sequence[Sink], buffer_points: int) -> RunOutcome:
-    """Run to the end, or to Ctrl-C."""
+    """Run to the end, or to Ctrl-C; a second one ends at once."""
     stop = threading.Event()
-    before = signal.signal(signal.SIGINT, lambda *_: stop.set())
+
+    def interrupted(*_: object) -> None:
+        stop.set()
+        signal.signal(signal.SIGINT, before)
+
+    before = signal.signal(signal.SIGINT, interrupted)
     try:
         return run_inspection(source, live, sinks, started, buffer_points=buffer_points, clock=time.monotonic, stop=stop)
     finally:
         signal.signal(signal.SIGINT, before)
 
 
-def _tell(outcome: RunOutcome, profile: NominalProfile, telling: Telling, title: str) -> int:
-    """Print and write the outcome; the exit code."""
-    facts = summary(outcome.result, outcome.counts)
-    if telling.out is not None:
-        write_results(telling.out, facts, outcome.result, profile, title)
+def _tell(outcome: RunOutcome, profile: NominalProfile, telling: Telling, started: RunStarted) -> int:
+    """Print and write the outcome, the verdict first, whatever happens to the files; the exit code."""
+    facts = summary(outcome.result, outcome.counts) | identity(started)
     message = str(outcome.failure or outcome.refusal or "")
     if outcome.ending == "aborted":
-        message = message or "aborted by the operator"
+        message = message or "stopped by the operator: the scan is not complete"
+    if message:
+        sys.stderr.write(f"cmmlink: {message}\n")
     if telling.as_json:
         _print_json(facts)
     else:
-        print_summary(Console(highlight=False, soft_wrap=True), outcome.result, outcome.counts, "")
-        if telling.out is not None:
-            typer.echo(f"results in {telling.out}")
-    if message:
-        sys.stderr.write(f"cmmlink: {message}\n")
+        print_summary(Console(highlight=False, soft_wrap=not sys.stdout.isatty()), outcome.result, outcome.counts, _heading(started))
+    if telling.out is not None:
+        written = write_results(telling.out, facts, outcome.result, profile, _title(started))
+        if not telling.as_json:
+            typer.echo(f"results in {telling.out}: {', '.join(written)}")
     if outcome.failure is not None:
         return _DEVICE_FAILED
     return _UNUSABLE if outcome.result is None else _EXIT[outcome.result.verdict]
+
+
+def _title(started: RunStarted) -> str:
+    return " ".join(filter(None, [started.part, started.serial_number]))
+
+
+def _heading(started: RunStarted) -> str:
+    return f"{_title(started)}, {'SIMULATED device, ' if started.simulated else ''}{started.device}"
 
 
 def _print_json(facts: dict[str, Any]) -> None:
@@ -250,7 +320,7 @@ def _print_json(facts: dict[str, Any]) -> None:
 
 @app.command()
 def inspect(
-    points: Annotated[Path, typer.Argument(metavar="POINTS")],
+    points: Annotated[Path, typer.Argument(metavar="POINTS", help="Measured points: csv, txt, asc, xyz or npy.")],
     nominal: Annotated[Path, typer.Option(metavar="FILE", help="The nominal profile.")],
     tolerance: Annotated[tuple[float, float], typer.Option(metavar="LO HI", help="Deviations allowed, mm, positive out of material.")],
     method: Annotated[MethodName, typer.Option(help="How deviations are found.")] = MethodName.EXACT,
@@ -260,7 +330,9 @@ def inspect(
     scale: Annotated[float, typer.Option(metavar="S", help="Units of the nominal file to mm (a chord, for airfoils).")] = 1.0,
     closed: Annotated[bool | None, typer.Option("--closed/--open", help="Close the nominal, or leave it open.")] = None,
     material: Annotated[Side | None, typer.Option(help="Side of the material, seen along the nominal.")] = None,
-    coverage_min: Annotated[float, typer.Option(min=0, max=1, help="Share of the nominal to be measured before conform is proven.")] = 0.0,
+    coverage_min: Annotated[
+        float, typer.Option(min=0, max=1, metavar="SHARE", help="Share of the nominal to be measured before conform is proven.")
+    ] = 0.0,
     out: Out = None,
     as_json: Json = False,
 ) -> int:
@@ -271,25 +343,29 @@ def inspect(
     try:
         live = LiveInspection(profile, zone, fit=fit.value, method=method.value, tip_radius_mm=tip_radius, coverage_min=coverage_min)
     except ValueError as error:
-        raise PlanError(str(error)) from None
-    outcome = _carry_out(source, live, RunStarted(points.stem, "", "", f"file {points.name}", False), [], _BUFFER_POINTS)
+        raise PlanError(f"--tip-radius {tip_radius:g}: {error}") from None
+    prepare(out)
+    started = RunStarted(points.stem, "", "", f"file {points.name}", False)
+    outcome = _carry_out(source, live, started, [], _BUFFER_POINTS)
     if outcome.refusal is not None:
         raise PlanError(f"{points}: {outcome.refusal}")
-    return _tell(outcome, profile, Telling(True, as_json, out), points.stem)
+    return _tell(outcome, profile, Telling(True, as_json, out), started)
 
 
 def _zone(tolerance: tuple[float, float], uncertainty: float) -> ToleranceZone:
+    limits = f"--tolerance {tolerance[0]:g} {tolerance[1]:g}"
     try:
-        return ToleranceZone(*tolerance, uncertainty)
+        return replace(ToleranceZone(*tolerance), uncertainty_mm=uncertainty)
     except ValueError as error:
-        raise PlanError(f"--tolerance {tolerance[0]:g} {tolerance[1]:g}: {error}") from None
+        option = f"{limits} --uncertainty {uncertainty:g}" if uncertainty else limits
+        raise PlanError(f"{option}: {error}") from None
 
 
 @app.command()
 def nominal(
-    file: Annotated[Path, typer.Argument(metavar="FILE")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The nominal profile: UIUC dat, points, or nurbs yaml.")],
     scale: Annotated[float, typer.Option(metavar="S", help="Units of the file to mm.")] = 1.0,
-    closed: Annotated[bool | None, typer.Option("--closed/--open")] = None,
+    closed: Annotated[bool | None, typer.Option("--closed/--open", help="Close the nominal, or leave it open.")] = None,
     as_json: Json = False,
 ) -> int:
     """Show what was understood of a nominal file."""
@@ -323,16 +399,14 @@ def _nominal_facts(understood: NominalFile) -> dict[str, Any]:
 
 
 @app.command()
-def check(plan_file: Annotated[Path, typer.Argument(metavar="PLAN.yaml")]) -> int:
-    """Check a plan and everything it names, without touching the device."""
+def check(plan_file: PlanFile) -> int:
+    """Check a plan and what it names, not the device."""
     plan = load_plan(plan_file)
-    profile = planned_profile(plan)
-    try:
-        planned_inspection(plan, profile)
-    except ValueError as error:
-        raise PlanError(f"{plan_file}: {error}") from None
+    profile = _checked_profile(plan, plan_file)
+    with _naming(plan_file, "device"):
+        _, device = _source_of(plan)
     zone = plan.tolerance.zone
-    typer.echo(f"{plan_file} can be run: {plan.part.name}, zone {zone.lower_mm:+g} .. {zone.upper_mm:+g} mm")
+    typer.echo(f"{plan_file} can be run: {plan.part.name}, zone {zone.lower_mm:+g} .. {zone.upper_mm:+g} mm, {device}")
     typer.echo(f"nominal {profile.length_mm:.3f} mm long, {len(profile)} samples, material on the {profile.material}")
     return 0
 
@@ -348,14 +422,20 @@ def list_ports() -> int:
     return 0
 
 
-@app.command(context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
-def simulate(context: typer.Context, device: Annotated[str, typer.Argument(metavar="DEVICE")]) -> int:
-    """Serve a simulated device: cmmlink simulate serial --address A --path POINTS [--rate HZ] [--fault SPEC ...]."""
-    from simulators import serial_scanner  # noqa: PLC0415 - only this command knows simulators
+@app.command(add_help_option=False, context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
+def simulate(context: typer.Context, device: Annotated[str, typer.Argument(metavar="DEVICE")] = "") -> int:
+    """Serve a simulated device."""
+    from simulators.settings import devices, say, settings_from  # noqa: PLC0415 - only this command knows simulators
 
-    devices = {"serial": serial_scanner}
-    if device not in devices:
-        raise PlanError(f"no simulated device is called {device}; known: {', '.join(devices)}")
-    simulator = devices[device]
-    simulator.serve(simulator.settings_from(context.args), simulator.say)
+    known = devices()
+    if device in ("-h", "--help"):
+        settings_from(["--help"], f"cmmlink simulate {{{','.join(sorted(known))}}}")
+    if device not in known:
+        problem = f"no simulated device is called {device}" if device else "name the device to simulate"
+        raise PlanError(f"{problem}; known: {', '.join(sorted(known))}; `cmmlink simulate --help` shows their options")
+    settings = settings_from(context.args, f"cmmlink simulate {device}")
+    try:
+        known[device](settings, say)
+    except (ValueError, OSError) as error:
+        raise LinkError(f"the simulated device cannot serve {settings.address}: {error}") from None
     return 0

@@ -16,7 +16,7 @@ def profile_of(file: NominalFile, path: Path, material: Material | None) -> Nomi
     """The discretised nominal; material inside a closed profile unless it is told otherwise."""
     side = material or material_side(file.curve)
     if side is None:
-        raise PlanError(f"{path}: an open profile does not show on which side its material lies; say material left or right")
+        raise PlanError(f"{path}: an open profile does not show on which side its material lies; say --material left or --material right")
     return discretize(file.curve, material=side)
 
 
@@ -26,7 +26,9 @@ def planned_profile(plan: Plan) -> NominalProfile:
     file = load_nominal(nominal.file, nominal.scale, nominal.closed)
     side = nominal.material or material_side(file.curve)
     if side is None:
-        raise PlanError(f"{nominal.file}: an open profile does not show on which side its material lies; set nominal: material")
+        raise PlanError(
+            f"{nominal.file}: an open profile does not show on which side its material lies; set nominal.material to left or right"
+        )
     return discretize(file.curve, finely.samples, finely.pole_angle_min_deg, finely.step_min, side)
 
 

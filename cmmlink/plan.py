@@ -46,7 +46,7 @@ import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
 from cmmlink.errors import PlanError, YamlError
-from cmmlink.yaml_model import read_model
+from cmmlink.yaml_model import line_of, read_model
 from drivers.errors import PointFileError
 from drivers.point_file import read_text
 from inspection.tolerance import ToleranceZone
@@ -230,6 +230,11 @@ def load_plan(path: Path) -> Plan:
     except YamlError as error:
         raise PlanError(f"{path}: {error}") from None
     return _with_paths_from(path.resolve().parent, plan)
+
+
+def place_of(path: Path, key: str) -> str:
+    """Where a key of a plan stands, for messages about its value: file, line and key."""
+    return f"{path}: line {line_of(read_text(path), key)}: {key}"
 
 
 def _with_paths_from(folder: Path, plan: Plan) -> Plan:

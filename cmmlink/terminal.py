@@ -1,52 +1,64 @@
 """The live table of a run and its summary, in the terminal."""
 
 import math
+from collections.abc import Iterator
 
+import numpy as np
 from rich.console import Console, Group
 from rich.live import Live
+from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn
 from rich.table import Table
 
-from cmmlink.events import Arrived, Counts, Event, Judged, RunFinished, RunStarted
+from cmmlink.events import Arrived, Counts, Event, Judged, RunStarted
 from drivers.source import LinkDown, LinkUp, ScanOpened
 from inspection import InspectionResult, LiveUpdate, ToleranceZone, Verdict
 
 WORDS = {Verdict.CONFORM: "CONFORM", Verdict.UNCERTAIN: "NOT PROVEN", Verdict.NONCONFORM: "NOT CONFORM"}
 _STYLES = {Verdict.CONFORM: "bold green", Verdict.UNCERTAIN: "bold yellow", Verdict.NONCONFORM: "bold red"}
 _REPAINTS_PER_S = 8
+_WHOLE = 0.95  # of the nominal's length: below it the summary says that the rest is unknown
+_MOST_STRETCHES = 10
 
 
 class LiveTable:
-    """A sink that keeps a table of the run on the screen until the run is over."""
+    """A sink that keeps a table of the run on the screen, for as long as it is entered as a context."""
 
-    def __init__(self, console: Console, zone: ToleranceZone, length_mm: float) -> None:
-        self._zone, self._length = zone, length_mm
+    def __init__(self, console: Console, zone: ToleranceZone) -> None:
+        self._zone = zone
         self._progress = Progress(TextColumn("{task.description}"), BarColumn(bar_width=40), MofNCompleteColumn(), console=console)
         self._bar: TaskID = self._progress.add_task("points", total=None)
-        self._live = Live(console=console, refresh_per_second=_REPAINTS_PER_S, transient=True)
         self._started: RunStarted | None = None
-        self._begin_s = self._now_s = 0.0
+        self._begin_s: float | None = None
+        self._now_s = 0.0
         self._counts = Counts()
         self._update: LiveUpdate | None = None
         self._worst = self._worst_station = math.nan
-        self._link = "open"
+        self._link = "waiting for the device"
+        self._live = Live(console=console, get_renderable=self._screen, refresh_per_second=_REPAINTS_PER_S, transient=True)
+
+    def __enter__(self) -> "LiveTable":
+        self._live.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Clear the table, also when the run ended with an error."""
+        self._live.stop()
 
     def __call__(self, event: Event) -> None:
-        """Take one event; repainting is rich's business, a few times a second."""
+        """Take one event; painting is rich's business, a few times a second."""
         if isinstance(event, RunStarted):
             self._started = event
-            self._live.start()
         elif isinstance(event, Arrived):
             self._arrived(event)
         elif isinstance(event, Judged):
             self._judged(event)
         else:
             self._counts = event.counts
-            self._live.stop()
-        if not isinstance(event, RunFinished):
-            self._live.update(Group(self._table(), self._progress))
 
     def _arrived(self, event: Arrived) -> None:
+        if self._begin_s is None:
+            self._begin_s, self._link = event.time_s, "open"
         if isinstance(event.arrival, ScanOpened):
             self._progress.update(self._bar, total=event.arrival.expected)
             self._begin_s = event.time_s
@@ -56,29 +68,35 @@ class LiveTable:
             self._link = f"open again after {event.arrival.gap_s:.1f} s"
 
     def _judged(self, event: Judged) -> None:
-        self._counts, self._update, self._now_s = event.counts, event.update, event.time_s
+        update = event.update
+        self._counts, self._update, self._now_s = event.counts, update, event.time_s
         self._progress.update(self._bar, completed=event.counts.received)
-        off = [math.nan if math.isnan(d) else abs(d - self._zone.middle_mm) for d in event.update.deviation_mm]
-        if event.update.first == 0:
+        if update.first == 0:
             self._worst = math.nan
-        for index, value in enumerate(off):
-            if not math.isnan(value) and not value <= abs(self._worst - self._zone.middle_mm):
-                self._worst, self._worst_station = float(event.update.deviation_mm[index]), float(event.update.station_mm[index])
+        off = np.abs(update.deviation_mm - self._zone.middle_mm)
+        if np.isfinite(off).any():
+            index = int(np.nanargmax(off))
+            if not off[index] <= abs(self._worst - self._zone.middle_mm):
+                self._worst, self._worst_station = float(update.deviation_mm[index]), float(update.station_mm[index])
 
-    def _table(self) -> Table:
+    def _screen(self) -> Group:
+        counts, started = self._counts, self._started
+        elapsed_s = self._now_s - (self._begin_s or 0.0)
+        rate = counts.received / elapsed_s if elapsed_s > 0 else 0.0
+        rows = {
+            "part": " ".join(filter(None, [started.part, started.serial_number])) if started else "",
+            "device": f"{'SIMULATED, ' if started.simulated else ''}{started.device}" if started else "",
+            "link": self._link,
+            "points": f"{counts.received} received, {counts.judged} judged, {counts.rejected} rejected, {counts.lost} lost",
+            "rate": f"{rate:.0f} points/s",
+            "registration": self._registration(),
+            "worst": self._worst_words(),
+            "verdict": self._verdict(),
+        }
         table = Table.grid(padding=(0, 3))
-        part = self._started
-        counts = self._counts
-        elapsed = self._now_s - self._begin_s
-        rate = counts.received / elapsed if elapsed > 0 else 0.0
-        if part is not None:
-            table.add_row("part", " ".join(filter(None, [part.part, part.serial_number])), "device", part.device)
-        table.add_row("received", f"{counts.received}", "judged", f"{counts.judged}")
-        table.add_row("rejected", f"{counts.rejected}", "lost", f"{counts.lost}")
-        table.add_row("rate", f"{rate:.0f} points/s", "link", self._link)
-        table.add_row("registration", self._registration(), "worst", self._worst_words())
-        table.add_row("verdict", self._verdict())
-        return table
+        for name, words in rows.items():
+            table.add_row(name, words)
+        return Group(table, self._progress)
 
     def _registration(self) -> str:
         update = self._update
@@ -96,19 +114,37 @@ class LiveTable:
         return f"[{_STYLES[verdict]}]{WORDS[verdict]}[/] so far"
 
 
-def print_summary(console: Console, result: InspectionResult | None, counts: Counts, message: str) -> None:
-    """Print the four numbers, and what the profile's verdict rests on."""
-    if result is not None:
-        console.print(f"[{_STYLES[result.verdict]}]{WORDS[result.verdict]}[/]" + ("" if result.complete else "  (the scan was cut short)"))
-    console.print(f"received {counts.received} = judged {counts.judged} + rejected {counts.rejected}; lost {counts.lost}")
+def print_summary(console: Console, result: InspectionResult | None, counts: Counts, heading: str) -> None:
+    """Print the verdict, the four numbers, and what the verdict on the profile rests on."""
+    verdict = Verdict.UNCERTAIN if result is None else result.verdict
+    console.print(f"[{_STYLES[verdict]}]{WORDS[verdict]}[/]   {escape(heading)}".rstrip())
+    for reason in _reservations(result):
+        console.print(f"  {reason}", style="yellow")
+    console.print(f"received {counts.received} = judged {counts.judged} + rejected {counts.rejected}; lost {counts.lost} points")
     for reason, count in counts.rejected_by_reason.items():
         console.print(f"  rejected: {count} {reason}")
     if counts.damaged_bytes:
         console.print(f"  damaged: {counts.damaged_bytes} bytes on the line")
     if result is not None and result.worst is not None:
         _print_numbers(console, result)
-    if message:
-        console.print(message, style="bold")
+
+
+def _reservations(result: InspectionResult | None) -> Iterator[str]:
+    """What keeps the verdict from being the last word."""
+    if result is None or result.worst is None:
+        yield "nothing was judged"
+        return
+    near = int(np.count_nonzero(result.verdicts == Verdict.UNCERTAIN))
+    if not result.complete:
+        yield "the scan was cut short"
+    if result.coverage < _WHOLE or (result.verdict == Verdict.UNCERTAIN and result.complete and not near):
+        yield f"only {result.coverage:.1%} of the nominal was measured: nothing is known of the rest"
+    if near:
+        yield f"{near} points lie nearer to a limit than the uncertainty"
+    if not result.registration.converged:
+        yield "the registration did not settle: the last step still moved points"
+    for rival in result.registration.rivals:
+        yield f"the part fits as well turned {math.degrees(rival.rotation_rad):.2f} deg: the pose is ambiguous"
 
 
 def _print_numbers(console: Console, result: InspectionResult) -> None:
@@ -126,15 +162,20 @@ def _print_numbers(console: Console, result: InspectionResult) -> None:
         f"worst {result.deviation_mm[worst]:+.4f} mm at station {result.station_mm[worst]:.2f} mm "
         f"(x {result.actual_mm[worst, 0]:.3f}, y {result.actual_mm[worst, 1]:.3f})"
     )
-    for stretch in result.stretches:
-        console.print(f"  out of tolerance: station {stretch.from_mm:.2f} .. {stretch.to_mm:.2f} mm, worst {stretch.worst_mm:+.4f} mm")
+    _print_stretches(console, result)
     registration = result.registration
     pose = registration.nominal_from_section
-    console.print(
-        f"fit {result.fit}: turned {math.degrees(pose.rotation_rad):.4f} deg, moved ({pose.translation_mm[0]:.4f}, "
-        f"{pose.translation_mm[1]:.4f}) mm, {registration.iterations} steps; method {result.method}; coverage {result.coverage:.1%}"
-    )
-    if not registration.converged:
-        console.print("  the registration did not settle: the last step still moved points", style="yellow")
-    for rival in registration.rivals:
-        console.print(f"  the part fits as well turned {math.degrees(rival.rotation_rad):.2f} deg: the pose is ambiguous", style="yellow")
+    moved = f"({pose.translation_mm[0]:.4f}, {pose.translation_mm[1]:.4f}) mm"
+    console.print(f"fit {result.fit}: turned {math.degrees(pose.rotation_rad):.4f} deg, moved {moved}, {registration.iterations} steps")
+    console.print(f"method {result.method}; coverage {result.coverage:.1%}")
+
+
+def _print_stretches(console: Console, result: InspectionResult) -> None:
+    """List the worst stretches out of tolerance, in station order."""
+    worst_first = sorted(result.stretches, key=lambda stretch: -abs(stretch.worst_mm - result.zone.middle_mm))
+    shown = worst_first[:_MOST_STRETCHES]
+    for stretch in result.stretches:
+        if stretch in shown:
+            console.print(f"  out of tolerance: station {stretch.from_mm:.2f} .. {stretch.to_mm:.2f} mm, worst {stretch.worst_mm:+.4f} mm")
+    if len(worst_first) > len(shown):
+        console.print(f"  out of tolerance: {len(worst_first) - len(shown)} more stretches, none of them worse")

@@ -56,6 +56,15 @@ def read_model(text: str, model: type[Model]) -> Model:
     raise YamlError(f"line {line}: {message}{others}")
 
 
+def line_of(text: str, key: str) -> int:
+    """Line of a dotted key in a text that was read before; of what it stands in, where it is not written out."""
+    lines = _read(text).lines
+    path: Path = tuple(key.split("."))
+    while path and path not in lines:
+        path = path[:-1]
+    return lines.get(path, 1)
+
+
 @dataclass(slots=True)
 class _Document:
     """Plain values of a YAML text, and the line of each by its path."""

@@ -7,6 +7,8 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
+from types import MappingProxyType
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,22 +47,9 @@ def devices() -> Mapping[str, Serve]:
     return found
 
 
-def settings_from(arguments: Sequence[str]) -> SimulatorSettings:
-    """Read the settings from command-line arguments."""
-    parser = argparse.ArgumentParser(description="A simulated device; faults: " + ", ".join(CATALOGUE))
-    parser.add_argument("--address", required=True, help="pty or host:port")
-    parser.add_argument("--path", required=True, type=Path, help="points of the path on the part, mm")
-    parser.add_argument("--fault", action="append", default=[], metavar="NAME[:VALUE][@POINT]")
-    parser.add_argument("--unpaced", action="store_true", help="as fast as the client takes the points")
-    parser.add_argument("--rate", dest="rate_hz", type=float, default=1000.0, help="points per second")
-    parser.add_argument("--speed", dest="speed_mm_s", type=float, default=50.0, help="mm per second along the path")
-    parser.add_argument("--open", dest="closed", action="store_false", help="the path is open")
-    parser.add_argument("--backward", action="store_true")
-    for name, kind in (("count", int), ("seed", int), ("form_error_mm", float), ("noise_mm", float), ("tip_radius_mm", float)):
-        parser.add_argument("--" + name.replace("_", "-"), type=kind)
-    for name in ("defect_mm", "defect_station_mm", "rotation_deg", "start_mm"):
-        parser.add_argument("--" + name.replace("_", "-"), type=float)
-    parser.add_argument("--translation-mm", type=float, nargs=3)
+def settings_from(arguments: Sequence[str], program: str | None = None) -> SimulatorSettings:
+    """Read the settings from command-line arguments; `program` is how the caller is called, for the help."""
+    parser = _parser(program)
     given = {name: value for name, value in vars(parser.parse_args(arguments)).items() if value is not None}
     if "translation_mm" in given:
         given["translation_mm"] = tuple(given["translation_mm"])
@@ -68,8 +57,55 @@ def settings_from(arguments: Sequence[str]) -> SimulatorSettings:
         motion = Motion(**{field.name: given[field.name] for field in fields(Motion) if field.name in given})
         faults = tuple(Fault.parse(text) for text in given["fault"])
         return SimulatorSettings(given["address"], read_path(given["path"]), motion, faults, not given["unpaced"])
+    except FileNotFoundError:
+        parser.error(f"{given['path']}: no such file")
     except (ValueError, OSError) as error:
         parser.error(str(error))
+
+
+class _OneLine(argparse.ArgumentParser):
+    """A parser whose errors are one message, without the usage before it."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"{self.prog}: {message}; `{self.prog} --help` shows what is allowed\n")
+
+
+def _parser(program: str | None) -> argparse.ArgumentParser:
+    faults = "\n".join(f"  {name:18}{kind.meaning} [{kind.default:g}]" for name, kind in CATALOGUE.items())
+    parser = _OneLine(
+        prog=program,
+        usage="%(prog)s --address A --path POINTS [OPTIONS]",
+        description="A simulated device that streams one scan; its first line of output is the address it serves.",
+        epilog=f"faults, from point number POINT on, with the value and its default:\n{faults}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--address", required=True, metavar="A", help="pty, or host:port (port 0: any free one)")
+    parser.add_argument("--path", required=True, type=Path, metavar="POINTS", help="points of the path on the part, mm")
+    parser.add_argument("--fault", action="append", default=[], metavar="NAME[:VALUE][@POINT]", help="may be given several times")
+    parser.add_argument("--unpaced", action="store_true", help="as fast as the client takes the points")
+    parser.add_argument("--rate", dest="rate_hz", type=float, default=1000.0, metavar="HZ", help="points per second [%(default)g]")
+    parser.add_argument("--speed", dest="speed_mm_s", type=float, default=50.0, metavar="MM_S", help="mm per second [%(default)g]")
+    parser.add_argument("--count", type=int, metavar="N", help="points to send [once along the path]")
+    parser.add_argument("--open", dest="closed", action="store_false", help="the path is open")
+    parser.add_argument("--backward", action="store_true", help="against the order of the path")
+    parser.add_argument("--seed", type=int, metavar="N", help="of form error, noise and faults [0]")
+    for name, meaning in _MILLIMETRES.items():
+        parser.add_argument(f"--{name}-mm", type=float, metavar="MM", help=meaning)
+    parser.add_argument("--rotation-deg", type=float, metavar="DEG", help="how the part is turned on the machine")
+    parser.add_argument("--translation-mm", type=float, nargs=3, metavar=("X", "Y", "Z"), help="where the part lies on the machine")
+    return parser
+
+
+_MILLIMETRES: Mapping[str, str] = MappingProxyType(
+    {
+        "form-error": "largest deviation of the smooth form error",
+        "noise": "standard deviation of the noise",
+        "tip-radius": "send centres of a ball of this radius",
+        "defect": "height of a local defect",
+        "defect-station": "where along the path the defect is",
+        "start": "where along the path the scan begins",
+    }
+)
 
 
 def say(text: str) -> None:

@@ -1,6 +1,9 @@
 """The folder of results that `--out` asks for."""
 
 import json
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -9,15 +12,36 @@ from cmmlink.report.deviations_csv import write_deviations
 from inspection import InspectionResult, NominalProfile
 
 
-def write_results(folder: Path, facts: dict[str, Any], result: InspectionResult | None, profile: NominalProfile, title: str) -> None:
-    """Write result.json, and where something was judged deviations.csv and profile.png."""
-    from cmmlink.report.picture import write_picture  # noqa: PLC0415 - matplotlib takes half a second that other commands need not pay
+def prepare(folder: Path | None) -> None:
+    """Make the folder and see that it takes files, before anything is measured in vain. Raises PlanError."""
+    if folder is None:
+        return
+    with _told_of(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
 
-    try:
+
+def write_results(folder: Path, facts: dict[str, Any], result: InspectionResult | None, profile: NominalProfile, title: str) -> list[str]:
+    """Write result.json, and where something was judged deviations.csv and profile.png; their names. Raises PlanError."""
+    with _told_of(folder):
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "result.json").write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
-        if result is not None and result.judged:
-            write_deviations(result, folder / "deviations.csv")
-            write_picture(result, profile, title, folder / "profile.png")
+        for name in ("deviations.csv", "profile.png"):
+            (folder / name).unlink(missing_ok=True)  # an earlier run's must not stand beside this one's result
+        if result is None or not result.judged:
+            return ["result.json"]
+        from cmmlink.report.picture import write_picture  # noqa: PLC0415 - matplotlib takes half a second that other commands need not pay
+
+        write_deviations(result, folder / "deviations.csv")
+        write_picture(result, profile, title, folder / "profile.png")
+    return ["result.json", "deviations.csv", "profile.png"]
+
+
+@contextmanager
+def _told_of(folder: Path) -> Iterator[None]:
+    """Turn what the system says of a folder into a message."""
+    try:
+        yield
     except OSError as error:
         raise PlanError(f"{folder}: the results cannot be written ({error.strerror}); choose another folder with --out") from None

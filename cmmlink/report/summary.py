@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from cmmlink.events import Counts
+from cmmlink.events import Counts, RunStarted
 from inspection import InspectionResult, Registration, Verdict
 
 
@@ -35,6 +35,17 @@ def summary(result: InspectionResult | None, counts: Counts) -> dict[str, Any]:
             "uncertainty_mm": result.zone.uncertainty_mm,
         },
         **tail,
+    }
+
+
+def identity(started: RunStarted) -> dict[str, Any]:
+    """What was measured, by whom and with what: the further keys of a run."""
+    return {
+        "part": started.part,
+        "serial_number": started.serial_number or None,
+        "operator": started.operator or None,
+        "device": started.device,
+        "simulated": started.simulated,
     }
 
 
