@@ -50,11 +50,13 @@ class AsciiDecoder:
         self._pending = b""
         self._overlong = False
         self._out: list[Arrival] = []
+        self._asked = False
         self._begin()
 
     def request(self) -> bytes:
-        """Return the line that tells a waiting device to begin."""
-        return b"G\r\n"
+        """Tell a device that waits for its host, once after each opening of the link, to begin."""
+        asked, self._asked = self._asked, True
+        return b"" if asked else b"G\r\n"
 
     def feed(self, data: bytes) -> list[Arrival]:
         """Decode the next bytes."""
@@ -68,7 +70,7 @@ class AsciiDecoder:
         """Count the begun line, if any, as damaged."""
         if self._pending:
             self._damaged(len(self._pending), "line cut off where the link ended")
-        self._pending, self._overlong = b"", False
+        self._pending, self._overlong, self._asked = b"", False, False
         return self._handed_over()
 
     def _begin(self) -> None:

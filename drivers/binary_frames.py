@@ -52,13 +52,15 @@ class BinaryDecoder:
     def __init__(self) -> None:
         self._pending = b""
         self._out: list[Arrival] = []
+        self._asked = False
         self._damage = 0
         self._away = False
         self._begin()
 
     def request(self) -> bytes:
-        """Return `G`, which tells a waiting device to begin."""
-        return b"G"
+        """Tell a device that waits for its host, once after each opening of the link, to begin."""
+        asked, self._asked = self._asked, True
+        return b"" if asked else b"G"
 
     def feed(self, data: bytes) -> list[Arrival]:
         """Decode the next bytes."""
@@ -76,7 +78,7 @@ class BinaryDecoder:
     def interrupted(self) -> list[Arrival]:
         """Count a begun frame as damaged; the counter may have wrapped when the link comes back."""
         self._damage += len(self._pending)
-        self._pending, self._away = b"", True
+        self._pending, self._away, self._asked = b"", True, False
         return self._handed_over()
 
     def _begin(self) -> None:

@@ -5,16 +5,14 @@ import sys
 from binascii import crc32, crc_hqx
 from collections.abc import Sequence
 
-from .serial_scanner import Sample, stream
+from .serial_scanner import Device, Sample, stream
 from .settings import Announce, SimulatorSettings, say, settings_from
 
 SERIAL_NUMBER = 4711
 
 
-class BinaryDevice:
+class BinaryDevice(Device):
     """One 24-byte frame a point."""
-
-    samples_per_frame = 1
 
     def __init__(self) -> None:
         self._heard = False

@@ -12,7 +12,6 @@ import time
 from binascii import crc_hqx
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -38,34 +37,42 @@ class Sample:
     invalid: bool = False
 
 
-class Device(Protocol):
-    """A wire format as the device speaks it."""
+class Device:
+    """A device as its line sees it; this one only streams, knows no signs of life and no beginning or end."""
 
-    samples_per_frame: int
+    samples_per_frame = 1
 
     def opening(self, count: int) -> bytes:
         """Return what precedes the first point."""
+        return b""
 
     def frame(self, samples: Sequence[Sample]) -> bytes:
         """Return the frame of up to `samples_per_frame` consecutive points."""
+        raise NotImplementedError
 
     def heartbeat(self, index: int, time_s: float) -> bytes:
         """Return the sign of life before point number `index`."""
+        return b""
 
     def closing(self, count: int) -> bytes:
         """Return what follows the last point."""
+        return b""
 
     def answer(self, command: bytes) -> bytes:
         """Return the reply to bytes from the host."""
+        return b""
 
     def told_to_begin(self) -> bool:
         """Tell whether the host has started the scan."""
+        return True
+
+    def frames_asked_for(self) -> int | None:
+        """Return how many frames the host waits for; None: the device sends them unasked."""
+        return None
 
 
-class AsciiDevice:
+class AsciiDevice(Device):
     """Lines of text with a checksum each: `P,seq,t_us,x,y,z,flags*CRC`."""
-
-    samples_per_frame = 1
 
     def __init__(self) -> None:
         self._heard = b""
@@ -164,6 +171,9 @@ class _Scan:
         count, step = len(self._scan.time_s), self._device.samples_per_frame
         taken = int(np.searchsorted(self._scan.time_s, elapsed_s, side="right")) if self._paced else index + BURST_POINTS
         end = self._injector.before_next_event(index, count)
+        asked = self._device.frames_asked_for()
+        if asked is not None:
+            return min(taken, end, index + step * asked)
         return end if taken >= end else index + max(0, taken - index) // step * step
 
     def _frame(self, first: int, stop: int) -> bytes:
@@ -204,7 +214,7 @@ class _Scan:
             if alive and now_s >= next_beat_s:
                 self._send(self._device.heartbeat(index, float(self._scan.time_s[index])))
                 next_beat_s += HEARTBEAT_S
-            self._line.receive(min(0.02, end_s - now_s))
+            self._listen(min(0.02, max(0.0, end_s - now_s)))
 
     def _listen(self, wait_s: float) -> None:
         command = self._line.receive(wait_s)

@@ -157,10 +157,10 @@ def test_a_heartbeat_puts_a_wrong_guess_right() -> None:
     assert account(decoder.feed(beat)).lost == -65536 * 2
 
 
-@pytest.mark.parametrize("size", [1, 1024])
+@pytest.mark.parametrize("size", [1, 64])
 def test_a_million_points_with_flipped_bits_give_no_wrong_point_and_the_true_loss(size: int) -> None:
     count = 1_000_000
-    data, sent_mm = single(count) if size == 1 else blocks(count, 64)
+    data, sent_mm = single(count) if size == 1 else blocks(count, size)
     damaged = data[:72] + flipped(data[72:-72], 1e-4, np.random.default_rng(4)) + data[-72:]
     book = decoded(BinaryDecoder(), damaged, range(1024, len(damaged), 1024))
     only_sent_points(book, sent_mm, within_mm=0.0)
