@@ -35,10 +35,8 @@ def running_sensor(sensor: str, folder: Path, *options: str, count: int) -> Abst
 def test_a_fed_sensor_gives_the_surface(sensor: str, tmp_path: Path) -> None:
     make, within_mm = SENSORS[sensor]
     truth_mm = fed(SURFACE_MM, Motion(SPEED_MM_S, RATE_HZ, count=COUNT)).points_mm
-    with simulated(
-        sensor, "127.0.0.1:0", tmp_path, path_mm=SURFACE_MM, count=COUNT, rate_hz=RATE_HZ, speed_mm_s=SPEED_MM_S, noise_mm=0.0
-    ) as running:
-        source = ConstantFeed(SerialScanner(running.address, decoder), BEAM, SPEED_MM_S)
+    with running_sensor(sensor, tmp_path, count=COUNT) as running:
+        source = ConstantFeed(SerialScanner(running.address, make()), BEAM, SPEED_MM_S)
         book = account(source.arrivals())
     assert book.sequence == list(range(COUNT))
     np.testing.assert_allclose(np.array(book.points_mm)[:, 1:], truth_mm[:, 1:], atol=within_mm)
