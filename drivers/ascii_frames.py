@@ -22,10 +22,9 @@ import re
 from binascii import crc_hqx
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .errors import ProtocolError
-from .sequence import SequenceCounter
+from .sequence import SequenceCounter, WrappingClock
 from .source import Arrival, Damaged, Heartbeat, Lost, PointBatch, Rejected, ScanClosed, ScanOpened
 
 MM_PER_UNIT = {"mm": 1.0, "um": 1e-3, "cm": 10.0, "m": 1000.0, "inch": 25.4}
@@ -51,11 +50,13 @@ class AsciiDecoder:
         self._pending = b""
         self._overlong = False
         self._out: list[Arrival] = []
+        self._asked = False
         self._begin()
 
     def request(self) -> bytes:
-        """Return the line that tells a waiting device to begin."""
-        return b"G\r\n"
+        """Tell a device that waits for its host, once after each opening of the link, to begin."""
+        asked, self._asked = self._asked, True
+        return b"" if asked else b"G\r\n"
 
     def feed(self, data: bytes) -> list[Arrival]:
         """Decode the next bytes."""
@@ -69,14 +70,13 @@ class AsciiDecoder:
         """Count the begun line, if any, as damaged."""
         if self._pending:
             self._damaged(len(self._pending), "line cut off where the link ended")
-        self._pending, self._overlong = b"", False
+        self._pending, self._overlong, self._asked = b"", False, False
         return self._handed_over()
 
     def _begin(self) -> None:
         self._counter = SequenceCounter(WRAP)
         self._closed = False
-        self._last_raw_us: int | None = None
-        self._last_us = 0
+        self._clock = WrappingClock(WRAP, 1e6)
         self._sequence: list[int] = []
         self._raw_us: list[int] = []
         self._xyz: list[tuple[float, float, float]] = []
@@ -189,16 +189,7 @@ class AsciiDecoder:
             self._out.append(Rejected(len(sequence), "no scan header arrived: the unit is unknown"))
             return
         points_mm = np.array(xyz, dtype=np.float64) * self._mm_per_unit
-        self._out.append(PointBatch(np.array(sequence, dtype=np.int64), self._seconds(raw_us), points_mm))
-
-    def _seconds(self, raw_us: list[int]) -> NDArray[np.float64]:
-        """Unwrap the device's clock; steps back (late frames) stay steps back."""
-        raw = np.array(raw_us, dtype=np.int64)
-        before = raw[0] if self._last_raw_us is None else self._last_raw_us
-        steps = (np.diff(raw, prepend=before) + WRAP // 2) % WRAP - WRAP // 2
-        unwrapped = (int(before) if self._last_raw_us is None else self._last_us) + np.cumsum(steps)
-        self._last_raw_us, self._last_us = raw_us[-1], int(unwrapped[-1])
-        return unwrapped * 1e-6
+        self._out.append(PointBatch(np.array(sequence, dtype=np.int64), self._clock.seconds(np.array(raw_us, dtype=np.int64)), points_mm))
 
     def _handed_over(self) -> list[Arrival]:
         self._flush()

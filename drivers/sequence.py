@@ -1,4 +1,4 @@
-"""What a device's running counter says about each frame: new, behind a gap, late or repeated.
+"""What a device's running counters say: which frame is new, behind a gap, late or repeated, and at what time it was.
 
 Counters wrap; here they are unwrapped. Every number between the first and the last one seen is either received
 or lost, and a number counted as lost that comes late after all is taken back.
@@ -6,6 +6,9 @@ or lost, and a number counted as lost that comes late after all is taken back.
 
 from collections import deque
 from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
 
 GAPS_REMEMBERED = 4096  # bounds the memory; a frame later than that many gaps counts as repeated
 
@@ -41,10 +44,16 @@ class SequenceCounter:
 
     def reach(self, counter: int, near: int | None = None) -> int:
         """Take the device's word that `counter` is the next number; return how many frames are newly lost."""
-        sequence = self.unwrap(counter, near)
-        lost = max(0, sequence - self.expected)
-        self._remember(range(self.expected, sequence))
-        self.expected = max(self.expected, sequence)
+        return self.reach_total(max(self.expected, self.unwrap(counter, near)))
+
+    def reach_total(self, total: int) -> int:
+        """Take the device's word that it has sent `total` frames; return how many are newly lost.
+
+        Negative where a gap longer than the counter's range had been taken for a longer one still.
+        """
+        lost = total - self.expected
+        self._remember(range(self.expected, total))
+        self.expected = total
         return lost
 
     def unwrap(self, counter: int, near: int | None = None) -> int:
@@ -65,3 +74,21 @@ class SequenceCounter:
                 self._remember(range(sequence + 1, gap.stop))
                 return True
         return False
+
+
+class WrappingClock:
+    """Unwraps a device's clock of the given modulus; steps back (late frames) stay steps back."""
+
+    def __init__(self, modulus: int, ticks_per_second: float) -> None:
+        self._modulus = modulus
+        self._ticks_per_second = ticks_per_second
+        self._last_raw: int | None = None
+        self._last = 0
+
+    def seconds(self, raw: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the time of each reading, (m,), m > 0."""
+        before, start = (int(raw[0]), int(raw[0])) if self._last_raw is None else (self._last_raw, self._last)
+        half = self._modulus // 2
+        unwrapped = start + np.cumsum((np.diff(raw, prepend=before) + half) % self._modulus - half)
+        self._last_raw, self._last = int(raw[-1]), int(unwrapped[-1])
+        return np.asarray(unwrapped / self._ticks_per_second)

@@ -59,10 +59,10 @@ class SerialScanner:
         return kept_up(lambda: closing(self._open()), self._scan, reconnect_s=self._reconnect_s, stopped=self._stopped, clock=self._clock)
 
     def _scan(self, port: serial.Serial) -> Iterator[Arrival]:
-        self._write(port, self._decoder.request())
         watch = _Watch(self._silence_s, self._clock())
         try:
             while not self._stopped.is_set():
+                self._write(port, self._decoder.request())
                 data = self._read(port)
                 found: list[Arrival] = []
                 if data:
@@ -70,6 +70,7 @@ class SerialScanner:
                     found = self._decoder.feed(data)
                     yield from found
                 if any(isinstance(arrival, ScanClosed) for arrival in found):
+                    self._write(port, self._decoder.request())
                     return
                 self._judge(watch.saw(data, found, self._clock()))
         except LinkError:

@@ -118,7 +118,7 @@ class Decoder(Protocol):
     """
 
     def request(self) -> bytes:
-        """Return what the host sends each time the link opens; empty for devices that stream by themselves."""
+        """Return what the host has to send now; called when the link opens and after every read, be it empty."""
 
     def feed(self, data: bytes) -> list[Arrival]:
         """Decode the next bytes; raise `ProtocolError` only when no point of this device could ever be used."""

@@ -36,6 +36,11 @@ CATALOGUE: Mapping[str, Kind] = MappingProxyType(
         "stall": Kind("seconds without points, the device being alive", 1.0, once=True),
         "silence": Kind("seconds without any byte", math.inf, once=True),
         "unplug": Kind("seconds for which the line is gone", 0.5, once=True),
+        "restart": Kind("seconds for which a Modbus device is gone before it begins anew", 0.5, once=True),
+        "slow": Kind("seconds that each Modbus answer takes from then on", 0.3),
+        "word-swap": Kind("1: the halves of 32-bit numbers in Modbus registers come swapped", 1),
+        "sentinel": Kind("share of points whose registers hold the value for none", 0.01),
+        "overflow": Kind("number of points that a full Modbus buffer costs; its flag stays set", 20, once=True),
         "die": Kind("exit status with which the device ends at once", 9, once=True),
     }
 )
@@ -72,6 +77,7 @@ class Injector:
         self._held: bytes | None = None
         self._index = 0
         self._done: set[Fault] = set()
+        self._without_value: dict[int, bool] = {}
         self.tally: Counter[str] = Counter()
 
     def invalid(self, index: int) -> bool:
@@ -101,6 +107,29 @@ class Injector:
                 self.tally[name] += 1
                 return fault.value
         return None
+
+    def sentinel(self, index: int) -> bool:
+        """Tell whether this point has no value; the same however often it is asked."""
+        if index not in self._without_value:
+            self._without_value[index] = self._chance("sentinel", index)
+        return self._without_value[index]
+
+    def arrange(self, index: int) -> list[int]:
+        """Return which points, by their numbers, are stored when this one is taken: none, it, or it twice, or it and one held back."""
+        stored = self.frame(index, index.to_bytes(8, "big"))
+        return [int.from_bytes(stored[at : at + 8], "big") for at in range(0, len(stored), 8)]
+
+    def has(self, name: str) -> bool:
+        """Tell whether a fault was asked for at all."""
+        return any(fault.name == name for fault in self._faults)
+
+    def lasting(self, name: str, index: int) -> float:
+        """Return the value of a fault that lasts from its point on; 0 before."""
+        return self._share(name, index)
+
+    def reached(self, index: int) -> None:
+        """Take note of how far the scan is."""
+        self._index = index
 
     def before_next_event(self, index: int, due: int) -> int:
         """Return `due`, or the point before it at which something is to happen once."""

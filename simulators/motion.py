@@ -1,7 +1,7 @@
 """A probe that walks along a path on a part: the points a scanner would stream, and when."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -72,6 +72,21 @@ def walk(path_mm: NDArray[np.float64], motion: Motion) -> Walk:
     points = surface + height[:, None] * outward
     points[:, :2] += rng.normal(0.0, motion.noise_mm, (len(points), 2))
     return Walk(np.arange(len(points)) / motion.rate_hz, _posed(points, motion))
+
+
+def fed(path_mm: NDArray[np.float64], motion: Motion) -> Walk:
+    """Feed the part under a one-dimensional sensor at constant speed along x: points (x, y(x), 0) of the open path y over x.
+
+    Form error, defect and noise act along y, the direction of the beam.
+    """
+    rng = np.random.default_rng(motion.seed)
+    x, y = path_mm[np.argsort(path_mm[:, 0]), :2].T
+    step = motion.speed_mm_s / motion.rate_hz
+    count = motion.count if motion.count is not None else max(1, math.floor((x[-1] - x[0] - motion.start_mm) / step))
+    along = motion.start_mm + step * np.arange(count, dtype=np.float64)
+    height = np.interp(x[0] + along, x, y) + _form_error(along / (x[-1] - x[0]), motion.form_error_mm, rng)
+    height += _defect(along, float(x[-1] - x[0]), replace(motion, closed=False)) + rng.normal(0.0, motion.noise_mm, count)
+    return Walk(np.arange(count) / motion.rate_hz, np.column_stack([x[0] + along, height, np.zeros(count)]))
 
 
 def read_path(path: Path) -> NDArray[np.float64]:

@@ -11,7 +11,7 @@ import sys
 import time
 from binascii import crc_hqx
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -27,29 +27,51 @@ TICK_S = 0.001
 BURST_POINTS = 64  # largest number of points sent at once when the scan is not paced
 
 
-class Device(Protocol):
-    """A wire format as the device speaks it."""
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """One point as the device took it; `invalid`: the device itself distrusts it."""
+
+    index: int
+    time_s: float
+    point_mm: tuple[float, float, float]
+    invalid: bool = False
+
+
+class Device:
+    """A device as its line sees it; this one only streams, knows no signs of life and no beginning or end."""
+
+    samples_per_frame = 1
 
     def opening(self, count: int) -> bytes:
         """Return what precedes the first point."""
+        return b""
 
-    def frame(self, index: int, time_s: float, point_mm: Sequence[float], invalid: bool) -> bytes:
-        """Return the frame of one point."""
+    def frame(self, samples: Sequence[Sample]) -> bytes:
+        """Return the frame of up to `samples_per_frame` consecutive points."""
+        raise NotImplementedError
 
     def heartbeat(self, index: int, time_s: float) -> bytes:
         """Return the sign of life before point number `index`."""
+        return b""
 
     def closing(self, count: int) -> bytes:
         """Return what follows the last point."""
+        return b""
 
     def answer(self, command: bytes) -> bytes:
         """Return the reply to bytes from the host."""
+        return b""
 
     def told_to_begin(self) -> bool:
         """Tell whether the host has started the scan."""
+        return True
+
+    def frames_asked_for(self) -> int | None:
+        """Return how many frames the host waits for; None: the device sends them unasked."""
+        return None
 
 
-class AsciiDevice:
+class AsciiDevice(Device):
     """Lines of text with a checksum each: `P,seq,t_us,x,y,z,flags*CRC`."""
 
     def __init__(self) -> None:
@@ -59,10 +81,11 @@ class AsciiDevice:
         """Say three times which device begins, so that one damaged line does not cost the scan."""
         return 3 * _line(f"S,simulated scanner,SIM-0001,mm,{count}")
 
-    def frame(self, index: int, time_s: float, point_mm: Sequence[float], invalid: bool) -> bytes:
+    def frame(self, samples: Sequence[Sample]) -> bytes:
         """Return one P line."""
-        x, y, z = point_mm
-        return _line(f"P,{index % 2**32},{round(time_s * 1e6) % 2**32},{x:.6f},{y:.6f},{z:.6f},{int(invalid)}")
+        [taken] = samples
+        x, y, z = taken.point_mm
+        return _line(f"P,{taken.index % 2**32},{round(taken.time_s * 1e6) % 2**32},{x:.6f},{y:.6f},{z:.6f},{int(taken.invalid)}")
 
     def heartbeat(self, index: int, time_s: float) -> bytes:
         """Return one H line."""
@@ -92,9 +115,9 @@ def serve(settings: SimulatorSettings, announce: Announce) -> None:
     stream(settings, AsciiDevice(), announce)
 
 
-def stream(settings: SimulatorSettings, device: Device, announce: Announce) -> None:
-    """Serve one scan of any streaming device."""
-    scan = walk(settings.path_mm, settings.motion)
+def stream(settings: SimulatorSettings, device: Device, announce: Announce, taken: Callable[..., Walk] = walk) -> None:
+    """Serve one scan of any streaming device; `taken` moves the probe along the path."""
+    scan = taken(settings.path_mm, settings.motion)
     injector = Injector(settings.faults, settings.motion.seed)
     line = open_line(settings.address)
     try:
@@ -123,7 +146,8 @@ class _Scan:
             paused_s = self._trouble(index)
             start_s += paused_s
             due = self._due(time.monotonic() - start_s, index)
-            self._send(b"".join(map(self._frame, range(index, due))))
+            step = self._device.samples_per_frame
+            self._send(b"".join(self._frame(first, min(first + step, due)) for first in range(index, due, step)))
             index = due
             if self._unplugged:
                 self._line.plug()
@@ -143,15 +167,19 @@ class _Scan:
             self._listen(0.02)
 
     def _due(self, elapsed_s: float, index: int) -> int:
-        """Return the number of points taken by now, ending at the next point at which a fault is to strike."""
-        times = self._scan.time_s
-        due = int(np.searchsorted(times, elapsed_s, side="right")) if self._paced else index + BURST_POINTS
-        return self._injector.before_next_event(index, min(max(due, index), len(times)))
+        """Return the number of points to be sent by now: whole frames, up to the next point at which a fault is to strike."""
+        count, step = len(self._scan.time_s), self._device.samples_per_frame
+        taken = int(np.searchsorted(self._scan.time_s, elapsed_s, side="right")) if self._paced else index + BURST_POINTS
+        end = self._injector.before_next_event(index, count)
+        asked = self._device.frames_asked_for()
+        if asked is not None:
+            return min(taken, end, index + step * asked)
+        return end if taken >= end else index + max(0, taken - index) // step * step
 
-    def _frame(self, index: int) -> bytes:
-        point = self._scan.points_mm[index].tolist()
-        frame = self._device.frame(index, float(self._scan.time_s[index]), point, self._injector.invalid(index))
-        return self._injector.frame(index, frame)
+    def _frame(self, first: int, stop: int) -> bytes:
+        times, points = self._scan.time_s, self._scan.points_mm
+        samples = [Sample(i, float(times[i]), tuple(points[i].tolist()), self._injector.invalid(i)) for i in range(first, stop)]
+        return self._injector.frame(first, self._device.frame(samples))
 
     def _send(self, data: bytes) -> None:
         if data:
@@ -186,7 +214,7 @@ class _Scan:
             if alive and now_s >= next_beat_s:
                 self._send(self._device.heartbeat(index, float(self._scan.time_s[index])))
                 next_beat_s += HEARTBEAT_S
-            self._line.receive(min(0.02, end_s - now_s))
+            self._listen(min(0.02, max(0.0, end_s - now_s)))
 
     def _listen(self, wait_s: float) -> None:
         command = self._line.receive(wait_s)

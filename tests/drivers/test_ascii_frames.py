@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from drivers.ascii_frames import LONGEST_LINE, AsciiDecoder
 from drivers.errors import ProtocolError
 from drivers.source import Damaged, Heartbeat, ScanClosed, ScanOpened
-from simulators.serial_scanner import AsciiDevice
+from simulators.serial_scanner import AsciiDevice, Sample
 from tests.drivers.streams import account, any_cut_is_the_same, decoded, flipped, only_sent_points
 
 # Written by hand from the format's definition; the checksums by the bitwise CRC-16/CCITT-FALSE below, not by the decoder's library call.
@@ -58,7 +58,7 @@ def test_golden_bytes() -> None:
 
 def test_the_simulated_device_writes_the_golden_bytes() -> None:
     device = AsciiDevice()
-    point = device.frame(1, 0.0015, (1.50001, -2.25001, 0.12501), invalid=False)
+    point = device.frame([Sample(1, 0.0015, (1.50001, -2.25001, 0.12501))])
     assert decoded(AsciiDecoder("mm"), point).points_mm == [(1.50001, -2.25001, 0.12501)]
     assert point == line("P,1,1500,1.500010,-2.250010,0.125010,0")
     assert device.heartbeat(2, 0.002) == b"H,2,2000*F518\r\n"
@@ -182,7 +182,7 @@ def test_a_million_points_with_flipped_bits_give_no_wrong_point_and_the_true_los
     device, rng = AsciiDevice(), np.random.default_rng(4)
     sent_mm = np.round(rng.uniform(-100, 100, (count, 3)), 6)
     opening = device.opening(count)
-    body = b"".join(device.frame(i, i * 1e-4, point, invalid=False) for i, point in enumerate(sent_mm.tolist()))
+    body = b"".join(device.frame([Sample(i, i * 1e-4, point)]) for i, point in enumerate(sent_mm.tolist()))
     damaged = flipped(opening + body, 1e-4, rng, first=len(opening)) + device.closing(count)
     book = decoded(AsciiDecoder(), damaged, range(1024, len(damaged), 1024))
     only_sent_points(book, sent_mm, within_mm=0.0)

@@ -32,12 +32,22 @@ class Simulated:
 
 
 @contextmanager
-def simulated(device: str, address: str, folder: Path, *options: str, count: int = 1000, rate_hz: float = RATE_HZ) -> Iterator[Simulated]:
+def simulated(
+    device: str,
+    address: str,
+    folder: Path,
+    *options: str,
+    count: int = 1000,
+    rate_hz: float = RATE_HZ,
+    speed_mm_s: float = SPEED_MM_S,
+    noise_mm: float = 0.01,
+    path_mm: NDArray[np.float64] = PATH_MM,
+) -> Iterator[Simulated]:
     """Run the device until the end of the block."""
     path = folder / "path.csv"
-    np.savetxt(path, PATH_MM, delimiter=",")
-    motion = Motion(SPEED_MM_S, rate_hz, count=count, seed=SEED, noise_mm=0.01)
-    told = ["--speed", SPEED_MM_S, "--rate", rate_hz, "--count", count, "--seed", SEED, "--noise-mm", 0.01]
+    np.savetxt(path, path_mm, delimiter=",")
+    motion = Motion(speed_mm_s, rate_hz, count=count, seed=SEED, noise_mm=noise_mm)
+    told = ["--speed", speed_mm_s, "--rate", rate_hz, "--count", count, "--seed", SEED, "--noise-mm", noise_mm]
     command = [sys.executable, "-m", "simulators", device, "--address", address, "--path", path, *told, *options]
     root = Path(__file__).resolve().parents[2]
     with subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, text=True, cwd=root) as process:
@@ -45,7 +55,7 @@ def simulated(device: str, address: str, folder: Path, *options: str, count: int
             assert process.stdout is not None
             served = process.stdout.readline().strip()
             assert served, "the simulated device said no address"
-            yield Simulated(served, process, walk(PATH_MM, motion).points_mm)
+            yield Simulated(served, process, walk(path_mm, motion).points_mm)
         finally:
             process.kill()
             process.wait()

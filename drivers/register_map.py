@@ -1,0 +1,201 @@
+"""Modbus devices as data: a YAML map says which registers hold what, and how they are to be read.
+
+    device: my scanner
+    table: holding                  # holding registers (function 3) or input registers (function 4)
+    word_order: high-first          # or low-first: which register of a 32- or 64-bit number comes first
+    pattern: ring                   # latest, ring, queue or fifo, see below
+    status:                         # optional for latest, queue and fifo: what is read besides the points
+      at: 0                         # address as the protocol counts, from 0
+      fields:
+        magic: {at: 0, type: uint32, equals: 0x434D4D31}       # refuse any other device
+        written: {at: 2, type: uint32}                         # points written so far (ring)
+        state: {at: 4, type: uint16, finished: 2}              # this value: the scan is over
+        sent: {at: 7, type: uint32}                            # points taken: the sequence runs from 0 to it
+        overflow: {at: 5, type: uint16}                        # not 0: the device itself lost points
+        heartbeat: {at: 6, type: uint16}                       # changes while the device is alive
+    points:
+      at: 100
+      entries: 100                  # ring only: how many points the ring holds
+      fields:                       # `at` counts from the first register of a point
+        sequence: {at: 0, type: uint16}                        # its counter, which wraps
+        time: {at: 1, type: uint32, scale: 1.0e-6}             # seconds = scale * value; wraps
+        x: {at: 3, type: int32, scale: 1.0e-5}                 # mm = scale * value + offset
+        y: {at: 5, type: int32, scale: 1.0e-5, invalid: 0x80000000}   # this value means no value
+        flags: {at: 7, type: uint16, invalid_bits: 1}          # any of these bits set: an invalid point
+        crc: {at: 8, type: uint16}      # CRC-16/CCITT-FALSE over the registers before it in the block
+
+latest  the points block holds one point, new when its sequence has changed. Without a sequence every reading counts.
+ring    `written` runs ahead; point number n lies in place n modulo entries. Overrun points are lost, and counted.
+queue   reading the block `pop` takes the oldest message out of the device's queue; the points block, read after it,
+        belongs to that message. `pop` may hold sequence, time, overflow, x, y, z as well.
+fifo    function 24 at the address of the points block hands over up to 31 registers, and forgets them.
+
+Coordinates that are not named are 0; a distance sensor's distance is z.
+"""
+
+from binascii import crc_hqx
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+MAPS = Path(__file__).parent / "maps"
+MOST_REGISTERS = 125  # that one answer can carry
+MOST_FIFO = 31
+NUMPY_TYPES = {
+    "uint16": ">u2", "int16": ">i2", "uint32": ">u4", "int32": ">i4", "uint64": ">u8", "int64": ">i8", "float32": ">f4", "float64": ">f8"
+}  # fmt: skip
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class RegisterField(_Part):
+    """One number: where it lies in its block, and what it means."""
+
+    at: Annotated[int, Field(ge=0, le=65535)]
+    type: Literal["uint16", "int16", "uint32", "int32", "uint64", "int64", "float32", "float64"]
+    scale: float = 1.0
+    offset: float = 0.0
+    invalid: int | None = None
+    invalid_bits: int = 0
+    equals: int | None = None
+    finished: int | None = None
+
+    @property
+    def registers(self) -> int:
+        """The number of registers it takes."""
+        return np.dtype(NUMPY_TYPES[self.type]).itemsize // 2
+
+
+class Block(_Part):
+    """Registers read together."""
+
+    at: Annotated[int, Field(ge=0, le=65535)]
+    fields: Annotated[dict[str, RegisterField], Field(min_length=1)]
+    entries: Annotated[int, Field(ge=1)] = 1
+    registers: Annotated[int, Field(ge=0, le=MOST_REGISTERS)] = 0
+
+    @property
+    def size(self) -> int:
+        """Registers of one entry: as said, or up to the last field."""
+        return max(self.registers, *(field.at + field.registers for field in self.fields.values()), 0)
+
+    @model_validator(mode="after")
+    def _fits(self) -> "Block":
+        if self.size > MOST_REGISTERS:
+            raise ValueError(f"{self.size} registers; one answer carries at most {MOST_REGISTERS}")
+        if self.at + self.size * self.entries > 65536:
+            raise ValueError(f"{self.entries} entries of {self.size} registers from {self.at} end after register 65535")
+        return self
+
+
+class RegisterMap(_Part):
+    """One kind of Modbus device."""
+
+    device: Annotated[str, Field(min_length=1)]
+    source: str = ""
+    table: Literal["holding", "input"] = "holding"
+    word_order: Literal["high-first", "low-first"] = "high-first"
+    pattern: Literal["latest", "ring", "queue", "fifo"]
+    status: Block | None = None
+    pop: Block | None = None
+    points: Block
+
+    @model_validator(mode="after")
+    def _complete(self) -> "RegisterMap":
+        _only(self.status, {"magic", "written", "state", "overflow", "heartbeat", "announced", "sent", "crc"}, "status")
+        _only(self.pop, {"pop", "queued", "overflow", "sequence", "time", "x", "y", "z"}, "pop")
+        _only(self.points, {"sequence", "time", "x", "y", "z", "flags", "overflow", "crc"}, "points")
+        named = set(self.points.fields) | (set(self.pop.fields) if self.pop else set())
+        if not named & {"x", "y", "z"}:
+            raise ValueError("points: none of x, y, z is named")
+        if self.pattern == "ring" and (self.status is None or "written" not in self.status.fields):
+            raise ValueError("a ring needs the field written in status")
+        if (self.pattern == "queue") != (self.pop is not None):
+            raise ValueError("a queue, and only a queue, needs a block pop")
+        if self.pattern != "latest" and "sequence" not in named:
+            raise ValueError(f"a {self.pattern} needs a field sequence, or a loss would not show")
+        if self.pattern == "fifo" and self.points.size > MOST_FIFO:
+            raise ValueError(f"an entry of {self.points.size} registers; function 24 hands over at most {MOST_FIFO}")
+        return self
+
+
+def _only(block: Block | None, names: set[str], where: str) -> None:
+    unknown = sorted(set(block.fields) - names) if block else []
+    if unknown:
+        raise ValueError(f"{where}: field {unknown[0]!r} is none of {', '.join(sorted(names))}")
+
+
+def load_map(name: str | Path) -> RegisterMap:
+    """Read a map: a YAML file, or the name of one that is shipped; raise `ValueError` naming file, line and key."""
+    path = Path(name)
+    if not path.suffix and not path.exists():
+        path = MAPS / f"{name}.yaml"
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        shipped = ", ".join(sorted(file.stem for file in MAPS.glob("*.yaml")))
+        raise ValueError(f"{path}: {error.strerror or error}; give a YAML file or one of {shipped}") from error
+    try:
+        tree = yaml.safe_load(text)
+        return RegisterMap.model_validate(tree)
+    except yaml.YAMLError as error:
+        raise ValueError(f"{path}: no YAML: {error}") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        keys = [str(key) for key in first["loc"]]
+        where = f", line {_line_of(text, keys)}" if keys else ""
+        raise ValueError(f"{path}{where}: {'.'.join(keys) or 'map'}: {first['msg']}; found {first['input']!r:.80}") from error
+
+
+def _line_of(text: str, keys: Iterable[str]) -> int:
+    """Return the line on which the innermost of the nested keys that exists stands."""
+    node, line = yaml.compose(text, Loader=yaml.SafeLoader), 1
+    for key in keys:
+        if not isinstance(node, yaml.MappingNode):
+            break
+        for name, value in node.value:
+            if name.value == key:
+                node, line = value, name.start_mark.line + 1
+                break
+        else:
+            break
+    return line
+
+
+@dataclass(frozen=True, slots=True)
+class Columns:
+    """The fields of consecutive entries, each (m,); `sound` is False where the checksum of an entry is wrong."""
+
+    values: dict[str, NDArray[np.generic]]
+    sound: NDArray[np.bool_]
+
+
+def columns(block: Block, word_order: str, registers: bytes) -> Columns:
+    """Take the big-endian registers of whole entries apart."""
+    words = np.frombuffer(registers, dtype=">u2").reshape(-1, block.size)
+    values: dict[str, NDArray[np.generic]] = {}
+    for name, field in block.fields.items():
+        part = words[:, field.at : field.at + field.registers]
+        ordered = part if word_order == "high-first" else part[:, ::-1]
+        values[name] = np.ascontiguousarray(ordered).view(NUMPY_TYPES[field.type])[:, 0]
+    sound = np.ones(len(words), dtype=np.bool_)
+    if "crc" in block.fields:
+        checked = 2 * block.fields["crc"].at
+        size = 2 * block.size
+        found = [crc_hqx(registers[at : at + checked], 0xFFFF) for at in range(0, len(registers), size)]
+        sound = values["crc"] == np.array(found)
+    return Columns(values, sound)
+
+
+def equals_pattern(column: NDArray[np.generic], pattern: int, kind: str) -> NDArray[np.bool_]:
+    """Compare bit patterns, so that 0x80000000 is found in an int32 too."""
+    raw = column.view(NUMPY_TYPES[kind].replace("i", "u").replace("f", "u"))
+    return np.asarray(raw == pattern)

@@ -1,0 +1,255 @@
+"""Simulated scanners behind Modbus TCP or RTU: the only file of simulators that knows pymodbus; a program of its own.
+
+A device keeps registers that are computed when they are read; the server, the pace, the line and its faults are here.
+`pty` serves RTU over a pair of pseudo-terminals with a relay between them, which is where bytes are damaged.
+"""
+
+import asyncio
+import contextlib
+import json
+import logging
+import os
+import sys
+import threading
+import time
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from pymodbus.constants import ExcCodes
+from pymodbus.datastore import ModbusServerContext
+from pymodbus.pdu import ModbusPDU
+from pymodbus.pdu.file_message import ReadFifoQueueRequest, ReadFifoQueueResponse
+from pymodbus.server import ModbusSerialServer, ModbusTcpServer
+from pymodbus.server.base import ModbusBaseServer
+from pymodbus.simulator import DataType, SimData, SimDevice
+
+from .faults import Injector
+from .line import PtyLine
+from .motion import Walk, walk
+from .settings import Announce, SimulatorSettings
+
+if sys.platform != "win32":
+    import tty
+
+DEVICE_ID = 1
+FAREWELL_S = 10.0
+LOOK_S = 0.01
+READ_FIFO = 24
+
+Words = NDArray[np.uint16]
+
+
+class RegisterDevice:
+    """Registers of a device whose points appear one after the other; what is behind an address, a subclass says."""
+
+    size = 65536
+
+    def __init__(self, scan: Walk, injector: Injector, *, swapped: bool) -> None:
+        self.scan = scan
+        self.count = len(scan.time_s)
+        self.injector = injector
+        self.swapped = swapped  # the halves of 32-bit numbers, as some gateways do
+        self.taken = 0
+        self.heartbeat = 0
+        self.overflow = 0
+        self.done = False
+
+    def take(self, taken: int) -> None:
+        """Let the points up to `taken` happen."""
+        self.taken = taken
+
+    def appearing(self, function: int, address: int, count: int) -> int:
+        """Return how many points appear at this access when the scan is not paced: as many as the client will fetch."""
+        return 1
+
+    def read(self, table: int, address: int, count: int) -> Words:
+        """Return the registers; reading may change the device."""
+        raise NotImplementedError
+
+    def fifo(self, address: int) -> Words:
+        """Return and forget up to 31 registers."""
+        raise NotImplementedError
+
+    def numbers(self, values: NDArray[np.integer], dtype: str) -> Words:
+        """Return (m, k) registers of (m,) numbers, high word first unless swapped."""
+        words = np.ascontiguousarray(values.astype(dtype)).view(">u2").reshape(len(values), -1).astype(np.uint16)
+        return words[:, ::-1] if self.swapped else words
+
+
+Maker = Callable[[Walk, Injector, bool], RegisterDevice]
+
+
+def serve_registers(settings: SimulatorSettings, announce: Announce, make: Maker, taken: Callable[..., Walk] = walk) -> None:
+    """Serve one scan of a device made by `make(walk, injector, swapped)`."""
+    logging.getLogger("pymodbus").addHandler(logging.NullHandler())
+    asyncio.run(_Service(settings, announce, make, taken(settings.path_mm, settings.motion)).run())
+
+
+class _Service:
+    """One device being served."""
+
+    def __init__(self, settings: SimulatorSettings, announce: Announce, make: Maker, scan: Walk) -> None:
+        self._settings = settings
+        self._announce = announce
+        self._make = make
+        self._scan = scan
+        self._injector = Injector(settings.faults, settings.motion.seed)
+        self._swapped = self._injector.has("word-swap")
+        self._device = make(scan, self._injector, self._swapped)
+        self._began_s: float | None = None
+        self._stalled_until_s = 0.0
+        self._silent_until_s = 0.0
+        self._away_s: float | None = None
+        self._relay: _Relay | None = None
+        self._address = settings.address
+
+    async def run(self) -> None:
+        server = await self._listening()
+        self._announce(self._address)
+        finished_s: float | None = None
+        while finished_s is None or time.monotonic() < finished_s + FAREWELL_S:
+            await asyncio.sleep(LOOK_S)
+            if self._away_s is not None:
+                server = await self._away(server, self._away_s)
+            if self._device.done and finished_s is None:
+                finished_s = time.monotonic()
+                self._announce(json.dumps({"points": self._device.count, **self._injector.tally}))
+        await server.shutdown()  # type: ignore[no-untyped-call]
+        if self._relay is not None:
+            self._relay.close()
+
+    async def _away(self, server: ModbusBaseServer, seconds: float) -> ModbusBaseServer:
+        """Take the server away and bring it back under the same address."""
+        self._away_s = None
+        await server.shutdown()  # type: ignore[no-untyped-call]
+        if self._relay is not None:
+            self._relay.plugged = False
+        await asyncio.sleep(seconds)
+        if self._relay is not None:
+            self._relay.plugged = True
+        return await self._listening()
+
+    async def _listening(self) -> ModbusBaseServer:
+        context = SimDevice(id=0, simdata=[SimData(0, count=self._device.size, values=0, datatype=DataType.REGISTERS)], action=self._access)
+        request = _fifo_request(self._fifo)
+        if self._settings.address == "pty":
+            self._relay = self._relay or _Relay(self._injector)
+            self._address = self._relay.line.address
+            serial = ModbusSerialServer(context, port=self._relay.inner, baudrate=115_200, custom_pdu=[request])
+            await serial.serve_forever(background=True)
+            return serial
+        host, _, port = self._address.rpartition(":")
+        server = ModbusTcpServer(context, address=(host, int(port)), custom_pdu=[request], trace_packet=self._damaged)
+        await server.serve_forever(background=True)
+        if not int(port):
+            transport = server.transport
+            assert isinstance(transport, asyncio.Server)
+            self._address = f"{host}:{transport.sockets[0].getsockname()[1]}"
+        return server
+
+    def _damaged(self, sending: bool, data: bytes) -> bytes:
+        return self._injector.damage(data) if sending else data
+
+    async def _access(
+        self, function: int, start: int, address: int, count: int, registers: list[int], values: list[int] | list[bool] | None
+    ) -> ExcCodes | None:
+        """Let time pass, then compute the registers asked for."""
+        if values is not None:
+            return None
+        await self._time_passes(function, address, count)
+        registers[address - start : address - start + count] = self._device.read(function, address, count).tolist()
+        return None
+
+    async def _fifo(self, address: int) -> list[int]:
+        await self._time_passes(READ_FIFO, address, 0)
+        return [int(register) for register in self._device.fifo(address)]
+
+    async def _time_passes(self, function: int, address: int, count: int) -> None:
+        now_s = time.monotonic()
+        self._began_s = now_s if self._began_s is None else self._began_s
+        if now_s < self._silent_until_s:
+            await asyncio.sleep(self._silent_until_s - now_s)
+        slow_s = self._injector.lasting("slow", self._device.taken)
+        if slow_s:
+            await asyncio.sleep(slow_s)
+        self._device.heartbeat = (self._device.heartbeat + 1) % 65536
+        if time.monotonic() >= self._stalled_until_s:
+            self._advance(self._device.appearing(function, address, count))
+
+    def _advance(self, appearing: int) -> None:
+        assert self._began_s is not None
+        device, elapsed_s = self._device, time.monotonic() - self._began_s
+        due = int(np.searchsorted(self._scan.time_s, elapsed_s, side="right")) if self._settings.paced else device.taken + appearing
+        due = self._injector.before_next_event(device.taken, min(due, device.count))
+        device.take(max(due, device.taken))
+        self._injector.reached(device.taken)
+        self._strike(device.taken)
+
+    def _strike(self, index: int) -> None:
+        """Let the faults of this point happen."""
+        status = self._injector.event("die", index)
+        if status is not None:
+            os._exit(int(status))
+        stall_s = self._injector.event("stall", index)
+        if stall_s is not None:
+            self._stalled_until_s = time.monotonic() + stall_s
+            self._began_s = (self._began_s or 0.0) + stall_s
+        silence_s = self._injector.event("silence", index)
+        if silence_s is not None:
+            self._silent_until_s = time.monotonic() + min(silence_s, 1e6)
+        away_s = self._injector.event("unplug", index)
+        if away_s is not None:
+            self._away_s = away_s
+        restart_s = self._injector.event("restart", index)
+        if restart_s is not None:
+            self._away_s = restart_s
+            self._device = self._make(self._scan, self._injector, self._swapped)
+            self._began_s = None
+
+
+def _fifo_request(read: Callable[[int], object]) -> type[ModbusPDU]:
+    """Make a request of function 24 whose answer comes from `read`; the library's own answers a constant."""
+
+    class Request(ReadFifoQueueRequest):
+        async def datastore_update(self, context: ModbusServerContext, device_id: int) -> ModbusPDU:
+            values = await read(self.address)  # type: ignore[misc]
+            return ReadFifoQueueResponse(values=values, dev_id=device_id, transaction_id=self.transaction_id)
+
+    return Request
+
+
+class _Relay:
+    """Carries bytes between the client's pseudo-terminal and the server's, damaging what the server sends."""
+
+    def __init__(self, injector: Injector) -> None:
+        self.line = PtyLine()
+        self._injector = injector
+        self._master, slave = os.openpty()
+        if sys.platform != "win32":
+            tty.setraw(slave)
+        self.inner = os.ttyname(slave)
+        self._slave = slave
+        os.set_blocking(self._master, False)
+        self._running = self.plugged = True
+        self._thread = threading.Thread(target=self._carry, daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        self._running = False
+        self._thread.join()
+        self.line.close()
+        os.close(self._master)
+        os.close(self._slave)
+
+    def _carry(self) -> None:
+        there = True
+        while self._running:
+            if self.plugged != there:
+                there = self.plugged
+                (self.line.plug if there else self.line.unplug)()
+            asked = self.line.receive(0.0005)
+            if asked:
+                os.write(self._master, asked)
+            with contextlib.suppress(BlockingIOError):
+                self.line.send(self._injector.damage(os.read(self._master, 4096)))
