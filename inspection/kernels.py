@@ -81,9 +81,7 @@ def _rows_to_columns(typing_context: Any, table: Any, rows: Any, first: Any, tar
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         eight = ir.VectorType(ir.DoubleType(), 8)
-        table_data, rows_data, target_data = (
-            context.make_array(signature.args[i])(context, builder, args[i]).data for i in (0, 1, 3)
-        )
+        table_data, rows_data, target_data = (context.make_array(signature.args[i])(context, builder, args[i]).data for i in (0, 1, 3))
         word = ir.IntType(64)
 
         def at(data: Any, offset: Any) -> Any:
@@ -100,7 +98,9 @@ def _rows_to_columns(typing_context: Any, table: Any, rows: Any, first: Any, tar
             for i in range(8):
                 if not i & span:
                     mixed[i] = builder.shuffle_vector(lines[i], lines[i + span], ir.Constant(ir.VectorType(ir.IntType(32), 8), mask_low))
-                    mixed[i + span] = builder.shuffle_vector(lines[i], lines[i + span], ir.Constant(ir.VectorType(ir.IntType(32), 8), mask_high))
+                    mixed[i + span] = builder.shuffle_vector(
+                        lines[i], lines[i + span], ir.Constant(ir.VectorType(ir.IntType(32), 8), mask_high)
+                    )
             lines = mixed
         for q in range(8):
             offset = builder.add(args[4], word(q * _BLOCK))
@@ -277,7 +277,14 @@ def _start(w: Any, j: int) -> None:
 def _solve(w: Any, q: Any, j: int) -> None:
     """One Halley step from t, then a Newton step and the results; solved where the step is small and t belongs to the piece."""
     c0, c1, c2, c3, c4, c5 = w[j], w[_BLOCK + j], w[2 * _BLOCK + j], w[3 * _BLOCK + j], w[4 * _BLOCK + j], w[5 * _BLOCK + j]
-    d0, d1, d2, d3, d4, d5 = w[6 * _BLOCK + j], w[7 * _BLOCK + j], w[8 * _BLOCK + j], w[9 * _BLOCK + j], w[10 * _BLOCK + j], w[11 * _BLOCK + j]
+    d0, d1, d2, d3, d4, d5 = (
+        w[6 * _BLOCK + j],
+        w[7 * _BLOCK + j],
+        w[8 * _BLOCK + j],
+        w[9 * _BLOCK + j],
+        w[10 * _BLOCK + j],
+        w[11 * _BLOCK + j],
+    )
     x, y, t = w[_X + j], w[_Y + j], w[_T + j]
     c0 -= x
     d0 -= y
@@ -439,9 +446,7 @@ def _resume(w: Any, lanes: int, waiting: int) -> None:
 
 
 @_compiled
-def _settle(
-    w: Any, q: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, lanes: int, waiting: int, best: Any, stack: Any
-) -> int:
+def _settle(w: Any, q: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, lanes: int, waiting: int, best: Any, stack: Any) -> int:
     """Offer the solved items to their points, send the others on."""
     for j in range(lanes):
         if q[_SOLVED + j] == 1:
@@ -454,9 +459,7 @@ def _settle(
 
 
 @_compiled
-def _advance(
-    w: Any, q: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, j: int, waiting: int, best: Any, stack: Any
-) -> int:
+def _advance(w: Any, q: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, j: int, waiting: int, best: Any, stack: Any) -> int:
     """The next try of an unsolved lane: once on the neighbouring piece, or the vertex there, or on from its t; else the search.
 
     Feet are accepted on the certified piece and its two neighbours only, so no try can end on another stretch of curve.
@@ -687,7 +690,17 @@ def project_on_samples(points_mm: Array, grid: FootGrid, table: SampleTable, met
 
 @_compiled
 def _project_on_samples(
-    points: Any, samples: Any, links: Any, boxes: Any, starts: Any, domain: Any, method: int, numbers: Any, vertex: Any, start: int, stop: int
+    points: Any,
+    samples: Any,
+    links: Any,
+    boxes: Any,
+    starts: Any,
+    domain: Any,
+    method: int,
+    numbers: Any,
+    vertex: Any,
+    start: int,
+    stop: int,
 ) -> None:
     """Projections of points[start:stop]; numbers and vertex hold the exact ones and take the new ones in their place."""
     stop = min(stop, len(vertex))
@@ -985,3 +998,88 @@ def _strides(points: Any, least: float, picked: Any) -> int:
             picked[count] = last = i
             count += 1
     return count
+
+
+# --- points of a scan, row by row ---------------------------------------------------------------------------------------
+
+
+def take_in(points_mm: Array, plane: Array, off_section_max_mm: float, section_mm: Array, rejection: NDArray[np.int8], at: int) -> None:
+    """Enter points (m, 2) or (m, 3) as section points from row `at` on, and why any cannot be used.
+
+    plane : (12,) origin, x axis, y axis and normal of the section in machine coordinates
+    """
+    _take_in(points_mm, plane, off_section_max_mm, section_mm, rejection, at)
+
+
+@_compiled
+def _take_in(points: Any, plane: Any, off_section_max: float, section: Any, rejection: Any, at: int) -> None:
+    flat = points.shape[1] == 2
+    for i in range(len(points)):
+        row = at + i
+        x, y, height = points[i, 0], points[i, 1], 0.0
+        if not flat:
+            px, py, pz = x - plane[0], y - plane[1], points[i, 2] - plane[2]
+            x = px * plane[3] + py * plane[4] + pz * plane[5]
+            y = px * plane[6] + py * plane[7] + pz * plane[8]
+            height = px * plane[9] + py * plane[10] + pz * plane[11]
+        section[row, 0], section[row, 1] = x, y
+        if not (np.isfinite(x) and np.isfinite(y) and np.isfinite(height)):
+            rejection[row] = 1
+        elif abs(height) > off_section_max:
+            rejection[row] = 2
+        else:
+            rejection[row] = 0
+
+
+def placed(section_mm: Array, rejection: NDArray[np.int8], first: int, stop: int, pose: tuple[float, float, float, float]) -> Array:
+    """Rows first .. stop - 1 in nominal coordinates by (cos, sin, x, y); NaN where a row cannot be used."""
+    moved = np.empty((stop - first, 2))
+    _placed(section_mm, rejection, first, pose, moved)
+    return moved
+
+
+@_compiled
+def _placed(section: Any, rejection: Any, first: int, pose: Any, moved: Any) -> None:
+    c, s, tx, ty = pose
+    for i in range(len(moved)):
+        row = first + i
+        if rejection[row] == 1 or rejection[row] == 2:
+            moved[i, 0] = moved[i, 1] = np.nan
+        else:
+            x, y = section[row, 0], section[row, 1]
+            moved[i, 0] = c * x - s * y + tx
+            moved[i, 1] = s * x + c * y + ty
+
+
+def judge(feet: Feet, judgement: tuple[float, ...], first: int, rows: tuple[Any, ...]) -> None:
+    """Enter what feet say from row `first` on.
+
+    judgement : outward, tip radius, lower and upper limit, uncertainty
+    rows      : arrays actual_mm, foot_mm, gradient, station_mm, deviation_mm, verdicts, rejection
+    """
+    _judge(feet.foot_mm, feet.distance_mm, feet.gradient, feet.station_mm, feet.vertex, judgement, first, rows)
+
+
+@_compiled
+def _judge(foot: Any, distance: Any, gradient: Any, station: Any, vertex: Any, judgement: Any, first: int, rows: Any) -> None:
+    outward, tip, lower, upper, uncertainty = judgement
+    actual, feet, normals, stations, deviations, verdicts, rejection = rows
+    for i in range(len(distance)):
+        row = first + i
+        if rejection[row] == 3:
+            rejection[row] = 0  # beyond an end at an earlier pose
+        if np.isnan(distance[i]) or vertex[i] == 2 or rejection[row] != 0:
+            if rejection[row] == 0:
+                rejection[row] = 3
+            actual[row, 0] = actual[row, 1] = feet[row, 0] = feet[row, 1] = normals[row, 0] = normals[row, 1] = np.nan
+            stations[row] = deviations[row] = np.nan
+            verdicts[row] = -1
+            continue
+        e = outward * distance[i] - tip
+        nx, ny = outward * gradient[i, 0], outward * gradient[i, 1]
+        actual[row, 0], actual[row, 1] = foot[i, 0] + e * nx, foot[i, 1] + e * ny
+        feet[row, 0], feet[row, 1] = foot[i, 0], foot[i, 1]
+        normals[row, 0], normals[row, 1] = nx, ny
+        stations[row], deviations[row] = station[i], e
+        beyond = max(lower - e, e - upper)
+        verdicts[row] = 2 if beyond > uncertainty else 0 if beyond <= -uncertainty else 1

@@ -8,18 +8,20 @@ judges every one at that settled pose.
 State moves only at fixed point numbers, never at the edges of batches: the same points in any batches give the same result.
 """
 
+import math
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inspection.deviations import Deviations, Method
+from inspection.deviations import Method
 from inspection.errors import RegistrationError
 from inspection.fine import ranked_poses, register, register_fine
+from inspection.kernels import judge, placed, take_in
 from inspection.minimum_zone import fit_minimum_zone
 from inspection.nominal import NominalProfile
-from inspection.profile_error import check_tip_radius, deviations
+from inspection.profile_error import check_tip_radius, deviations, feet_on
 from inspection.registration import Registration, given_pose
 from inspection.result import NOT_JUDGED, InspectionResult, Rejection, coverage, rejections_by_reason, stretches
 from inspection.rigid import RigidTransform, about
@@ -32,6 +34,7 @@ State = Literal["seeking", "provisional", "settled"]
 
 __all__ = ["InspectionResult", "LiveInspection", "LiveUpdate", "Rejection"]
 
+_USABLE = (Rejection.NONE, Rejection.BEYOND_END)  # what a registration may use; beyond which end depends on the pose
 _BLOCK = 64  # points between two moves of the state
 _SEEK_GROWTH = 1.3  # a further search once the prefix has grown by this factor
 _REFIT_GROWTH = 2.0
@@ -95,7 +98,10 @@ class LiveInspection:
         if method not in get_args(Method):
             raise ValueError(f"method must be one of {', '.join(get_args(Method))}, not {method!r}")
         self._nominal, self._zone, self._fit, self._method, self._tip = nominal, zone, fit, method, tip_radius_mm
-        self._section, self._off_section_max, self._coverage_min = section, off_section_max_mm, coverage_min
+        self._coverage_min = coverage_min
+        self._plane = (section or SectionPlane(np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))).packed
+        self._off_section_max = float("inf") if off_section_max_mm is None else off_section_max_mm
+        self._judgement = (nominal.outward, tip_radius_mm, zone.lower_mm, zone.upper_mm, zone.uncertainty_mm)
         self._reject_outliers = reject_outliers
         self._datum = RigidTransform.identity() if datum is None and fit == "none" else datum
         self._rows = _Rows()
@@ -126,15 +132,21 @@ class LiveInspection:
 
     def add(self, points_mm: ArrayLike) -> LiveUpdate:
         """Take in section points (m, 2) or machine points (m, 3), in scan order."""
-        points, rejection = self._to_section(np.asarray(points_mm, dtype=np.float64))
-        first = self._rows.count
-        changed_from, done = first, 0
-        while done < len(points):
-            take = min(len(points) - done, _BLOCK - self._rows.count % _BLOCK)
-            self._rows.append(points[done : done + take], rejection[done : done + take])
-            done += take
-            self._judge(self._rows.count - take, self._rows.count)
-            if self._rows.count % _BLOCK == 0 and self._datum is None and self._advance():
+        points = np.asarray(points_mm, dtype=np.float64)
+        if points.ndim != 2 or points.shape[1] not in (2, 3):
+            raise ValueError(f"points must have shape (m, 2) or (m, 3), got {points.shape}")
+        rows, first = self._rows, self._rows.count
+        rows.reserve(first + len(points))
+        take_in(points, self._plane, self._off_section_max, rows.points, rows.rejection, first)
+        if self._datum is not None:
+            rows.count = first + len(points)
+            self._judge(first, rows.count)
+            return self._update(first)
+        changed_from = first
+        for stop in range(first - first % _BLOCK + _BLOCK, first + len(points) + _BLOCK, _BLOCK):
+            begin, rows.count = rows.count, min(stop, first + len(points))
+            self._judge(begin, rows.count)
+            if rows.count == stop and self._advance():
                 changed_from = 0
         return self._update(changed_from)
 
@@ -148,53 +160,40 @@ class LiveInspection:
 
         Raises RegistrationError when the points cannot be brought onto the nominal.
         """
-        rows = self._rows
-        usable = rows.rejection[: rows.count] == Rejection.NONE
-        points = rows.points[: rows.count][usable]
-        registration = given_pose(self._datum, len(points)) if self._datum is not None else self._registered(points)
-        moved = registration.nominal_from_section.apply(points)
-        d = deviations(moved, self._nominal, self._method, self._tip)
-        rejection = rows.rejection[: rows.count].copy()
-        rejection[usable] = np.where(registration.outliers, Rejection.OUTLIER, np.where(d.beyond_end, Rejection.BEYOND_END, Rejection.NONE))
-        return self._result(d, np.flatnonzero(usable), rejection, registration, complete)
-
-    def _to_section(self, points: Array) -> tuple[Array, NDArray[np.int8]]:
-        """Section points (m, 2) and why any of them cannot be used (m,)."""
-        if points.ndim != 2 or points.shape[1] not in (2, 3):
-            raise ValueError(f"points must have shape (m, 2) or (m, 3), got {points.shape}")
-        rejection = np.where(np.isfinite(points).all(axis=1), Rejection.NONE, Rejection.NOT_FINITE).astype(np.int8)
-        if points.shape[1] == 3:
-            plane = self._section or SectionPlane(np.zeros(3), np.array([1.0, 0, 0]), np.array([0, 0, 1.0]))
-            points, height = plane.to_section(points)
-            if self._off_section_max is not None:
-                rejection[np.abs(height) > self._off_section_max] = Rejection.OFF_SECTION
-        return points, rejection
+        rows, count = self._rows, self._rows.count
+        usable = np.flatnonzero(np.isin(rows.rejection[:count], _USABLE))
+        registration = given_pose(self._datum, len(usable)) if self._datum is not None else self._registered(rows.points[usable])
+        settled = rows.copy()
+        settled.rejection[usable[registration.outliers]] = Rejection.OUTLIER
+        self._judge_rows(settled, registration.nominal_from_section, 0, count)
+        return self._result(settled, registration, complete)
 
     def _judge(self, first: int, stop: int) -> None:
         """Deviations and verdicts of rows first .. stop - 1 at the pose of this moment."""
-        pose = self._datum if self._datum is not None else self._track.pose if self._track is not None else None
-        if pose is None or first == stop:
-            return
-        rows = first + np.flatnonzero(np.isin(self._rows.rejection[first:stop], (Rejection.NONE, Rejection.BEYOND_END)))
-        d = deviations(pose.apply(self._rows.points[rows]), self._nominal, self._method, self._tip)
-        self._rows.put(rows, d, self._zone)
+        if self._datum is not None:
+            self._judge_rows(self._rows, self._datum, first, stop)
+        elif self._track is not None:
+            self._judge_rows(self._rows, self._track.pose, first, stop)
+
+    def _judge_rows(self, rows: "_Rows", pose: RigidTransform, first: int, stop: int) -> None:
+        x, y = pose.translation_mm
+        moved = placed(rows.points, rows.rejection, first, stop, (math.cos(pose.rotation_rad), math.sin(pose.rotation_rad), x, y))
+        judge(feet_on(moved, self._nominal, self._method), self._judgement, first, rows.judged_arrays)
 
     def _advance(self) -> bool:
         """Move the state at a block's end; True when every verdict given so far is replaced."""
-        count = self._rows.count
-        usable = self._rows.rejection[:count] != Rejection.NOT_FINITE
-        usable &= self._rows.rejection[:count] != Rejection.OFF_SECTION
-        if self._track is None:
-            if count < self._next_search:
-                return False
-            self._next_search = int(count * _SEEK_GROWTH)
-            self._track = self._sought(self._rows.points[:count][usable])
-        elif count >= _REFIT_GROWTH * self._track.fitted:
-            fitted = register_fine(self._rows.points[:count][usable], self._nominal, self._track.pose, tip_radius_mm=self._tip)
-            self._track = self._fresh_track(fitted, self._rows.points[:count][usable])
-        else:
-            self._track.refine(self._rows, count - _BLOCK, count)
+        rows, count = self._rows, self._rows.count
+        if self._track is None and count < self._next_search:
             return False
+        if self._track is not None and count < _REFIT_GROWTH * self._track.fitted:
+            self._track.refine(rows, count - _BLOCK, count)
+            return False
+        points = rows.points[:count][np.isin(rows.rejection[:count], _USABLE)]
+        if self._track is None:
+            self._next_search = int(count * _SEEK_GROWTH)
+            self._track = self._sought(points)
+        else:
+            self._track = self._fresh_track(register_fine(points, self._nominal, self._track.pose, tip_radius_mm=self._tip), points)
         if self._track is not None:
             self._judge(0, count)
         return self._track is not None
@@ -211,14 +210,13 @@ class LiveInspection:
         if not clear or scores[0] > _MISFIT * size:
             return None
         track = self._fresh_track(register_fine(points, self._nominal, poses[0][1], tip_radius_mm=self._tip), points)
-        return track if track.can_move_mm() < _MISFIT * size else None
+        return track if track.can_move_mm < _MISFIT * size else None
 
     def _fresh_track(self, registration: Registration, points: Array) -> "_PoseTrack":
         return _PoseTrack(registration, points, self._nominal, self._tip, _PRIOR_SHARE * (self._zone.upper_mm - self._zone.lower_mm))
 
     def _update(self, first: int) -> LiveUpdate:
         rows, stop = self._rows, self._rows.count
-        moves = 0.0 if self._datum is not None else float("nan") if self._track is None else self._track.can_move_mm()
         return LiveUpdate(
             self.state,
             first,
@@ -228,7 +226,7 @@ class LiveInspection:
             rows.station[first:stop].copy(),
             rows.deviation[first:stop].copy(),
             rows.verdicts[first:stop].copy(),
-            moves,
+            0.0 if self._datum is not None else float("nan") if self._track is None else self._track.can_move_mm,
             self._track.registration if self._track is not None else None,
         )
 
@@ -259,25 +257,19 @@ class LiveInspection:
                 f"{np.hypot(*np.ptp(points, axis=0)):.4g} mm, the nominal {size:.4g} mm. Check the unit, the scale and the nominal"
             )
 
-    def _result(
-        self, d: Deviations, usable: NDArray[np.int64], rejection: NDArray[np.int8], registration: Registration, complete: bool
-    ) -> InspectionResult:
-        rows = _Rows(len(rejection))
-        rows.append(self._rows.points[: len(rejection)], rejection)
-        rows.put(usable, d, self._zone)
-        rows.clear(np.flatnonzero(rejection != Rejection.NONE))
-        judged = rows.verdicts != NOT_JUDGED
-        station, deviation, verdicts = rows.station[judged], rows.deviation[judged], rows.verdicts[judged]
+    def _result(self, settled: "_Rows", registration: Registration, complete: bool) -> InspectionResult:
+        judged = settled.verdicts != NOT_JUDGED
+        station, deviation, verdicts = settled.station[judged], settled.deviation[judged], settled.verdicts[judged]
         covered = coverage(station, self._nominal)
         verdict = self._zone.verdict(deviation)
         proven = complete and covered >= self._coverage_min
         return InspectionResult(
-            rows.actual,
-            rows.foot,
-            rows.station,
-            rows.deviation,
-            rows.verdicts,
-            rejection,
+            settled.actual,
+            settled.foot,
+            settled.station,
+            settled.deviation,
+            settled.verdicts,
+            settled.rejection,
             verdict if proven else max(verdict, Verdict.UNCERTAIN),
             covered,
             complete,
@@ -294,42 +286,35 @@ class _Rows:
 
     def __init__(self, capacity: int = 4096) -> None:
         self.count = 0
-        self.points, self.actual, self.foot = (np.full((capacity, 2), np.nan) for _ in range(3))
+        self.points, self.actual, self.foot, self.normal = (np.full((capacity, 2), np.nan) for _ in range(4))
         self.station, self.deviation = np.full(capacity, np.nan), np.full(capacity, np.nan)
         self.verdicts = np.full(capacity, NOT_JUDGED, dtype=np.int8)
         self.rejection = np.zeros(capacity, dtype=np.int8)
 
-    def append(self, points: Array, rejection: NDArray[np.int8]) -> None:
-        stop = self.count + len(points)
-        if stop > len(self.verdicts):
-            self._grow(max(stop, 2 * len(self.verdicts)))
-        self.points[self.count : stop] = points
-        self.rejection[self.count : stop] = rejection
-        self.count = stop
+    @property
+    def judged_arrays(self) -> tuple[NDArray[np.generic], ...]:
+        """What `judge` fills, in its order."""
+        return (self.actual, self.foot, self.normal, self.station, self.deviation, self.verdicts, self.rejection)
 
-    def put(self, rows: NDArray[np.int64], d: Deviations, zone: ToleranceZone) -> None:
-        """Enter deviations of these rows; points beyond an open end are rejected."""
-        self.actual[rows] = d.foot_mm + d.deviation_mm[:, None] * d.normal
-        self.foot[rows] = d.foot_mm
-        self.station[rows] = d.station_mm
-        self.deviation[rows] = d.deviation_mm
-        self.verdicts[rows] = zone.verdicts(d.deviation_mm)
-        self.rejection[rows] = np.where(d.beyond_end, Rejection.BEYOND_END, Rejection.NONE)
-        self.clear(rows[d.beyond_end])
+    def reserve(self, capacity: int) -> None:
+        """Make room for so many rows, at least doubling it."""
+        if capacity > len(self.verdicts):
+            self._take_over(self, _Rows(max(capacity, 2 * len(self.verdicts))))
 
-    def clear(self, rows: NDArray[np.int64]) -> None:
-        """Take back what was said about these rows."""
-        for array in (self.actual, self.foot, self.station, self.deviation):
-            array[rows] = np.nan
-        self.verdicts[rows] = NOT_JUDGED
+    def copy(self) -> "_Rows":
+        """The rows so far, in arrays of just their number."""
+        same = _Rows(self.count)
+        same._take_over(self, same)
+        return same
 
-    def _grow(self, capacity: int) -> None:
-        old, self_count = dict(vars(self)), self.count
-        self.__init__(capacity)  # type: ignore[misc]
-        for name, value in old.items():
-            if isinstance(value, np.ndarray):
-                getattr(self, name)[:self_count] = value[:self_count]
-        self.count = self_count
+    def _take_over(self, old: "_Rows", larger: "_Rows") -> None:
+        """Hold the arrays of `larger`, with the rows of `old` in them."""
+        count = old.count
+        for name, array in vars(larger).items():
+            if isinstance(array, np.ndarray):
+                array[:count] = getattr(old, name)[:count]
+                setattr(self, name, array)
+        self.count = count
 
 
 class _PoseTrack:
@@ -356,18 +341,15 @@ class _PoseTrack:
         self._stations = np.zeros(64, dtype=bool)
         self._reach = float(np.hypot(*(nominal.points_mm - self._centre).T).max())
         self._mark(d.station_mm)
+        self.can_move_mm = self._can_move_mm()
 
     def refine(self, rows: _Rows, first: int, stop: int) -> None:
         """Take in a block of rows judged at this track's pose."""
         judged = first + np.flatnonzero(rows.verdicts[first:stop] != NOT_JUDGED)
-        foot, e = rows.foot[judged], rows.deviation[judged]
-        off = rows.actual[judged] - foot
-        size = np.hypot(off[:, 0], off[:, 1])
-        kept = size > 0
-        normal = (off / np.where(kept, size, 1.0)[:, None]) * np.sign(e)[:, None]
-        J = self._gradients(foot, normal)[kept]
+        e = rows.deviation[judged]
+        J = self._gradients(rows.foot[judged], rows.normal[judged])
         self._normal += J.T @ J
-        self._right += J.T @ (e[kept] - J @ self._motion)
+        self._right += J.T @ (e - J @ self._motion)
         self._sum_square += float(e @ e)
         self._sum_change += _changes(e)
         self._count += len(e)
@@ -375,8 +357,9 @@ class _PoseTrack:
         self._motion = np.asarray(-np.linalg.lstsq(self._normal, self._right, rcond=1e-12)[0], dtype=np.float64)
         self.pose = about(self._centre, self._motion[2], self._motion[:2]).after(self._start)
         self.registration = replace(self.registration, nominal_from_section=self.pose)
+        self.can_move_mm = self._can_move_mm()
 
-    def can_move_mm(self) -> float:
+    def _can_move_mm(self) -> float:
         """Largest 95 % shift of a deviation anywhere on the profile by what the pose is still uncertain.
 
         What changes from point to point is noise, independent at every point. The rest is form error, one value for every

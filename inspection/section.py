@@ -35,6 +35,11 @@ class SectionPlane:
             value.setflags(write=False)
             object.__setattr__(self, name, value)
 
+    @property
+    def packed(self) -> Array:
+        """Origin, x axis, y axis and normal (12,), as `kernels.take_in` takes them."""
+        return np.concatenate([self.origin_mm, self.x_axis, np.cross(self.normal, self.x_axis), self.normal])
+
     def to_section(self, points_mm: ArrayLike) -> tuple[Array, Array]:
         """Section points (m, 2) and heights above the plane (m,) of machine points (m, 3)."""
         p = np.asarray(points_mm, dtype=np.float64) - self.origin_mm
