@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Material = Literal["left", "right"]
 
+_FARTHEST = 0.1  # of the profile's size: farther points are not asked to meet an accuracy
 _SCOUT_SAMPLES = 2000  # even samples from which the poles are read before the spacing is chosen
 _MOST_SAMPLES = 400_000  # a refinement beyond this is a step limit set too small, not a profile
 
@@ -106,7 +107,7 @@ def discretize(
     step_min           : never split a step of less than twice this fraction of the parameter range (the paper: 1e-4)
     material           : the side of the curve, seen along its direction, on which the material lies
     accuracy_mm        : choose the samples by curvature instead, as few as keep the error of `method` below this, for
-                         points nearer than half the local pole radius: with spacing h, curvature k, its change k' and
+                         points nearer than half the local pole radius and a tenth of the size: with spacing h, curvature k, its change k' and
                          pole radius r the error is at most |k'| h^3 / 48 for circle, |k| h^2 / 8 for chord,
                          (3/8) |1/r - k| h^2 + (1/2) |k'| h^3 for pcp and veaw (at corners and sharp edges r falls to
                          zero: no spacing bounds those two there). `exact` and `inversion` are exact at any spacing.
@@ -138,24 +139,32 @@ def discretize(
 
 def _accurate(curve: NurbsCurve, grid: FootGrid, accuracy_mm: float, method: Method) -> list[Array]:
     """Parameters of the fewest samples that meet the accuracy; poles are read off a first, even discretisation."""
-    if not accuracy_mm > 0:
-        raise NominalError(f"the accuracy must be above zero, not {accuracy_mm:g} mm")
+    if not 0 < accuracy_mm < np.inf:
+        raise NominalError(f"the accuracy must be a positive number, not {accuracy_mm:g} mm")
     even = _even_parameters(curve, _SCOUT_SAMPLES)
     scout = _profile(curve, "left", even, grid)
     u, curvature, poles_there = scout.parameter, scout.curvature, scout.poles
-    excess = np.maximum(np.abs(poles_there.left_curvature - curvature), np.abs(poles_there.right_curvature + curvature))
+    sides = ((poles_there.left_curvature, curvature), (poles_there.right_curvature, -curvature))
+    farthest = _FARTHEST * float(np.hypot(*np.ptp(scout.points_mm, axis=0)))
+    pole_error = np.maximum(*(_pole_error(k, bend, farthest) for k, bend in sides))
     radius = 1 / np.maximum(poles_there.left_curvature, poles_there.right_curvature)
     order = np.argsort(u, kind="stable")
     start, end = curve.domain
 
     def poles(at: Array) -> LocalPoles:
         wrapped = np.where(at > end, at - (end - start), at)
-        return LocalPoles(*(np.interp(wrapped, u[order], values[order]) for values in (radius, _widest(excess))))
+        return LocalPoles(*(np.interp(wrapped, u[order], values[order]) for values in (radius, _widest(pole_error))))
 
     pieces = [spaced_parameters(curve, piece[0], piece[-1], accuracy_mm, method, poles) for piece in even]
     if sum(map(len, pieces)) > _MOST_SAMPLES:
         raise NominalError(f"{method} needs more than {_MOST_SAMPLES} samples for {accuracy_mm:g} mm; choose circle or exact")
     return pieces
+
+
+def _pole_error(pole_curvature: Array, curvature: Array, farthest_mm: float) -> Array:
+    """Error of a pole circle per squared spacing, for points up to half the pole radius off and no farther than told."""
+    excess = np.abs(pole_curvature - curvature)
+    return np.asarray(3 / 8 * excess + np.minimum(0.5 / pole_curvature, farthest_mm) * excess**2 / 8)
 
 
 def _widest(values: Array) -> Array:

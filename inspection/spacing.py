@@ -5,7 +5,7 @@ the pole radius r there, the methods' errors are bounded by (METHOD; Hu & Wallne
 
     circle       |k'| h^3 / 48, and |jump of k| h^2 / 8 beside a knot where the curvature jumps
     chord        |k| h^2 / 8
-    pcp, veaw    (3/8) |1/r - k| h^2 + (1/2) |k'| h^3
+    pcp, veaw    (3/8) |1/r - k| h^2 + (1/2) |k'| h^3, and d (1/r - k)^2 h^2 / 8 at the distance d from the profile
 
 and they presume that the nearest sample lies on the branch of the foot: the spacing stays below the smaller pole radius, so
 that this holds for points nearer than half of it (a thin edge wants dense samples). `exact` and `inversion` solve on the
@@ -36,11 +36,12 @@ class LocalPoles:
     """What a spacing must know of the poles at g places.
 
     radius_mm : (g,) smaller of the two pole radii
-    excess    : (g,) max |1/r - k| of the two sides, 1/mm
+    pole_error : (g,) error of a pole circle per h^2, 1/mm: the larger of (3/8) K + d K^2 / 8 of the two sides, K = |1/r - k| there,
+                the second term for points as far off as d
     """
 
     radius_mm: Array
-    excess: Array
+    pole_error: Array
 
 
 def spaced_parameters(
@@ -97,7 +98,7 @@ def _largest_step_mm(curve: NurbsCurve, u: Array, accuracy_mm: float, method: Me
         return np.minimum(limit, np.cbrt(48 * tau / np.maximum(change, tiny)))
     if method == "chord":
         return np.minimum(limit, np.sqrt(8 * tau / np.maximum(k, tiny)))
-    return np.minimum(limit, np.minimum(np.sqrt(4 * tau / (3 * np.maximum(local.excess, tiny))), np.cbrt(tau / np.maximum(change, tiny))))
+    return np.minimum(limit, np.minimum(np.sqrt(tau / (2 * np.maximum(local.pole_error, tiny))), np.cbrt(tau / np.maximum(change, tiny))))
 
 
 def _wrapped(u: Array, curve: NurbsCurve) -> Array:

@@ -127,7 +127,8 @@ def test_spacing_by_accuracy_keeps_every_error_below_it_and_wastes_no_samples(na
     u = profiles.inner_parameters(curve, 1500, rng, 5e-3)
     site = np.searchsorted(fine.parameter, u).clip(1, len(fine.parameter) - 2)
     left, right = 0.45 / fine.poles.left_curvature[site], 0.45 / fine.poles.right_curvature[site]
-    reach = np.where(np.arange(len(u)) % 2, np.minimum(left, 20.0), -np.minimum(right, 20.0))
+    tenth = 0.1 * float(np.hypot(*np.ptp(fine.points_mm, axis=0)))
+    reach = np.where(np.arange(len(u)) % 2, np.minimum(left, tenth), -np.minimum(right, tenth))
     offset = np.concatenate([reach[:500] * rng.uniform(0, 1, 500), np.sign(reach[500:]) * 0.02])
     points = profiles.offset_points(curve, u, offset)
     for accuracy in (1e-3, 1e-5):
