@@ -34,6 +34,7 @@ _PIECE_TURN = 1 / 8  # rad; a piece never turns by more, so that one third-order
 _OVERLAP = 0.3  # a piece stays valid for this part of its length beyond its borders, within its knot span
 _VERTEX_GRAIN = 2e-13  # part of a piece by which a foot may miss the end of the curve through round-off
 _STEEPEST = 0.9  # a cell is certified where curvature x distance stays below this on the near side of the evolute
+_STATION_ERROR = 1e-13  # of the arc length, as a fraction of the size
 _MOST_PIECES = 200_000
 _NODES = (np.arange(9) + 0.5) / 9  # inside a knot span, never on its borders
 
@@ -42,8 +43,10 @@ _NODES = (np.arange(9) + 0.5) / 9  # inside a knot span, never on its borders
 class FootGrid:
     """Packed tables of a curve for `kernels.project`.
 
-    reals      : header (origin x, y, blocks per mm, size in mm, pieces' ...), pieces, bounds of pieces, boxes of the search tree, vertices
-    integers   : header (blocks across, offsets of the tables in both arrays), links of pieces, blocks, cells, lists
+    reals      : header (origin x, y, blocks per mm, round-off of a place in mm, first and last parameter, length), then the pieces, their
+                 bounds, the boxes of the search tree, the vertices
+    integers   : header (blocks across, pieces, leaves of the tree, then where each table begins and the next ends, for the reals from 3,
+                 for the integers from 8), then the links of the pieces, blocks, cells, lists
     pieces     : number of polynomial pieces
     cells      : number of cells of the grid
     band_mm    : half width of the band that the grid covers
@@ -107,7 +110,7 @@ def build_foot_grid(curve: NurbsCurve) -> FootGrid:
     root = size * (1 + 2 * _BAND) * 1.02
     origin = (low + high) / 2 - root / 2
     leaves = _refine(pieces, origin, root, size)
-    return _pack(pieces, origin, root, size, leaves)
+    return _pack(pieces, origin, root, size, leaves, (*curve.domain, curve.length_mm))
 
 
 # --- pieces -----------------------------------------------------------------------------------------------------------
@@ -147,6 +150,8 @@ def _cut(curve: NurbsCurve, size: float) -> tuple[Array, Array, Array, Array]:
             turn = (cross / speed**2).max(axis=1) * (high - low)
             uneven = speed.max(axis=1) / speed.min(axis=1)
         good = (length <= _PIECE_LENGTH * size) & (turn <= _PIECE_TURN) & (uneven <= 1.25)
+        seventh = np.abs(np.diff(speed, 7, axis=1)).max(axis=1)  # 2.5 times the error of the arc length per parameter
+        good &= seventh * (high - low) <= _STATION_ERROR * size
         good &= _is_quintic(curve, low, high, span_low, span_high, size)
         done.append((low[good], high[good], span_low[good], span_high[good]))
         middle = (low + high) / 2
@@ -223,12 +228,8 @@ def _links(curve: NurbsCurve, low: Array) -> tuple[Index, Index, Array, Array]:
         before[0], after[-1] = -1 - len(made), -2 - len(made)
         made += [_vertex(curve, end, 2.0) for end in curve.domain]
         made[-2][1][0], made[-1][1][1] = 0.0, 0.0
-    return (
-        before,
-        after,
-        np.array([row for row, _ in made]).reshape(-1, VERTEX_WIDTH),
-        np.array([cone for _, cone in made]).reshape(-1, 2, 2),
-    )
+    rows, cones = np.array([row for row, _ in made]), np.array([cone for _, cone in made])
+    return before, after, rows.reshape(-1, VERTEX_WIDTH), cones.reshape(-1, 2, 2)
 
 
 def _vertex(curve: NurbsCurve, u: float, kind: float) -> tuple[Array, Array]:
@@ -512,7 +513,7 @@ def _split(pairs: _Pairs, chosen: NDArray[np.bool_]) -> _Pairs:
 # --- packing ----------------------------------------------------------------------------------------------------------
 
 
-def _pack(pieces: _Pieces, origin: Array, root: float, size: float, leaves: _Leaves) -> FootGrid:
+def _pack(pieces: _Pieces, origin: Array, root: float, size: float, leaves: _Leaves, ends: tuple[float, float, float]) -> FootGrid:
     across = 2**BLOCK_LEVEL
     blocks, cells = _cells(leaves)
     boxes = _search_tree(pieces)
@@ -522,7 +523,8 @@ def _pack(pieces: _Pieces, origin: Array, root: float, size: float, leaves: _Lea
     index_tables = [np.zeros(HEADER, np.int64), links.ravel(), blocks.ravel(), cells, leaves.lists]
     real_at = np.cumsum([len(table) for table in tables])
     index_at = np.cumsum([len(table) for table in index_tables])
-    tables[0][:5] = [origin[0], origin[1], across / root, size, 16 * np.finfo(float).eps * (size + np.abs(origin).max())]
+    tables[0][:4] = [origin[0], origin[1], across / root, 16 * np.finfo(float).eps * (size + np.abs(origin).max())]
+    tables[0][4:7] = ends
     index_tables[0][:13] = [across, len(pieces), len(boxes) // 2, *real_at, *index_at]
     return FootGrid(_aligned(np.concatenate(tables)), np.concatenate(index_tables).astype(np.int32), len(pieces), len(cells), _BAND * size)
 
@@ -557,11 +559,11 @@ def _cells(leaves: _Leaves) -> tuple[Index, Index]:
 
 
 def _bounds(pieces: _Pieces) -> Array:
-    """Bounds (p, 4) of |C'|, |C''|, |C'''| on each piece."""
+    """Bounds (p, 4) of the first four derivatives on each piece."""
     c = np.abs(pieces.rows[:, :12].reshape(-1, 2, 6))
     result = np.zeros((len(pieces), 4))
     factor = np.ones(6)
-    for order in range(3):
+    for order in range(4):
         factor = factor * np.maximum(np.arange(6) - order, 0)
         terms = c * factor * 0.5 ** np.maximum(np.arange(6) - order - 1, 0)
         result[:, order] = np.hypot(*terms.sum(axis=2).T)

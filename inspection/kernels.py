@@ -9,7 +9,7 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from llvmlite import ir
@@ -35,13 +35,27 @@ _STEP = 3e-9  # largest last step, in pieces, after which the square of the erro
 _CHUNK = 16_384  # points per task when several threads share a large batch
 SAMPLE_METHODS = ("circle", "chord", "pcp", "veaw")
 _CIRCLE, _CHORD, _PCP = range(3)
-_compiled: Any = njit(cache=True, nogil=True, error_model="numpy")
-_inlined: Any = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+_Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+def _compiled(function: _Function) -> _Function:
+    """Compile on the first call and keep the result on disk."""
+    return cast(_Function, njit(cache=True, nogil=True, error_model="numpy")(function))
+
+
+def _inlined(function: _Function) -> _Function:
+    """Likewise, and always as part of the caller, so that loops over it vectorise."""
+    return cast(_Function, njit(cache=True, nogil=True, error_model="numpy", forceinline=True)(function))
+
+
+def _generated(function: Callable[..., Any]) -> Any:
+    """Instructions written out for the compiler."""
+    return intrinsic(function)
+
+
+@_generated
 def _fma(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
-    """a b + c with one rounding."""
+    """The value a b + c with one rounding."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.fma(*args)
@@ -49,7 +63,7 @@ def _fma(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
     return types.float64(types.float64, types.float64, types.float64), generate
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_generated
 def _stack_reals(typing_context: Any) -> Any:
     """Memory on the stack: the compiler then knows that it overlaps no table, and vectorises loops that read both."""
 
@@ -61,7 +75,7 @@ def _stack_reals(typing_context: Any) -> Any:
     return types.CPointer(types.float64)(), generate
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_generated
 def _stack_integers(typing_context: Any) -> Any:
     """Likewise for integers."""
 
@@ -72,7 +86,7 @@ def _stack_integers(typing_context: Any) -> Any:
     return types.CPointer(types.int64)(), generate
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_generated
 def _rows_to_columns(typing_context: Any, table: Any, rows: Any, first: Any, target: Any, place: Any) -> Any:
     """Eight rows of eight numbers of a table become eight columns: target[place + q _BLOCK + i] = table[rows[first + i] + q].
 
@@ -91,17 +105,14 @@ def _rows_to_columns(typing_context: Any, table: Any, rows: Any, first: Any, tar
         for i in range(8):
             row = builder.load(at(rows_data, builder.add(args[2], word(i))))
             lines.append(builder.load(builder.bitcast(at(table_data, row), eight.as_pointer()), align=8))
+        choice = ir.VectorType(ir.IntType(32), 8)
         for span in (4, 2, 1):
-            mask_low = [i + (8 - span if i & span else 0) for i in range(8)]
-            mask_high = [i + (8 if i & span else span) for i in range(8)]
-            mixed = list(lines)
+            low = ir.Constant(choice, [i + (8 - span if i & span else 0) for i in range(8)])
+            high = ir.Constant(choice, [i + (8 if i & span else span) for i in range(8)])
             for i in range(8):
                 if not i & span:
-                    mixed[i] = builder.shuffle_vector(lines[i], lines[i + span], ir.Constant(ir.VectorType(ir.IntType(32), 8), mask_low))
-                    mixed[i + span] = builder.shuffle_vector(
-                        lines[i], lines[i + span], ir.Constant(ir.VectorType(ir.IntType(32), 8), mask_high)
-                    )
-            lines = mixed
+                    a, b = lines[i], lines[i + span]
+                    lines[i], lines[i + span] = builder.shuffle_vector(a, b, low), builder.shuffle_vector(a, b, high)
         for q in range(8):
             offset = builder.add(args[4], word(q * _BLOCK))
             builder.store(lines[q], builder.bitcast(at(target_data, offset), eight.as_pointer()), align=8)
@@ -182,8 +193,10 @@ def compile_kernels() -> None:
     real, whole = types.Array(types.float64, 1, "C"), types.Array(types.uint8, 1, "C")
     fixed, index32, index64 = (types.Array(kind, 1, "C", readonly=True) for kind in (types.float64, types.int32, types.int64))
     word = types.int64
-    _project.compile((fixed, fixed, index32, real, whole, word, word))
-    _project_on_samples.compile((fixed, fixed, index64, fixed, index64, fixed, word, real, whole, word, word))
+    exact: Any = _project
+    on_samples: Any = _project_on_samples
+    exact.compile((fixed, fixed, index32, real, whole, word, word))
+    on_samples.compile((fixed, fixed, index64, fixed, index64, fixed, word, real, whole, word, word))
 
 
 # Where the memory of a block keeps what, _BLOCK numbers each. Reals: the row of the piece (24 columns), then
@@ -194,10 +207,11 @@ _CONTENT, _ROW, _SOLVED, _POINT, _TRY, _UNSOLVED, _WAITING = (_BLOCK * i for i i
 
 @_compiled
 def _project(points: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, start: int, stop: int) -> None:
-    """Closest points of points[start:stop] into numbers (8 m: parameter, foot, distance, gradient, curvature, station) and vertex (m,).
+    """Closest points of points[start:stop], of the flat (2 m,) points, into numbers and vertex; `stop` may lie beyond the last.
 
-    `points` is flat; a `stop` beyond the last point is the last point. All points of a block are solved on the piece that their cell holds; those whose foot is not on
-    that piece, or whose cell holds several stretches, queue until they fill a block of their own.
+    numbers (8 m,) : parameter, foot (x, y), distance, gradient (x, y), curvature, station, each for all points
+    All points of a block are solved on the piece that their cell holds; those whose foot is not on that piece, or whose
+    cell holds several stretches, queue until they fill a block of their own.
     """
     stop = min(stop, len(vertex))
     pieces, blocks, cells = reals[integers[3] :], integers[integers[9] :], integers[integers[10] :]
@@ -228,9 +242,9 @@ def _project(points: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, 
         if not fresh:
             _resume(w, lanes, waiting)
         for j in range(lanes):
-            _solve(w, q, j)
+            _solve(w, q, j, _improve(w, j, w[_T + j]))
         for j in range(lanes):
-            w[_STATION + j] = _station(w, j, w[_T + j])
+            _measure(w, j, reals[4], reals[5], reals[6])
         if fresh:
             _store_block(w, numbers, vertex, block, lanes)
             waiting = _queue_unsolved(w, q, reals, integers, numbers, vertex, block, lanes, waiting, best, stack)
@@ -267,52 +281,51 @@ def _start(w: Any, j: int) -> None:
     c1, c2, c3 = w[1 * _BLOCK + j], w[2 * _BLOCK + j], w[3 * _BLOCK + j]
     d1, d2, d3 = w[7 * _BLOCK + j], w[8 * _BLOCK + j], w[9 * _BLOCK + j]
     rx, ry = w[j] - w[_X + j], w[6 * _BLOCK + j] - w[_Y + j]
-    g = _fma(rx, c1, ry * d1)
-    g1 = _fma(2.0, _fma(rx, c2, ry * d2), _fma(c1, c1, d1 * d1))
-    half_g2 = 3.0 * _fma(c1, c2, _fma(d1, d2, _fma(rx, c3, ry * d3)))
-    w[_T + j] = -g * g1 / _fma(g1, g1, -g * half_g2)
+    w[_T + j] = _halley(rx, ry, c1, d1, c2, d2, c3, d3)
 
 
 @_inlined
-def _solve(w: Any, q: Any, j: int) -> None:
-    """One Halley step from t, then a Newton step and the results; solved where the step is small and t belongs to the piece."""
-    c0, c1, c2, c3, c4, c5 = w[j], w[_BLOCK + j], w[2 * _BLOCK + j], w[3 * _BLOCK + j], w[4 * _BLOCK + j], w[5 * _BLOCK + j]
-    d0, d1, d2, d3, d4, d5 = (
-        w[6 * _BLOCK + j],
-        w[7 * _BLOCK + j],
-        w[8 * _BLOCK + j],
-        w[9 * _BLOCK + j],
-        w[10 * _BLOCK + j],
-        w[11 * _BLOCK + j],
-    )
-    x, y, t = w[_X + j], w[_Y + j], w[_T + j]
-    c0 -= x
-    d0 -= y
-    # Taylor coefficients at t by repeated synthetic division: C - M, C', C'' / 2, C''' / 6
+def _improve(w: Any, j: int, t: float) -> float:
+    """One Halley step from t, with Taylor coefficients there by repeated synthetic division."""
+    c1, c2, c3, c4, c5 = w[_BLOCK + j], w[2 * _BLOCK + j], w[3 * _BLOCK + j], w[4 * _BLOCK + j], w[5 * _BLOCK + j]
+    d1, d2, d3, d4, d5 = w[7 * _BLOCK + j], w[8 * _BLOCK + j], w[9 * _BLOCK + j], w[10 * _BLOCK + j], w[11 * _BLOCK + j]
     a4, b4 = _fma(c5, t, c4), _fma(d5, t, d4)
     a3, b3 = _fma(a4, t, c3), _fma(b4, t, d3)
     a2, b2 = _fma(a3, t, c2), _fma(b3, t, d2)
     a1, b1 = _fma(a2, t, c1), _fma(b2, t, d1)
-    rx, ry = _fma(a1, t, c0), _fma(b1, t, d0)
+    rx, ry = _fma(a1, t, w[j] - w[_X + j]), _fma(b1, t, w[6 * _BLOCK + j] - w[_Y + j])  # C - M
     a4, b4 = _fma(c5, t, a4), _fma(d5, t, b4)
     a3, b3 = _fma(a4, t, a3), _fma(b4, t, b3)
     a2, b2 = _fma(a3, t, a2), _fma(b3, t, b2)
-    vx, vy = _fma(a2, t, a1), _fma(b2, t, b1)
+    vx, vy = _fma(a2, t, a1), _fma(b2, t, b1)  # C'
     a4, b4 = _fma(c5, t, a4), _fma(d5, t, b4)
     a3, b3 = _fma(a4, t, a3), _fma(b4, t, b3)
-    hx, hy = _fma(a3, t, a2), _fma(b3, t, b2)
+    hx, hy = _fma(a3, t, a2), _fma(b3, t, b2)  # C'' / 2
     a4, b4 = _fma(c5, t, a4), _fma(d5, t, b4)
-    kx, ky = _fma(a4, t, a3), _fma(b4, t, b3)
+    kx, ky = _fma(a4, t, a3), _fma(b4, t, b3)  # the third derivative / 6
+    return t + _halley(rx, ry, vx, vy, hx, hy, kx, ky)
+
+
+@_inlined
+def _halley(rx: float, ry: float, vx: float, vy: float, hx: float, hy: float, kx: float, ky: float) -> float:
+    """Third-order step towards the zero of C' . (C - M), from C - M and the first three Taylor coefficients of C."""
     g = _fma(rx, vx, ry * vy)
     g1 = _fma(2.0, _fma(rx, hx, ry * hy), _fma(vx, vx, vy * vy))
     half_g2 = 3.0 * _fma(vx, hx, _fma(vy, hy, _fma(rx, kx, ry * ky)))
-    t -= g * g1 / _fma(g1, g1, -g * half_g2)
-    # once more, to C''
+    return float(-g * g1 / _fma(g1, g1, -g * half_g2))
+
+
+@_inlined
+def _solve(w: Any, q: Any, j: int, t: float) -> None:
+    """A Newton step from t and the results; solved where the step is small and t belongs to the piece."""
+    c1, c2, c3, c4, c5 = w[_BLOCK + j], w[2 * _BLOCK + j], w[3 * _BLOCK + j], w[4 * _BLOCK + j], w[5 * _BLOCK + j]
+    d1, d2, d3, d4, d5 = w[7 * _BLOCK + j], w[8 * _BLOCK + j], w[9 * _BLOCK + j], w[10 * _BLOCK + j], w[11 * _BLOCK + j]
+    x, y = w[_X + j], w[_Y + j]
     a4, b4 = _fma(c5, t, c4), _fma(d5, t, d4)
     a3, b3 = _fma(a4, t, c3), _fma(b4, t, d3)
     a2, b2 = _fma(a3, t, c2), _fma(b3, t, d2)
     a1, b1 = _fma(a2, t, c1), _fma(b2, t, d1)
-    rx, ry = _fma(a1, t, c0), _fma(b1, t, d0)
+    rx, ry = _fma(a1, t, w[j] - x), _fma(b1, t, w[6 * _BLOCK + j] - y)
     a4, b4 = _fma(c5, t, a4), _fma(d5, t, b4)
     a3, b3 = _fma(a4, t, a3), _fma(b4, t, b3)
     a2, b2 = _fma(a3, t, a2), _fma(b3, t, b2)
@@ -327,7 +340,6 @@ def _solve(w: Any, q: Any, j: int) -> None:
     vx, vy = _fma(hx, step, vx), _fma(hy, step, vy)
     slowness = 1.0 / np.sqrt(_fma(vx, vx, vy * vy))
     nx, ny = -vy * slowness, vx * slowness
-    w[_U + j] = _fma(w[13 * _BLOCK + j], t, w[12 * _BLOCK + j])
     w[_FOOT_X + j] = x + rx
     w[_FOOT_Y + j] = y + ry
     w[_E + j] = -_fma(rx, nx, ry * ny)
@@ -340,15 +352,17 @@ def _solve(w: Any, q: Any, j: int) -> None:
 
 
 @_inlined
-def _station(w: Any, j: int, t: float) -> float:
-    """Arc length from the start of the curve."""
+def _measure(w: Any, j: int, first: float, last: float, length: float) -> None:
+    """Parameter and arc length from the start of the curve; round-off at the seam leads out of neither range."""
+    t = w[_T + j]
     s = _fma(w[23 * _BLOCK + j], t, w[22 * _BLOCK + j])
     s = _fma(s, t, w[21 * _BLOCK + j])
     s = _fma(s, t, w[20 * _BLOCK + j])
     s = _fma(s, t, w[19 * _BLOCK + j])
     s = _fma(s, t, w[18 * _BLOCK + j])
     s = _fma(s, t, w[17 * _BLOCK + j])
-    return _fma(s, t, w[16 * _BLOCK + j])
+    w[_STATION + j] = min(max(_fma(s, t, w[16 * _BLOCK + j]), 0.0), length)
+    w[_U + j] = min(max(_fma(w[13 * _BLOCK + j], t, w[12 * _BLOCK + j]), first), last)
 
 
 @_inlined
@@ -472,10 +486,10 @@ def _advance(w: Any, q: Any, reals: Any, integers: Any, numbers: Any, vertex: An
         if link >= 0 and tried < _WALKED:
             return _push(w, q, waiting, point, link, _WALKED, np.nan)
         if link < 0:
-            rx, ry, vx, vy, _, _ = _at(reals[integers[3] :], PIECE_WIDTH * piece, x, y, 0.5 if after else -0.5)
+            rx, ry, vx, vy, _, _, _, _ = _at(reals[integers[3] :], PIECE_WIDTH * piece, x, y, 0.5 if after else -0.5)
             along = rx * vx + ry * vy
             if (along <= 0.0) if after else (along >= 0.0):
-                _finish_vertex(x, y, reals[integers[6] :], VERTEX_WIDTH * (-1 - link), reals[4], best)
+                _finish_vertex(x, y, reals[integers[6] :], VERTEX_WIDTH * (-1 - link), reals[3], best)
                 _offer(best, numbers, vertex, point)
                 return waiting
     elif not np.isnan(t) and (tried & (_WALKED - 1)) < _TRIES:
@@ -531,54 +545,63 @@ def _box_distance(boxes: Any, node: int, x: float, y: float) -> float:
     """Square of the distance from a box of the search tree."""
     dx = max(boxes[4 * node] - x, 0.0, x - boxes[4 * node + 2])
     dy = max(boxes[4 * node + 1] - y, 0.0, y - boxes[4 * node + 3])
-    return dx * dx + dy * dy
+    return float(dx * dx + dy * dy)
 
 
 @_compiled
 def _at(pieces: Any, row: int, x: float, y: float, t: float) -> tuple[float, ...]:
-    """C - M, C', C'' at t."""
-    rx = vx = hx = 0.0
-    ry = vy = hy = 0.0
+    """C - M and its first three derivatives at t."""
+    rx = vx = hx = kx = 0.0
+    ry = vy = hy = ky = 0.0
     for power in range(5, -1, -1):
         c, d = pieces[row + power], pieces[row + 6 + power]
         if power == 0:
             c, d = c - x, d - y
+        kx, ky = _fma(kx, t, hx), _fma(ky, t, hy)
         hx, hy = _fma(hx, t, vx), _fma(hy, t, vy)
         vx, vy = _fma(vx, t, rx), _fma(vy, t, ry)
         rx, ry = _fma(rx, t, c), _fma(ry, t, d)
-    return rx, ry, vx, vy, 2.0 * hx, 2.0 * hy
+    return rx, ry, vx, vy, 2.0 * hx, 2.0 * hy, 6.0 * kx, 6.0 * ky
 
 
 @_compiled
 def _closest_on_piece(pieces: Any, bounds: Any, piece: int, x: float, y: float, least: float) -> tuple[float, float]:
     """Closest t of one piece and the square of the distance, infinite when certainly above `least`.
 
-    Intervals are halved until the tangential distance is monotone in them; near the evolute of the curve, until they are tiny.
+    Intervals are halved until the tangential distance is monotone in them, or until no point of them can be closer than
+    their middle by more than round-off: near a centre of curvature a whole stretch is equally close.
     """
     row = PIECE_WIDTH * piece
-    fast, bend, twist = bounds[4 * piece], bounds[4 * piece + 1], bounds[4 * piece + 2]
+    fast, bend, twist, fourth = bounds[4 * piece], bounds[4 * piece + 1], bounds[4 * piece + 2], bounds[4 * piece + 3]
     closest, square_least = 0.0, np.inf
     level, place = 0, 0  # the interval of number `place` of 2 ** level
     while True:
         half = 0.5 / (1 << level)
         middle = (2 * place + 1) * half - 0.5
-        rx, ry, vx, vy, hx, hy = _at(pieces, row, x, y, middle)
-        distance = np.sqrt(rx * rx + ry * ry)
-        nearer = distance - fast * half
-        if nearer <= 0.0 or nearer * nearer <= least:
-            slope = vx * vx + vy * vy + rx * hx + ry * hy
-            change = half * (3.0 * fast * bend + (distance + fast * half) * twist)
+        rx, ry, vx, vy, hx, hy, kx, ky = _at(pieces, row, x, y, middle)
+        square = rx * rx + ry * ry
+        if square < square_least:
+            square_least, closest = square, middle
+            least = min(least, square)
+        distance = np.sqrt(square)
+        slope = vx * vx + vy * vy + rx * hx + ry * hy
+        bound = 3.0 * bend * bend + 4.0 * fast * twist + (distance + fast * half) * fourth
+        change = half * abs(3.0 * (vx * hx + vy * hy) + rx * kx + ry * ky) + 0.5 * half * half * bound
+        gain = 2.0 * half * abs(rx * vx + ry * vy) + half * half * (abs(slope) + change)
+        nearer = max(distance - fast * half, 0.0)
+        round_off = 1e-15 * least if slope <= change else 0.0
+        if nearer * nearer <= least and square - gain <= least - round_off:
             if abs(slope) <= change and level < _FINEST:
                 level, place = level + 1, 2 * place
                 continue
             if slope < -change:
-                low, low_square = _end_distance(pieces, row, x, y, middle - half)
-                t, square = _end_distance(pieces, row, x, y, middle + half)
-                if low_square < square:
-                    t, square = low, low_square
+                t, square = _end_distance(pieces, row, x, y, middle - half)
+                other, other_square = _end_distance(pieces, row, x, y, middle + half)
+                if other_square < square:
+                    t, square = other, other_square
             else:
                 t, square = _monotone_root(pieces, row, x, y, middle - half, middle + half)
-            if square < square_least:
+            if square <= square_least:
                 square_least, closest = square, t
                 least = min(least, square)
         while place & 1:
@@ -590,22 +613,22 @@ def _closest_on_piece(pieces: Any, bounds: Any, piece: int, x: float, y: float, 
 
 @_compiled
 def _end_distance(pieces: Any, row: int, x: float, y: float, t: float) -> tuple[float, float]:
-    rx, ry, _, _, _, _ = _at(pieces, row, x, y, t)
+    rx, ry, _, _, _, _, _, _ = _at(pieces, row, x, y, t)
     return t, rx * rx + ry * ry
 
 
 @_compiled
 def _monotone_root(pieces: Any, row: int, x: float, y: float, low: float, high: float) -> tuple[float, float]:
     """Where the tangential distance changes sign in [low, high], or the nearer end; Newton held inside its bracket."""
-    rx, ry, vx, vy, hx, hy = _at(pieces, row, x, y, low)
+    rx, ry, vx, vy, hx, hy, _, _ = _at(pieces, row, x, y, low)
     if rx * vx + ry * vy >= 0.0:
         return low, rx * rx + ry * ry
-    rx, ry, vx, vy, hx, hy = _at(pieces, row, x, y, high)
+    rx, ry, vx, vy, hx, hy, _, _ = _at(pieces, row, x, y, high)
     if rx * vx + ry * vy <= 0.0:
         return high, rx * rx + ry * ry
     t = 0.5 * (low + high)
     for _ in range(100):
-        rx, ry, vx, vy, hx, hy = _at(pieces, row, x, y, t)
+        rx, ry, vx, vy, hx, hy, _, _ = _at(pieces, row, x, y, t)
         g = rx * vx + ry * vy
         if g < 0.0:
             low = t
@@ -618,7 +641,7 @@ def _monotone_root(pieces: Any, row: int, x: float, y: float, low: float, high: 
         if abs(following - t) <= 1e-16 or g == 0.0:
             break
         t = following
-    rx, ry, vx, vy, hx, hy = _at(pieces, row, x, y, t)
+    rx, ry, vx, vy, hx, hy, _, _ = _at(pieces, row, x, y, t)
     return t, rx * rx + ry * ry
 
 
@@ -627,31 +650,26 @@ def _finish(x: float, y: float, piece: int, t: float, reals: Any, integers: Any,
     """Results for the foot at t of a piece: best = parameter, foot, distance, gradient, curvature, kind of vertex, station."""
     pieces, vertices, links = reals[integers[3] :], reals[integers[6] :], integers[integers[8] :]
     row = PIECE_WIDTH * piece
-    link = 0
-    if t > pieces[row + 15]:
-        link = links[2 * piece + 1]
-    elif t < pieces[row + 14]:
-        link = links[2 * piece]
-    elif t == 0.5:
-        link = links[2 * piece + 1]
-    elif t == -0.5:
-        link = links[2 * piece]
-    if link < 0:
-        _finish_vertex(x, y, vertices, VERTEX_WIDTH * (-1 - link), reals[4], best)
-        return
-    rx, ry, vx, vy, hx, hy = _at(pieces, row, x, y, t)
+    rx, ry, vx, vy, hx, hy, _, _ = _at(pieces, row, x, y, t)
+    if abs(t) == 0.5:
+        link = links[2 * piece + (1 if t > 0.0 else 0)]
+        slope = vx * vx + vy * vy + rx * hx + ry * hy
+        wanted = t - (rx * vx + ry * vy) / slope if slope > 0.0 else 2.0 * t
+        if link < 0 and not (pieces[row + 14] <= wanted <= pieces[row + 15]):
+            _finish_vertex(x, y, vertices, VERTEX_WIDTH * (-1 - link), reals[3], best)
+            return
     slowness = 1.0 / np.sqrt(vx * vx + vy * vy)
     nx, ny = -vy * slowness, vx * slowness
-    best[0] = pieces[row + 12] + t * pieces[row + 13]
+    best[0] = min(max(_fma(pieces[row + 13], t, pieces[row + 12]), reals[4]), reals[5])
     best[1], best[2] = x + rx, y + ry
-    best[3] = -(rx * nx + ry * ny)
+    best[3] = np.copysign(np.sqrt(rx * rx + ry * ry), -(rx * nx + ry * ny))
     best[4], best[5] = nx, ny
     best[6] = (vx * hy - vy * hx) * slowness * slowness * slowness
     best[7] = 0.0
     s = 0.0
     for power in range(23, 15, -1):
         s = _fma(s, t, pieces[row + power])
-    best[8] = s
+    best[8] = min(max(s, 0.0), reals[6])
 
 
 @_compiled
@@ -761,7 +779,7 @@ def _nearest_sample(x: float, y: float, site: int, samples: Any, boxes: Any, sta
 @_compiled
 def _sample_distance(samples: Any, site: int, x: float, y: float) -> float:
     dx, dy = x - samples[SAMPLE_WIDTH * site], y - samples[SAMPLE_WIDTH * site + 1]
-    return dx * dx + dy * dy
+    return float(dx * dx + dy * dy)
 
 
 @_compiled
@@ -865,7 +883,7 @@ def _between_pole_circles(x: float, y: float, site: int, samples: Any, links: An
 
 @_compiled
 def _angle(ax: float, ay: float, bx: float, by: float) -> float:
-    return abs(np.arctan2(ax * by - ay * bx, ax * bx + ay * by))
+    return float(abs(np.arctan2(ax * by - ay * bx, ax * bx + ay * by)))
 
 
 @_compiled

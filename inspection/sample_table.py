@@ -10,7 +10,9 @@ from inspection.nominal import NominalProfile
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-SAMPLE_WIDTH = 20  # place, tangent, normal (2 each), curvature, parameter, station, speed, left and right pole direction (2 each) and curvature, edge ends
+# A sample: place, tangent, normal (2 each), curvature, parameter, station, speed, left and right pole direction (2 each), their
+# curvatures, left and right end of the Voronoi edge shared with the next sample (2 each)
+SAMPLE_WIDTH = 20
 LINK_WIDTH = 4  # next, previous, twin, 1 at an open end
 LEAF = 16  # samples in a leaf of the search tree
 
