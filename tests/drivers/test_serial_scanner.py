@@ -49,9 +49,9 @@ class Clock:
         return self.now_s
 
 
-def run(monkeypatch: pytest.MonkeyPatch, port: Port, **options: float) -> Iterator[Arrival]:
+def run(monkeypatch: pytest.MonkeyPatch, port: Port) -> Iterator[Arrival]:
     monkeypatch.setattr(serial, "serial_for_url", lambda *_, **__: port)
-    return SerialScanner("COM1", AsciiDecoder(), clock=Clock(), **options).arrivals()
+    return SerialScanner("COM1", AsciiDecoder(), silence_s=3.0, clock=Clock()).arrivals()
 
 
 FAILURES = [
@@ -80,18 +80,18 @@ def test_whatever_opening_raises_is_a_link_that_cannot_be_opened(monkeypatch: py
         raise failure
 
     monkeypatch.setattr(serial, "serial_for_url", refuse)
-    with pytest.raises(LinkError, match="COM1: cannot be opened: .*is it plugged in, free, and named right"):
+    with pytest.raises(LinkError, match=r"COM1: cannot be opened: .*is it plugged in, free, and named right"):
         list(SerialScanner("COM1", AsciiDecoder()).arrivals())
 
 
 def test_silence_is_a_lost_link(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(LinkError, match="silent for 3 s; is the device switched on"):
-        list(run(monkeypatch, Port([]), silence_s=3.0))
+        list(run(monkeypatch, Port([])))
 
 
 def test_nothing_but_garbage_is_a_wrong_protocol(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(ProtocolError, match="not one valid frame; check baud rate"):
-        list(run(monkeypatch, Port([b"\x00\xff\n"] * 100), silence_s=3.0))
+        list(run(monkeypatch, Port([b"\x00\xff\n"] * 100)))
 
 
 @pytest.mark.parametrize(
