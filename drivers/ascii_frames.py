@@ -195,3 +195,6 @@ class AsciiDecoder:
         self._flush()
         out, self._out = self._out, []
         return out
+
+
+DECODERS = {"ascii": AsciiDecoder}

@@ -41,11 +41,6 @@ UNITS_PER_MM = 1e5
 RUN = 256  # frames looked at together; a damaged one among them costs that many checksums at most
 
 
-def decoder() -> "BinaryDecoder":
-    """Make the decoder of this format."""
-    return BinaryDecoder()
-
-
 class BinaryDecoder:
     """Bytes of the counted binary format to arrivals in millimetres."""
 
@@ -247,3 +242,6 @@ class BinaryDecoder:
         self._sound()
         out, self._out = self._out, []
         return out
+
+
+DECODERS = {"binary": BinaryDecoder}

@@ -2,7 +2,7 @@
 
 One synchronous client, one request in flight, no retries inside the library. An answer that does not come in time may
 still come later, and over RTU nothing tells it from the answer to the next request: so the link is closed, left alone
-for as long as an answer may take, and opened again before anything else is asked.
+for twice as long as an answer may take, and opened again, which forgets what came meanwhile, before anything is asked.
 """
 
 import logging
@@ -97,9 +97,8 @@ class ModbusScanner:
             if any(not isinstance(arrival, Damaged) for arrival in found):
                 last_news_s = self._clock()
             elif self._clock() - last_news_s > self._silence_s:
-                raise LinkError(
-                    f"{self._address}: answers, but for {self._silence_s:g} s without a new point or a sign of life; is it scanning?"
-                )
+                silence = f"for {self._silence_s:g} s without a new point or a moving heartbeat"
+                raise LinkError(f"{self._address}: the device answers, but {silence}; is it scanning?")
             if self._decoder.idle:
                 self._stopped.wait(self._poll_s)
 
@@ -111,7 +110,7 @@ class ModbusScanner:
                 return None
             try:
                 response = _execute(client, request, self._device_id)
-            except ConnectionException as error:
+            except (ConnectionException, OSError) as error:  # the library lets a reset connection through as it is
                 raise LinkError(f"{self._address}: the link was lost: {error}") from error
             except ModbusIOException as error:
                 failure = error
@@ -125,7 +124,8 @@ class ModbusScanner:
 
     def _let_late_answers_pass(self, client: ModbusBaseSyncClient) -> None:
         client.close()  # type: ignore[no-untyped-call]
-        self._stopped.wait(self._timeout_s)
+        if isinstance(client, ModbusSerialClient):  # over TCP a late answer dies with its connection
+            self._stopped.wait(2 * self._timeout_s)
         if not client.connect():
             raise LinkError(f"{self._address}: the link was lost and does not open again")
 

@@ -226,3 +226,6 @@ class OptoncdtDecoder:
         self._flush()
         out, self._out = self._out, []
         return out
+
+
+DECODERS = {"optoncdt": OptoncdtDecoder}

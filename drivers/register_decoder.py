@@ -242,7 +242,7 @@ class RegisterDecoder:
     def _number(self, counter: int) -> int:
         """Account for one point by its counter; return its number, or -1 if it is a repetition."""
         if self._first is None:
-            self._first = 0 if self._map.status or (self._count is None and self._map.pattern != "queue") else counter
+            self._first = 0 if self._sent is not None else counter  # a device that tells how many it sent begins with 0
             self._counter.expected = self._first
         place = self._counter.place(counter)
         if place.repeated:
@@ -282,7 +282,7 @@ class RegisterDecoder:
             for axis, name in enumerate("xyz"):
                 if block is not None and name in block.fields:
                     field = block.fields[name]
-                    points_mm[:, axis] = values[name][usable].astype(np.float64) * field.scale + field.offset
+                    points_mm[:, axis] = field.scaled(values[name][usable].astype(np.float64))
         return points_mm
 
     def _end_if_finished(self, finished: bool) -> None:

@@ -73,6 +73,12 @@ class RegisterField(_Part):
         """The number of registers it takes."""
         return np.dtype(NUMPY_TYPES[self.type]).itemsize // 2
 
+    def scaled(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return scale * value + offset; a scale like 1e-5 divides by 100,000, which rounds once and not twice."""
+        whole = round(1.0 / self.scale) if 0.0 < abs(self.scale) < 1.0 else 0
+        exact = whole != 0 and 1.0 / whole == self.scale
+        return (values / whole if exact else values * self.scale) + self.offset
+
 
 class Block(_Part):
     """Registers read together."""

@@ -188,3 +188,6 @@ class RiftekAsciiDecoder:
             self._distances.say(Damaged(len(self._pending), "line cut off where the link ended"))
         self._pending, self._waiting = b"", 0
         return self._distances.handed_over()
+
+
+DECODERS = {"riftek": RiftekDecoder, "riftek-ascii": RiftekAsciiDecoder}

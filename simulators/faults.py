@@ -20,6 +20,7 @@ class Kind:
     meaning: str
     default: float
     once: bool = False
+    registers_only: bool = False
 
 
 CATALOGUE: Mapping[str, Kind] = MappingProxyType(
@@ -36,11 +37,11 @@ CATALOGUE: Mapping[str, Kind] = MappingProxyType(
         "stall": Kind("seconds without points, the device being alive", 1.0, once=True),
         "silence": Kind("seconds without any byte", math.inf, once=True),
         "unplug": Kind("seconds for which the line is gone", 0.5, once=True),
-        "restart": Kind("seconds for which a Modbus device is gone before it begins anew", 0.5, once=True),
-        "slow": Kind("seconds that each Modbus answer takes from then on", 0.3),
-        "word-swap": Kind("1: the halves of 32-bit numbers in Modbus registers come swapped", 1),
-        "sentinel": Kind("share of points whose registers hold the value for none", 0.01),
-        "overflow": Kind("number of points that a full Modbus buffer costs; its flag stays set", 20, once=True),
+        "restart": Kind("seconds for which the device is gone before it begins its scan anew", 0.5, once=True),
+        "slow": Kind("seconds that each Modbus answer takes from then on", 0.3, registers_only=True),
+        "word-swap": Kind("1: the halves of 32-bit numbers in Modbus registers come swapped", 1, registers_only=True),
+        "sentinel": Kind("share of points whose registers hold the value for none", 0.01, registers_only=True),
+        "overflow": Kind("number of points that a full Modbus buffer costs; its flag stays set", 20, once=True, registers_only=True),
         "die": Kind("exit status with which the device ends at once", 9, once=True),
     }
 )

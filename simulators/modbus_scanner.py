@@ -166,6 +166,8 @@ class _Service:
         return [int(register) for register in self._device.fifo(address)]
 
     async def _time_passes(self, function: int, address: int, count: int) -> None:
+        if self._away_s is not None:
+            await asyncio.sleep(1e6)  # about to go: no answer any more
         now_s = time.monotonic()
         self._began_s = now_s if self._began_s is None else self._began_s
         if now_s < self._silent_until_s:

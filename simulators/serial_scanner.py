@@ -5,6 +5,7 @@ waits for a client, streams one scan and ends; its last line says, as JSON, how 
 struck how often.
 """
 
+import copy
 import json
 import math
 import sys
@@ -15,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .faults import Injector
+from .faults import CATALOGUE, Injector
 from .line import Line, open_line
 from .motion import Walk, walk
 from .settings import Announce, SimulatorSettings, say, settings_from
@@ -117,6 +118,9 @@ def serve(settings: SimulatorSettings, announce: Announce) -> None:
 
 def stream(settings: SimulatorSettings, device: Device, announce: Announce, taken: Callable[..., Walk] = walk) -> None:
     """Serve one scan of any streaming device; `taken` moves the probe along the path."""
+    strange = [fault.name for fault in settings.faults if CATALOGUE[fault.name].registers_only]
+    if strange:
+        raise ValueError(f"fault {strange[0]!r} strikes Modbus devices only")
     scan = taken(settings.path_mm, settings.motion)
     injector = Injector(settings.faults, settings.motion.seed)
     line = open_line(settings.address)
@@ -136,15 +140,16 @@ class _Scan:
     def __init__(self, line: Line, device: Device, scan: Walk, injector: Injector, paced: bool) -> None:
         self._line, self._device, self._scan, self._injector, self._paced = line, device, scan, injector, paced
         self._unplugged = False
+        self._fresh = copy.deepcopy(device)
 
     def run(self) -> None:
-        self._wait_for_client()
         count = len(self._scan.time_s)
-        self._send(self._device.opening(count))
-        start_s, index = time.monotonic(), 0
+        start_s, index = self._begin(), 0
         while index < count:
-            paused_s = self._trouble(index)
-            start_s += paused_s
+            restart_s = self._injector.event("restart", index)
+            if restart_s is not None:
+                start_s, index = self._begin_anew(restart_s), 0
+            start_s += self._trouble(index)
             due = self._due(time.monotonic() - start_s, index)
             step = self._device.samples_per_frame
             self._send(b"".join(self._frame(first, min(first + step, due)) for first in range(index, due, step)))
@@ -156,6 +161,20 @@ class _Scan:
         self._send(self._injector.held())
         self._wait_until(self._line.connected)
         self._send(self._device.closing(count))
+
+    def _begin(self) -> float:
+        """Open the scan when the client is there; return the time of its beginning."""
+        self._wait_for_client()
+        self._send(self._device.opening(len(self._scan.time_s)))
+        return time.monotonic()
+
+    def _begin_anew(self, away_s: float) -> float:
+        """Go, forget everything, and come back."""
+        self._line.unplug()
+        self._device = copy.deepcopy(self._fresh)
+        self._pause(away_s, 0, alive=False)
+        self._line.plug()
+        return self._begin()
 
     def take_leave(self) -> None:
         """Keep the line up until the client has gone, so that the last bytes are not lost with it."""

@@ -128,3 +128,18 @@ def test_a_port_in_use_is_refused(tmp_path: Path) -> None:
         next(first)
         with pytest.raises(LinkError, match="cannot be opened"):
             next(iter(SerialScanner(device.address, AsciiDecoder()).arrivals()))
+
+
+@pytest.mark.parametrize("line", LINES)
+def test_a_restarted_device_begins_a_new_scan(line: str, tmp_path: Path) -> None:
+    with simulated("serial", line, tmp_path, "--fault=restart:0.05@300") as device:
+        arrivals = list(SerialScanner(device.address, AsciiDecoder(), reconnect_s=20.0).arrivals())
+    assert [type(arrival) for arrival in account(arrivals).others] == [ScanOpened, LinkDown, LinkUp, ScanOpened, ScanClosed]
+    again = account(arrivals[max(place for place, arrival in enumerate(arrivals) if isinstance(arrival, ScanOpened)) :])
+    assert (again.sequence, again.lost) == (list(range(COUNT)), 0)
+    only_sent_points(again, device.sent_mm, within_mm=0.51e-6)
+
+
+def test_a_fault_that_makes_no_sense_on_a_stream_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(AssertionError, match="said no address"), simulated("serial", "127.0.0.1:0", tmp_path, "--fault=word-swap"):
+        pass

@@ -1,0 +1,14 @@
+"""Options that point the tests of devices at hardware."""
+
+import pytest
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    group = parser.getgroup("hardware", "tests/integration/test_any_device.py on a real device")
+    group.addoption("--device", metavar="ADDRESS", help="port name or host:port of the device")
+    group.addoption("--format", default="ascii", help="wire format of a streaming device")
+    group.addoption("--option", action="append", default=[], metavar="NAME=NUMBER", help="option of the format, like range_mm=50")
+    group.addoption("--map", metavar="FILE", help="register map of a Modbus device: a file, or the name of a shipped one")
+    group.addoption("--points", type=int, default=100, help="points to read (default 100)")
+    group.addoption("--baud-rate", type=int, default=115_200)
+    group.addoption("--parity", default="N", choices=["N", "E", "O"])

@@ -1,0 +1,32 @@
+import pytest
+
+from drivers.ascii_frames import AsciiDecoder
+from drivers.formats import decoder, decoders
+from drivers.riftek_frames import RiftekDecoder
+from simulators.settings import devices
+
+
+def test_every_format_is_found_by_its_name() -> None:
+    assert set(decoders()) == {"ascii", "binary", "optoncdt", "riftek", "riftek-ascii"}
+    assert isinstance(decoder("ascii"), AsciiDecoder)
+    assert isinstance(decoder("riftek", range_mm=50.0, rate_hz=1000.0), RiftekDecoder)
+
+
+def test_every_simulated_device_is_found_by_its_name() -> None:
+    streams = {"serial", "binary", "binary-block", "optoncdt", "riftek", "riftek-ascii"}
+    assert set(devices()) == streams | {"riftek-modbus", "modbus-ring", "modbus-fifo", "gocator"}
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "complaint"),
+    [
+        ("morse", {}, "format 'morse' is none of ascii, binary"),
+        ("riftek", {"range_mm": 50.0}, "format riftek: missing a required argument: 'rate_hz'; it takes range_mm, rate_hz"),
+        ("ascii", {"speed": 1}, "format ascii: got an unexpected keyword argument 'speed'; it takes unit"),
+        ("ascii", {"unit": "furlong"}, "unit 'furlong' is none of mm"),
+        ("riftek", {"range_mm": -1.0, "rate_hz": 1.0}, "must be positive"),
+    ],
+)
+def test_wrong_options_are_named(name: str, options: dict[str, object], complaint: str) -> None:
+    with pytest.raises(ValueError, match=complaint):
+        decoder(name, **options)

@@ -1,0 +1,101 @@
+"""Maps: what is shipped, what a user writes, and what is refused how."""
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from drivers.register_map import MAPS, Block, RegisterField, columns, load_map
+
+# What README shows: a controller with the latest point and a counter, in 12 lines.
+MINE = """\
+device: my controller
+pattern: latest
+points:
+  at: 40
+  fields:
+    sequence: {at: 0, type: uint16}
+    x: {at: 1, type: float32}
+    y: {at: 3, type: float32}
+"""
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "mine.yaml"
+    path.write_text(text)
+    return path
+
+
+def test_every_shipped_map_loads_by_its_name() -> None:
+    names = sorted(file.stem for file in MAPS.glob("*.yaml"))
+    assert names == ["generic-fifo", "generic-ring", "gocator", "riftek-rf60x"]
+    assert [load_map(name).pattern for name in names] == ["fifo", "ring", "queue", "latest"]
+
+
+def test_a_map_of_a_user(tmp_path: Path) -> None:
+    mine = load_map(written(tmp_path, MINE))
+    assert (mine.table, mine.word_order, mine.points.at, mine.points.size) == ("holding", "high-first", 40, 5)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "complaint"),
+    [
+        ("pattern: latest", "pattern: newest", r"mine\.yaml, line 2: pattern: .*'latest', 'ring', 'queue' or 'fifo'.*'newest'"),
+        ("type: float32}\n    y", "type: float}\n    y", r"line 7: points\.fields\.x\.type: .*float32.*'float'"),
+        ("at: 40", "at: forty", r"line 4: points\.at: .*integer.*'forty'"),
+        ("at: 40", "at: 70000", r"line 4: points\.at: .*65535"),
+        ("at: 40", "at: 65535", r"line 3: points: .*end after register 65535"),
+        ("    y: {at: 3", "    q: {at: 3", r"map: .*field 'q' is none of crc"),
+        ("device: my controller\n", "", r"device: Field required"),
+        ("device: my controller", "device: my controller\nbaud: 9600", r"line 2: baud: Extra inputs"),
+        ("y: {at: 3", "y: {at: 130", r"at most 125"),
+        ("pattern: latest", "pattern: ring", r"a ring needs the field written in status"),
+        ("pattern: latest", "pattern: queue", r"needs a block pop"),
+        ("    x: {at: 1, type: float32}\n    y: {at: 3, type: float32}\n", "", r"none of x, y, z is named"),
+        ("    sequence: {at: 0, type: uint16}\n", "", r""),
+        ("device: my", "device: [my", r"no YAML"),
+    ],
+)
+def test_mistakes_are_named_with_file_line_and_key(tmp_path: Path, old: str, new: str, complaint: str) -> None:
+    path = written(tmp_path, MINE.replace(old, new))
+    if not complaint:
+        load_map(path)  # without a counter every reading counts
+        return
+    with pytest.raises(ValueError, match=complaint):
+        load_map(path)
+
+
+def test_an_unknown_name_lists_what_is_shipped() -> None:
+    with pytest.raises(ValueError, match="give a YAML file or one of generic-fifo, generic-ring, gocator, riftek-rf60x"):
+        load_map("no-such-map")
+
+
+@pytest.mark.parametrize(("order", "words"), [("high-first", 1), ("low-first", -1)])
+@pytest.mark.parametrize(
+    ("kind", "code", "values"),
+    [
+        ("uint16", "H", (0, 65535)),
+        ("int16", "h", (-32768, 32767)),
+        ("uint32", "I", (1, 0xFFFFFFFE)),
+        ("int32", "i", (-(2**31), 123456789)),
+        ("uint64", "Q", (2**63 + 5, 1)),
+        ("int64", "q", (-(2**62), 7)),
+        ("float32", "f", (1.5, -0.25)),
+        ("float64", "d", (0.1, -1e300)),
+    ],
+)
+def test_every_type_in_both_word_orders(order: str, words: int, kind: str, code: str, values: tuple[float, float]) -> None:
+    entries = []
+    for value in values:
+        big = struct.pack(">" + code, value)
+        entries.append(b"\xaa\xbb" + b"".join([big[i : i + 2] for i in range(0, len(big), 2)][::words]))
+    field = RegisterField.model_validate({"at": 1, "type": kind})
+    read = columns(Block(at=0, fields={"x": field}), order, b"".join(entries))
+    np.testing.assert_array_equal(read.values["x"], values)
+
+
+def test_the_map_in_the_readme_is_short() -> None:
+    assert len(MINE.splitlines()) < 30
+    assert yaml.safe_load(MINE)["pattern"] == "latest"
