@@ -21,6 +21,10 @@ def inversion(points_mm: Array, nominal: NominalProfile) -> Feet:
     """Project by Newton steps in the parameter until none moves the foot by more than 1e-13 mm."""
     curve = nominal.curve
     start, end = curve.domain
+    finite: NDArray[np.bool_] = np.asarray(np.isfinite(points_mm).all(axis=1))
+    if not finite.all():
+        some = inversion(np.where(finite[:, None], points_mm, nominal.points_mm[0]), nominal)
+        return merged(finite, some, _nowhere(len(finite)))
     site, faces_none = nearest_sites(points_mm, nominal)
     u = nominal.parameter[site].copy()
     active = np.arange(len(u))  # a point that stands still is left alone, so that its result does not depend on its batch
@@ -52,3 +56,8 @@ def inversion(points_mm: Array, nominal: NominalProfile) -> Feet:
         vertex=np.full(len(u), INSIDE, dtype=np.uint8),
     )
     return merged(faces_none, on_vertices(points_mm, site, nominal), near)
+
+
+def _nowhere(m: int) -> Feet:
+    flat, pair = np.full(m, np.nan), np.full((m, 2), np.nan)
+    return Feet(flat, pair, flat, pair, flat, flat, np.full(m, INSIDE, dtype=np.uint8))

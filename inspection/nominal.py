@@ -6,7 +6,7 @@ corner is two samples at one place, each with the tangent of its own piece.
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Literal
+from typing import Literal, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from inspection.curve import NurbsCurve, left_of
 from inspection.deviations import Method
 from inspection.errors import NominalError
 from inspection.foot_grid import FootGrid, build_foot_grid
+from inspection.sample_table import SampleTable, pack_samples
 from inspection.spacing import LocalPoles, spaced_parameters
 from inspection.voronoi import SitePoles, site_poles
 
@@ -43,7 +44,7 @@ class NominalProfile:
     twin            : (n,) the sample of the adjoining piece at the same corner, -1 elsewhere
     is_open_end     : (n,) the two ends of an open curve
     poles           : left and right poles of every sample
-    tree, grid      : where the nearest sample and the closest point of the curve are looked up
+    tree, grid, samples : where the nearest sample and the closest point of the curve are looked up; the samples, packed
     unmet           : samples, other than ends and corners, whose pole angle stays below the limit at the smallest step
     """
 
@@ -64,6 +65,7 @@ class NominalProfile:
     unmet: int
     tree: cKDTree
     grid: FootGrid
+    samples: SampleTable
 
     def __post_init__(self) -> None:
         for name in self.__slots__:
@@ -107,11 +109,12 @@ def discretize(
     step_min           : never split a step of less than twice this fraction of the parameter range (the paper: 1e-4)
     material           : the side of the curve, seen along its direction, on which the material lies
     accuracy_mm        : choose the samples by curvature instead, as few as keep the error of `method` below this, for
-                         points nearer than half the local pole radius and a tenth of the size: with spacing h, curvature k, its change k' and
-                         pole radius r the error is at most |k'| h^3 / 48 for circle, |k| h^2 / 8 for chord,
-                         (3/8) |1/r - k| h^2 + (1/2) |k'| h^3 for pcp and veaw (at corners and sharp edges r falls to
-                         zero: no spacing bounds those two there). `exact` and `inversion` are exact at any spacing.
-                         The paper's two limits are then not applied: they bound no error.
+                         points nearer than half the local pole radius and a tenth of the size. With spacing h,
+                         curvature k, its change k' and pole radius r the error is at most |k'| h^3 / 48 for circle,
+                         |k| h^2 / 8 for chord, (3/8) |1/r - k| h^2 + (1/2) |k'| h^3 for pcp and veaw on the profile
+                         (at corners and sharp edges r falls to zero: no spacing bounds those two there).
+                         `exact` and `inversion` are exact at any spacing. The paper's two limits are then not
+                         applied: they bound no error.
 
     The pole angle alone bounds no error; with the defaults it is the even starting step that does. Raises NominalError.
     """
@@ -207,25 +210,40 @@ def _profile(curve: NurbsCurve, material: Material, pieces: list[Array], grid: F
     tangent = first / speed[:, None]
     normal = np.column_stack([-tangent[:, 1], tangent[:, 0]])
     at_end = (following < 0) | (previous < 0)
-    return NominalProfile(
-        curve=curve,
-        material=material,
-        parameter=u,
-        points_mm=point,
-        tangent=tangent,
-        normal=normal,
-        curvature=(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / speed**3,
-        station_mm=curve.station_mm(u),
-        speed=speed,
-        next_site=following,
-        previous_site=previous,
-        twin=twin,
-        is_open_end=is_open_end,
-        poles=site_poles(point, normal, following, at_end),
-        unmet=0,
-        tree=cKDTree(point),
-        grid=grid,
-    )
+    fields: _Fields = {
+        "curve": curve,
+        "parameter": u,
+        "points_mm": point,
+        "tangent": tangent,
+        "normal": normal,
+        "curvature": (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / speed**3,
+        "station_mm": curve.station_mm(u),
+        "speed": speed,
+        "next_site": following,
+        "previous_site": previous,
+        "twin": twin,
+        "is_open_end": is_open_end,
+        "poles": site_poles(point, normal, following, at_end),
+    }
+    return NominalProfile(material=material, unmet=0, tree=cKDTree(point), grid=grid, samples=pack_samples(**fields), **fields)
+
+
+class _Fields(TypedDict):
+    """What a profile and its packed samples share."""
+
+    curve: NurbsCurve
+    parameter: Array
+    points_mm: Array
+    tangent: Array
+    normal: Array
+    curvature: Array
+    station_mm: Array
+    speed: Array
+    next_site: Index
+    previous_site: Index
+    twin: Index
+    is_open_end: NDArray[np.bool_]
+    poles: SitePoles
 
 
 def _last_of(piece: Array, curve: NurbsCurve) -> Array:

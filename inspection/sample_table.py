@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from inspection.nominal import NominalProfile
+from inspection.curve import NurbsCurve
+from inspection.voronoi import SitePoles
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -39,19 +40,32 @@ class SampleTable:
             getattr(self, name).setflags(write=False)
 
 
-def build_sample_table(nominal: NominalProfile) -> SampleTable:
-    """Tables of the samples of `nominal`."""
-    poles = nominal.poles
-    columns = [nominal.points_mm, nominal.tangent, nominal.normal, nominal.curvature, nominal.parameter, nominal.station_mm, nominal.speed]
-    columns += [poles.left, poles.right, poles.left_curvature, poles.right_curvature, poles.edge_left_mm, poles.edge_right_mm]
-    samples = np.column_stack(columns)
-    links = np.column_stack([nominal.next_site, nominal.previous_site, nominal.twin, nominal.is_open_end]).astype(np.int64)
-    start, end = nominal.curve.domain
-    order = np.argsort(nominal.parameter, kind="stable")
-    middles = start + (np.arange(len(nominal)) + 0.5) / len(nominal) * (end - start)
-    nearest = np.minimum(np.searchsorted(nominal.parameter[order], middles), len(nominal) - 1)
-    domain = np.array([start, end, nominal.length_mm, float(nominal.curve.closed)])
-    return SampleTable(samples, links, _boxes(nominal.points_mm), order[nearest], domain)
+def pack_samples(
+    *,
+    points_mm: Array,
+    tangent: Array,
+    normal: Array,
+    curvature: Array,
+    parameter: Array,
+    station_mm: Array,
+    speed: Array,
+    poles: SitePoles,
+    next_site: Index,
+    previous_site: Index,
+    twin: Index,
+    is_open_end: NDArray[np.bool_],
+    curve: NurbsCurve,
+) -> SampleTable:
+    """Tables of the samples of a nominal profile, whose fields these are."""
+    sides = (poles.left, poles.right, poles.left_curvature, poles.right_curvature, poles.edge_left_mm, poles.edge_right_mm)
+    samples = np.column_stack([points_mm, tangent, normal, curvature, parameter, station_mm, speed, *sides])
+    links = np.column_stack([next_site, previous_site, twin, is_open_end]).astype(np.int64)
+    start, end = curve.domain
+    order = np.argsort(parameter, kind="stable")
+    middles = start + (np.arange(len(parameter)) + 0.5) / len(parameter) * (end - start)
+    nearest = np.minimum(np.searchsorted(parameter[order], middles), len(parameter) - 1)
+    domain = np.array([start, end, curve.length_mm, float(curve.closed)])
+    return SampleTable(samples, links, _boxes(points_mm), order[nearest], domain)
 
 
 def _boxes(points_mm: Array) -> Array:

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inspection.curve import NurbsCurve
-from inspection.nominal import NominalProfile
 from inspection.kernels import Feet
+from inspection.nominal import NominalProfile
 from inspection.projection import INSIDE, dot, merged, on_vertices
 
 Array = NDArray[np.float64]

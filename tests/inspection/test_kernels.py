@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from inspection import NurbsCurve, discretize, profile_error
+from inspection import NurbsCurve, discretize
 from inspection.foot_grid import FootGrid, build_foot_grid
 from inspection.kernels import SAMPLE_METHODS, Feet, project, project_on_samples
-from inspection.sample_table import build_sample_table
 from tests.inspection import profiles
+from tests.inspection import projections_reference as reference
 from tests.inspection.oracle import Closest, closest_point
 from tests.inspection.profiles import Array
 
@@ -278,16 +278,16 @@ def test_tables_do_not_depend_on_samples_and_stay_as_they_are() -> None:
 @pytest.mark.parametrize("name", ["P1", "P2", "P3", "ellipse", "stadium", "square", "NACA 2412 sharp", "NACA 4412 blunt", "MH42"])
 def test_compiled_method_is_the_plain_one(name: str, method: str) -> None:
     plain: dict[str, Callable[..., object]] = {
-        "circle": profile_error.circle,
-        "chord": profile_error.chord,
-        "pcp": profile_error.pcp,
-        "veaw": profile_error.veaw,
+        "circle": reference.circle,
+        "chord": reference.chord,
+        "pcp": reference.pcp,
+        "veaw": reference.veaw,
     }
     for samples in (60, 1000):
         nominal = discretize(curve_of(name), samples=samples, step_min=0.9 / samples, pole_angle_min_deg=90.0)
         points = scattered(curve_of(name), np.random.default_rng(42), 150)
         wanted: object = plain[method](points, nominal)
-        found = project_on_samples(points, grid_of(name), build_sample_table(nominal), method)
+        found = project_on_samples(points, grid_of(name), nominal.samples, method)
         pairs = {
             "distance_mm": "left_mm",
             "foot_mm": "foot_mm",
@@ -304,7 +304,7 @@ def test_compiled_method_is_the_plain_one(name: str, method: str) -> None:
 
 @pytest.mark.parametrize("method", SAMPLE_METHODS)
 def test_no_bit_of_a_compiled_method_depends_on_the_batch(method: str) -> None:
-    table = build_sample_table(discretize(curve_of("P3"), samples=500, step_min=1e-3))
+    table = discretize(curve_of("P3"), samples=500, step_min=1e-3).samples
     points = scattered(curve_of("P3"), np.random.default_rng(43), 400)
     whole = project_on_samples(points, grid_of("P3"), table, method)
     cut = [project_on_samples(part, grid_of("P3"), table, method) for part in np.array_split(points, 37)]
