@@ -67,6 +67,8 @@ CASES: dict[str, tuple[str, dict[str, Any]]] = {
     "veaw": ("P3", {"method": "veaw"}),
     "pcp": ("P3", {"method": "pcp"}),
     "inversion": ("P1", {"method": "inversion"}),
+    "chord": ("P2", {"method": "chord"}),
+    "circle": ("NACA 2412 sharp", {"method": "circle"}),
 }
 
 
@@ -88,6 +90,7 @@ def recorded(case: str) -> tuple[NominalProfile, Array, dict[str, Any]]:
         points = PLANE.to_machine(points)
         points[100:104] += 2.0 * np.array(PLANE.normal)
     points[[50, 333]] = np.nan
+    points[120, 0] = np.inf
     return nominal_of(name), points, options
 
 
@@ -135,7 +138,7 @@ def test_received_is_judged_plus_rejected_and_every_rejection_has_its_reason(cas
     _, result = inspected(nominal, points, 100, **options)
     assert result.received == len(points) == result.judged + result.rejected
     assert sum(result.rejected_by_reason.values()) == result.rejected
-    assert (result.rejection[[50, 333]] == Rejection.NOT_FINITE).all()
+    assert np.flatnonzero(result.rejection == Rejection.NOT_FINITE).tolist() == [50, 120, 333]
     rejected = result.rejection != Rejection.NONE
     assert np.isnan(result.deviation_mm[rejected]).all()
     assert np.isfinite(result.deviation_mm[~rejected]).all()
