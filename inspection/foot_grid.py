@@ -29,9 +29,9 @@ BLOCK_LEVEL = 6  # the quadtree's root is cut into 64 x 64 blocks, found by one 
 _DEEPEST = 11  # smallest cells: half a thousandth of the size of the curve
 _NEAR = 0.015  # band in which cells may become that small, as a fraction of the size
 _BAND = 0.08  # band of the whole grid: beyond it every point is searched for along the whole curve
-_PIECE_LENGTH = 1 / 200  # longest piece, as a fraction of the size
+_PIECE_LENGTH = 1 / 100  # longest piece, as a fraction of the size
 _PIECE_TURN = 1 / 8  # rad; a piece never turns by more, so that one third-order step from its middle comes close
-_OVERLAP = 0.3  # a piece stays valid for this part of its length beyond its borders, within its knot span
+_OVERLAP = 0.4  # a piece stays valid for this part of its length beyond its borders, within its knot span
 _VERTEX_GRAIN = 2e-13  # part of a piece by which a foot may miss the end of the curve through round-off
 _STEEPEST = 0.9  # a cell is certified where curvature x distance stays below this on the near side of the evolute
 _STATION_ERROR = 1e-13  # of the arc length, as a fraction of the size
@@ -181,7 +181,7 @@ def _is_quintic(curve: NurbsCurve, low: Array, high: Array, span_low: Array, spa
     c = _taylor(curve, (low + high) / 2, width, 8)
     r = 0.5 + _OVERLAP
     missed = (np.abs(c) * np.array([0, 0, 0, 0, 0, 0, r**6 / 32, r**7 / 64, 2 * r**8])).sum(axis=2).max(axis=1)
-    return np.asarray(missed <= 0.05 * np.finfo(float).eps * max(size, float(np.abs(curve.control_points_mm).max())))
+    return np.asarray(missed <= 0.2 * np.finfo(float).eps * max(size, float(np.abs(curve.control_points_mm).max())))
 
 
 def _taylor(curve: NurbsCurve, middle: Array, width: Array, order: int) -> Array:

@@ -8,8 +8,7 @@ vectorised and scalar code. Nothing is compiled when this file is imported; `com
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from typing import Any, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 from llvmlite import ir
@@ -32,7 +31,7 @@ _ACROSS = float(1 << BLOCK_LEVEL)
 _TRIES, _WALKED = 2, 4  # further steps on one piece; added to the tries once the neighbouring piece is tried
 _ANY = 0x7FFFFFFF  # tells the compiler that an index is not negative
 _STEP = 3e-9  # largest last step, in pieces, after which the square of the error is below round-off
-_CHUNK = 16_384  # points per task when several threads share a large batch
+_SHARED = 65_536  # points from which a batch is worth the start of threads (0.1 ms)
 SAMPLE_METHODS = ("circle", "chord", "pcp", "veaw")
 _CIRCLE, _CHORD, _PCP = range(3)
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -121,8 +120,7 @@ def _rows_to_columns(typing_context: Any, table: Any, rows: Any, first: Any, tar
     return types.void(table, rows, types.int64, target, types.int64), generate
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Feet:
+class Feet(NamedTuple):
     """Closest points on a curve of m points.
 
     parameter   : (m,) curve parameter
@@ -149,9 +147,9 @@ def project(points_mm: Array, grid: FootGrid, threads: int | None = None) -> Fee
     threads : None chooses by the number of points; the result is the same.
     """
     points = _flat(points_mm)
-    numbers, vertex = _results(len(points) // 2)
-    _share(lambda start, stop: _project(points, grid.reals, grid.integers, numbers, vertex, start, stop), len(vertex), threads)
-    return _feet(numbers, vertex)
+    feet = _empty_feet(len(points) // 2)
+    _share(lambda start, stop: _project(points, grid.reals, grid.integers, feet, start, stop), len(feet.vertex), threads)
+    return feet
 
 
 def _flat(points_mm: Array) -> Array:
@@ -160,43 +158,33 @@ def _flat(points_mm: Array) -> Array:
     return points
 
 
-def _results(m: int) -> tuple[Array, NDArray[np.uint8]]:
-    return np.empty(8 * m), np.empty(m, dtype=np.uint8)
-
-
-def _feet(numbers: Array, vertex: NDArray[np.uint8]) -> Feet:
-    m = len(vertex)
-    return Feet(
-        parameter=numbers[:m],
-        foot_mm=numbers[m : 3 * m].reshape(m, 2),
-        distance_mm=numbers[3 * m : 4 * m],
-        gradient=numbers[4 * m : 6 * m].reshape(m, 2),
-        curvature=numbers[6 * m : 7 * m],
-        station_mm=numbers[7 * m :],
-        vertex=vertex,
-    )
+def _empty_feet(m: int) -> Feet:
+    """Arrays of their own, not parts of one: the allocator hands such sizes out again without clearing their pages."""
+    return Feet(np.empty(m), np.empty((m, 2)), np.empty(m), np.empty((m, 2)), np.empty(m), np.empty(m), np.empty(m, dtype=np.uint8))
 
 
 def _share(work: Callable[[int, int], None], m: int, threads: int | None) -> None:
     """Run work(start, stop) over all of range(m): at once, or in chunks on threads when there are many points."""
     if threads is None:
-        threads = 1 if m < 4 * _CHUNK else os.cpu_count() or 1
-    if threads == 1 or m <= _CHUNK:
+        threads = (os.cpu_count() or 1) if m >= _SHARED else 1
+    if threads == 1 or m <= _BLOCK:
         work(0, m)
         return
+    chunk = _BLOCK * -(-m // (4 * threads * _BLOCK))  # four a thread, so that a thread that is held up delays the others little
     with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(work, range(0, m, _CHUNK), range(_CHUNK, m + _CHUNK, _CHUNK)))
+        list(pool.map(work, range(0, m, chunk), range(chunk, m + chunk, chunk)))
 
 
 def compile_kernels() -> None:
     """Compile every kernel, or load it from the cache: seconds on the first use after installation, milliseconds later."""
-    real, whole = types.Array(types.float64, 1, "C"), types.Array(types.uint8, 1, "C")
+    flat, pairs, kinds = types.Array(types.float64, 1, "C"), types.Array(types.float64, 2, "C"), types.Array(types.uint8, 1, "C")
+    feet = types.NamedTuple([flat, pairs, flat, pairs, flat, flat, kinds], Feet)
     fixed, index32, index64 = (types.Array(kind, 1, "C", readonly=True) for kind in (types.float64, types.int32, types.int64))
     word = types.int64
     exact: Any = _project
     on_samples: Any = _project_on_samples
-    exact.compile((fixed, fixed, index32, real, whole, word, word))
-    on_samples.compile((fixed, fixed, index64, fixed, index64, fixed, word, real, whole, word, word))
+    exact.compile((fixed, fixed, index32, feet, word, word))
+    on_samples.compile((fixed, fixed, index64, fixed, index64, fixed, word, feet, word, word))
 
 
 # Where the memory of a block keeps what, _BLOCK numbers each. Reals: the row of the piece (24 columns), then
@@ -206,14 +194,13 @@ _CONTENT, _ROW, _SOLVED, _POINT, _TRY, _UNSOLVED, _WAITING = (_BLOCK * i for i i
 
 
 @_compiled
-def _project(points: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, start: int, stop: int) -> None:
-    """Closest points of points[start:stop], of the flat (2 m,) points, into numbers and vertex; `stop` may lie beyond the last.
+def _project(points: Any, reals: Any, integers: Any, feet: Any, start: int, stop: int) -> None:
+    """Closest points of points[start:stop], of the flat (2 m,) points, into feet; `stop` may lie beyond the last.
 
-    numbers (8 m,) : parameter, foot (x, y), distance, gradient (x, y), curvature, station, each for all points
     All points of a block are solved on the piece that their cell holds; those whose foot is not on that piece, or whose
     cell holds several stretches, queue until they fill a block of their own.
     """
-    stop = min(stop, len(vertex))
+    stop = min(stop, len(feet.vertex))
     pieces, blocks, cells = reals[integers[3] :], integers[integers[9] :], integers[integers[10] :]
     w = carray(_stack_reals(), _REALS)
     q = carray(_stack_integers(), _INTEGERS)
@@ -246,11 +233,11 @@ def _project(points: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, 
         for j in range(lanes):
             _measure(w, j, reals[4], reals[5], reals[6])
         if fresh:
-            _store_block(w, numbers, vertex, block, lanes)
-            waiting = _queue_unsolved(w, q, reals, integers, numbers, vertex, block, lanes, waiting, best, stack)
+            _store_block(w, feet, block, lanes)
+            waiting = _queue_unsolved(w, q, reals, integers, feet, block, lanes, waiting, best, stack)
             block += lanes
         else:
-            waiting = _settle(w, q, reals, integers, numbers, vertex, lanes, waiting, best, stack)
+            waiting = _settle(w, q, reals, integers, feet, lanes, waiting, best, stack)
 
 
 @_inlined
@@ -366,13 +353,12 @@ def _measure(w: Any, j: int, first: float, last: float, length: float) -> None:
 
 
 @_inlined
-def _store_block(w: Any, numbers: Any, vertex: Any, block: int, k: int) -> None:
+def _store_block(w: Any, feet: Any, block: int, k: int) -> None:
     """Results of all points of a block, solved or not."""
-    m, end = len(vertex), block + k
-    u, e, curvature = numbers[block:end], numbers[3 * m + block : 3 * m + end], numbers[6 * m + block : 6 * m + end]
-    station = numbers[7 * m + block : 7 * m + end]
-    foot, gradient = numbers[m + 2 * block : m + 2 * end], numbers[4 * m + 2 * block : 4 * m + 2 * end]
-    kind = vertex[block:end]
+    end = block + k
+    u, e, curvature, station = feet.parameter[block:end], feet.distance_mm[block:end], feet.curvature[block:end], feet.station_mm[block:end]
+    foot, gradient = feet.foot_mm.reshape(-1)[2 * block : 2 * end], feet.gradient.reshape(-1)[2 * block : 2 * end]
+    kind = feet.vertex[block:end]
     for j in range(k):
         u[j] = w[_U + j]
     for j in range(k):
@@ -392,15 +378,12 @@ def _store_block(w: Any, numbers: Any, vertex: Any, block: int, k: int) -> None:
 
 
 @_compiled
-def _store(best: Any, numbers: Any, vertex: Any, i: int) -> None:
+def _store(best: Any, feet: Any, i: int) -> None:
     """Results of one point."""
-    m = len(vertex)
-    numbers[i] = best[0]
-    numbers[m + 2 * i], numbers[m + 2 * i + 1] = best[1], best[2]
-    numbers[3 * m + i] = best[3]
-    numbers[4 * m + 2 * i], numbers[4 * m + 2 * i + 1] = best[4], best[5]
-    numbers[6 * m + i], numbers[7 * m + i] = best[6], best[8]
-    vertex[i] = np.uint8(best[7])
+    feet.parameter[i], feet.distance_mm[i], feet.curvature[i], feet.station_mm[i] = best[0], best[3], best[6], best[8]
+    feet.foot_mm[i, 0], feet.foot_mm[i, 1] = best[1], best[2]
+    feet.gradient[i, 0], feet.gradient[i, 1] = best[4], best[5]
+    feet.vertex[i] = np.uint8(best[7])
 
 
 # --- further tries of the few points that the first pass leaves ---------------------------------------------------------
@@ -408,7 +391,7 @@ def _store(best: Any, numbers: Any, vertex: Any, i: int) -> None:
 
 @_compiled
 def _queue_unsolved(
-    w: Any, q: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, block: int, lanes: int, waiting: int, best: Any, stack: Any
+    w: Any, q: Any, reals: Any, integers: Any, feet: Any, block: int, lanes: int, waiting: int, best: Any, stack: Any
 ) -> int:
     """Queue what the first pass left, or search for it; the number of waiting items."""
     unsolved = 0
@@ -419,13 +402,13 @@ def _queue_unsolved(
     for item in range(unsolved):
         j = q[_UNSOLVED + item]
         point, content = block + j, q[_CONTENT + j]
-        numbers[3 * len(vertex) + point] = np.inf
+        feet.distance_mm[point] = np.inf
         if content >= 0:
             q[_POINT + j], q[_TRY + j] = point, 0
-            waiting = _advance(w, q, reals, integers, numbers, vertex, j, waiting, best, stack)
+            waiting = _advance(w, q, reals, integers, feet, j, waiting, best, stack)
         elif content == FAR:
             _search(w[_X + j], w[_Y + j], reals, integers, best, stack)
-            _store(best, numbers, vertex, point)
+            _store(best, feet, point)
         else:
             place = LISTED - content
             for branch in range(lists[place]):
@@ -460,20 +443,20 @@ def _resume(w: Any, lanes: int, waiting: int) -> None:
 
 
 @_compiled
-def _settle(w: Any, q: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, lanes: int, waiting: int, best: Any, stack: Any) -> int:
+def _settle(w: Any, q: Any, reals: Any, integers: Any, feet: Any, lanes: int, waiting: int, best: Any, stack: Any) -> int:
     """Offer the solved items to their points, send the others on."""
     for j in range(lanes):
         if q[_SOLVED + j] == 1:
             best[0], best[1], best[2], best[3] = w[_U + j], w[_FOOT_X + j], w[_FOOT_Y + j], w[_E + j]
             best[4], best[5], best[6], best[7], best[8] = w[_NX + j], w[_NY + j], w[_CURVATURE + j], 0.0, w[_STATION + j]
-            _offer(best, numbers, vertex, q[_POINT + j])
+            _offer(best, feet, q[_POINT + j])
         else:
-            waiting = _advance(w, q, reals, integers, numbers, vertex, j, waiting, best, stack)
+            waiting = _advance(w, q, reals, integers, feet, j, waiting, best, stack)
     return waiting
 
 
 @_compiled
-def _advance(w: Any, q: Any, reals: Any, integers: Any, numbers: Any, vertex: Any, j: int, waiting: int, best: Any, stack: Any) -> int:
+def _advance(w: Any, q: Any, reals: Any, integers: Any, feet: Any, j: int, waiting: int, best: Any, stack: Any) -> int:
     """The next try of an unsolved lane: once on the neighbouring piece, or the vertex there, or on from its t; else the search.
 
     Feet are accepted on the certified piece and its two neighbours only, so no try can end on another stretch of curve.
@@ -490,21 +473,21 @@ def _advance(w: Any, q: Any, reals: Any, integers: Any, numbers: Any, vertex: An
             along = rx * vx + ry * vy
             if (along <= 0.0) if after else (along >= 0.0):
                 _finish_vertex(x, y, reals[integers[6] :], VERTEX_WIDTH * (-1 - link), reals[3], best)
-                _offer(best, numbers, vertex, point)
+                _offer(best, feet, point)
                 return waiting
     elif not np.isnan(t) and (tried & (_WALKED - 1)) < _TRIES:
         return _push(w, q, waiting, point, piece, tried + 1, t)
     _search(x, y, reals, integers, best, stack)
-    _offer(best, numbers, vertex, point)
+    _offer(best, feet, point)
     return waiting
 
 
 @_compiled
-def _offer(best: Any, numbers: Any, vertex: Any, point: int) -> None:
+def _offer(best: Any, feet: Any, point: int) -> None:
     """Keep the closest foot of a point; of two equally close ones that of the smaller parameter, whatever their order."""
-    distance, least = abs(best[3]), abs(numbers[3 * len(vertex) + point])
-    if distance < least or (distance == least and best[0] < numbers[point]):
-        _store(best, numbers, vertex, point)
+    distance, least = abs(best[3]), abs(feet.distance_mm[point])
+    if distance < least or (distance == least and best[0] < feet.parameter[point]):
+        _store(best, feet, point)
 
 
 # --- any place: search over the whole curve -----------------------------------------------------------------------------
@@ -695,15 +678,15 @@ def project_on_samples(points_mm: Array, grid: FootGrid, table: SampleTable, met
     The grid merely says where to begin the search for the nearest sample. Points that are not finite give NaN.
     """
     points = _flat(points_mm)
-    numbers, vertex = _results(len(points) // 2)
+    feet = _empty_feet(len(points) // 2)
     tables = (table.samples.reshape(-1), table.links.reshape(-1), table.boxes.reshape(-1), table.starts, table.domain)
 
     def work(start: int, stop: int) -> None:
-        _project(points, grid.reals, grid.integers, numbers, vertex, start, stop)
-        _project_on_samples(points, *tables, SAMPLE_METHODS.index(method), numbers, vertex, start, stop)
+        _project(points, grid.reals, grid.integers, feet, start, stop)
+        _project_on_samples(points, *tables, SAMPLE_METHODS.index(method), feet, start, stop)
 
-    _share(work, len(vertex), threads)
-    return _feet(numbers, vertex)
+    _share(work, len(feet.vertex), threads)
+    return feet
 
 
 @_compiled
@@ -715,16 +698,15 @@ def _project_on_samples(
     starts: Any,
     domain: Any,
     method: int,
-    numbers: Any,
-    vertex: Any,
+    feet: Any,
     start: int,
     stop: int,
 ) -> None:
-    """Projections of points[start:stop]; numbers and vertex hold the exact ones and take the new ones in their place."""
-    stop = min(stop, len(vertex))
+    """Projections of points[start:stop]; feet hold the exact ones and take the new ones in their place."""
+    stop = min(stop, len(feet.vertex))
     stack, best = np.empty(64, dtype=np.int64), np.empty(9)
     for point in range(start, stop):
-        x, y, u = points[2 * point], points[2 * point + 1], numbers[point]
+        x, y, u = points[2 * point], points[2 * point + 1], feet.parameter[point]
         if np.isnan(u):
             continue
         site = int((u - domain[0]) / (domain[1] - domain[0]) * len(starts))
@@ -742,7 +724,7 @@ def _project_on_samples(
             else:
                 left, gx, gy = _between_pole_circles(x, y, site, samples, links)
             _from_sample(x, y, site, left, gx, gy, samples, domain, best)
-        _store(best, numbers, vertex, point)
+        _store(best, feet, point)
 
 
 @_compiled

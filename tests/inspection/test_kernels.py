@@ -17,7 +17,7 @@ from tests.inspection import projections_reference as reference
 from tests.inspection.oracle import Closest, closest_point
 from tests.inspection.profiles import Array
 
-FIELDS = tuple(Feet.__dataclass_fields__)
+FIELDS = Feet._fields
 FILES = ("ag35", "clarky", "dae11", "e387", "fx63137", "goe227", "goe404", "mh42", "naca65410", "rae2822", "s1223_hires", "sc20714")
 SECTIONS = tuple(f"{camber}{thickness:02d}" for camber in ("00", "24", "44", "65") for thickness in (6, 9, 12, 15, 21))
 
