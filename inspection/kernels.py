@@ -8,6 +8,7 @@ vectorised and scalar code. Nothing is compiled when this file is imported; `com
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np

@@ -64,7 +64,7 @@ def merged(chosen: Mask, if_chosen: Feet, otherwise: Feet) -> Feet:
         a, b = getattr(if_chosen, name), getattr(otherwise, name)
         return np.asarray(np.where(chosen[:, None] if a.ndim == 2 else chosen, a, b))
 
-    return Feet(*(pick(name) for name in Feet.__slots__))  # type: ignore[arg-type]
+    return Feet(*(pick(name) for name in Feet._fields))  # type: ignore[arg-type]
 
 
 def dot(a: Array, b: Array) -> Array:

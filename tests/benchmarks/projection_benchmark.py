@@ -174,7 +174,7 @@ def methods_table(rounds: int) -> Iterator[str]:
 
 
 def engeom_way(curve: NurbsCurve, samples: Array) -> Distances:
-    from engeom.geom2 import Curve2, Point2  # noqa: PLC0415
+    from engeom.geom2 import Curve2, Point2
 
     polyline = Curve2(samples, tol=1e-9)
 
@@ -186,11 +186,11 @@ def engeom_way(curve: NurbsCurve, samples: Array) -> Distances:
 
 
 def opencascade_way(curve: NurbsCurve, samples: Array) -> Distances:
-    from OCP.Geom import Geom_BSplineCurve  # noqa: PLC0415
-    from OCP.GeomAPI import GeomAPI_ProjectPointOnCurve  # noqa: PLC0415
-    from OCP.gp import gp_Pnt  # noqa: PLC0415
-    from OCP.TColgp import TColgp_Array1OfPnt  # noqa: PLC0415
-    from OCP.TColStd import TColStd_Array1OfInteger, TColStd_Array1OfReal  # noqa: PLC0415
+    from OCP.Geom import Geom_BSplineCurve
+    from OCP.GeomAPI import GeomAPI_ProjectPointOnCurve
+    from OCP.gp import gp_Pnt
+    from OCP.TColgp import TColgp_Array1OfPnt
+    from OCP.TColStd import TColStd_Array1OfInteger, TColStd_Array1OfReal
 
     values, counts = np.unique(curve.knots, return_counts=True)
     assert curve.weights is not None
@@ -222,7 +222,7 @@ def opencascade_way(curve: NurbsCurve, samples: Array) -> Distances:
 
 def geomdl_way(curve: NurbsCurve, samples: Array) -> Distances:
     """geomdl has no projection of its own: its derivatives in the published Newton iteration, started at the nearest sample."""
-    from geomdl import NURBS  # noqa: PLC0415
+    from geomdl import NURBS
 
     assert curve.weights is not None
     first, last = curve.domain
@@ -250,7 +250,7 @@ def geomdl_way(curve: NurbsCurve, samples: Array) -> Distances:
 
 def splipy_way(curve: NurbsCurve, samples: Array) -> Distances:
     """splipy: values and derivatives of all points at once in the published Newton iteration, started at the nearest sample."""
-    from splipy import BSplineBasis, Curve  # noqa: PLC0415
+    from splipy import BSplineBasis, Curve
 
     assert curve.weights is not None
     first, last = curve.domain
@@ -270,7 +270,7 @@ def splipy_way(curve: NurbsCurve, samples: Array) -> Distances:
 
 
 def libigl_way(curve: NurbsCurve, samples: Array) -> Distances:
-    import igl  # noqa: PLC0415
+    import igl
 
     vertices = np.column_stack([samples, np.zeros(len(samples))])
     edges = np.column_stack([np.arange(len(samples) - 1), np.arange(1, len(samples))])
@@ -283,7 +283,7 @@ def libigl_way(curve: NurbsCurve, samples: Array) -> Distances:
 
 
 def small_gicp_way(curve: NurbsCurve, samples: Array) -> Distances:
-    import small_gicp  # noqa: PLC0415
+    import small_gicp
 
     tree = small_gicp.KdTree(np.column_stack([samples, np.zeros(len(samples))]))
 
@@ -294,7 +294,7 @@ def small_gicp_way(curve: NurbsCurve, samples: Array) -> Distances:
 
 
 def open3d_way(curve: NurbsCurve, samples: Array) -> Distances:
-    import open3d as o3d  # noqa: PLC0415
+    import open3d as o3d
 
     reference = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(np.column_stack([samples, np.zeros(len(samples))])))
 
