@@ -296,7 +296,7 @@ def _tell(outcome: RunOutcome, profile: NominalProfile, telling: Telling, starte
     if telling.as_json:
         _print_json(facts)
     else:
-        print_summary(Console(highlight=False, soft_wrap=not sys.stdout.isatty()), outcome.result, outcome.counts, _heading(started))
+        print_summary(Console(highlight=False, soft_wrap=not sys.stdout.isatty()), outcome.result, outcome.counts, f"{_title(started)}, {started.device}")
     if telling.out is not None:
         written = write_results(telling.out, facts, outcome.result, profile, _title(started))
         if not telling.as_json:
@@ -307,11 +307,7 @@ def _tell(outcome: RunOutcome, profile: NominalProfile, telling: Telling, starte
 
 
 def _title(started: RunStarted) -> str:
-    return " ".join(filter(None, [started.part, started.serial_number]))
-
-
-def _heading(started: RunStarted) -> str:
-    return f"{_title(started)}, {'SIMULATED device, ' if started.simulated else ''}{started.device}"
+    return " ".join(filter(None, [started.part, started.serial_number, "(SIMULATED)" if started.simulated else ""]))
 
 
 def _print_json(facts: dict[str, Any]) -> None:

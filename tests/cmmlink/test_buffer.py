@@ -11,7 +11,7 @@ PATIENCE_S = 30.0
 
 def given_later(buffer: HandOver[int], results: list[bool], *gifts: tuple[int, int]) -> threading.Thread:
     """Give from another thread; the results are what `give` returned."""
-    giver = threading.Thread(target=lambda: results.extend(buffer.give(item, size) for item, size in gifts))
+    giver = threading.Thread(target=lambda: results.extend(buffer.give(item, size) for item, size in gifts), daemon=True)
     giver.start()
     return giver
 
@@ -57,7 +57,7 @@ def test_a_full_buffer_holds_the_giver_until_something_is_taken() -> None:
     given: list[bool] = []
     giver = given_later(buffer, given, (1, 10), (2, 1))
     until_stalled(buffer, giver)
-    assert (given, buffer.waiting, buffer.peak, buffer.stalls) == ([], 10, 10, 1)
+    assert (given, buffer.waiting, buffer.peak, buffer.stalls) == ([True], 10, 10, 1)
     assert buffer.take(0.0) == [1]
     ended(giver)
     assert given == [True, True]
