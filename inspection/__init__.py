@@ -5,7 +5,7 @@ from inspection.curve import NurbsCurve
 from inspection.deviations import Deviations, profile_error_mm
 from inspection.errors import InspectionError, NominalError, RegistrationError
 from inspection.fine import register, register_fine
-from inspection.live import InspectionResult, LiveInspection, LiveUpdate, Rejection
+from inspection.live import InspectionResult, LiveInspection, LiveUpdate, Rejection, rehearse
 from inspection.minimum_zone import MinimumZone, fit_minimum_zone
 from inspection.nominal import NominalProfile, discretize
 from inspection.profile_error import deviations
@@ -38,4 +38,5 @@ __all__ = [
     "register",
     "register_coarse",
     "register_fine",
+    "rehearse",
 ]

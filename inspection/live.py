@@ -281,6 +281,19 @@ class LiveInspection:
         )
 
 
+def rehearse(nominal: NominalProfile) -> None:
+    """Inspect a made-up scan of the nominal itself, so that every compiled loop is compiled before a real scan begins.
+
+    Takes seconds on the first use after an installation, milliseconds from the cache afterwards.
+    """
+    live = LiveInspection(nominal, ToleranceZone(-1.0, 1.0))
+    points = nominal.points_mm[:: max(1, len(nominal) // (4 * _BLOCK))]
+    live.add(np.column_stack([points, np.zeros(len(points))]))
+    live.add(points)
+    live.snapshot()
+    live.finish()
+
+
 class _Rows:
     """Growing arrays, a row for every received point."""
 
