@@ -38,7 +38,7 @@ from drivers.errors import DeviceError, LinkError, PointFileError
 from drivers.point_file import PointFileSource
 from drivers.serial_scanner import SerialScanner, ports
 from drivers.source import ScanSource
-from inspection import InspectionError, LiveInspection, NominalProfile, ToleranceZone, Verdict
+from inspection import InspectionError, LiveInspection, NominalProfile, ToleranceZone, Verdict, rehearse
 
 app = typer.Typer(
     add_completion=False,
@@ -251,6 +251,7 @@ def _naming(plan_file: Path, key: str) -> Iterator[None]:
 
 def _run(plan: Plan, profile: NominalProfile, telling: Telling, simulated: bool = False) -> int:
     """Carry out a plan and tell what came of it."""
+    _rehearsed(profile)
     live = planned_inspection(plan, profile)
     source, device = _source_of(plan)
     started = RunStarted(plan.part.name, plan.part.serial_number or "", plan.operator or "", device, simulated)
@@ -259,6 +260,17 @@ def _run(plan: Plan, profile: NominalProfile, telling: Telling, simulated: bool 
     with nullcontext() if quiet else table:
         outcome = _carry_out(source, live, started, [] if quiet else [table], plan.buffer_points)
     return _tell(outcome, profile, telling, started)
+
+
+def _rehearsed(profile: NominalProfile) -> None:
+    """Have everything compiled before a device is asked for points, saying so when that takes a while."""
+    message = "cmmlink: compiling the inspection, once after installation (about ten seconds)\n"
+    patience = threading.Timer(1.0, sys.stderr.write, (message,))
+    patience.start()
+    try:
+        rehearse(profile)
+    finally:
+        patience.cancel()
 
 
 def _source_of(plan: Plan) -> tuple[ScanSource, str]:
