@@ -20,8 +20,10 @@ test: .venv/test-installed
 
 .venv/installed: pyproject.toml | .venv/bin/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	@$(BIN)/python -m cmmlink.open3d_doctor
 	touch $@
 
 .venv/test-installed: pyproject.toml | .venv/bin/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
+	@$(BIN)/python -m cmmlink.open3d_doctor
 	touch $@ .venv/installed

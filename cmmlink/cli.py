@@ -11,7 +11,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -22,6 +22,9 @@ import typer
 from rich.console import Console
 
 from cmmlink import __version__
+from cmmlink.ct import inspect_stack
+from cmmlink.ct_command import ManyHeights, SectionBar, own_nominals, plan_from, print_stack
+from cmmlink.ct_plan import CtPlan, load_ct_plan
 from cmmlink.demo import plan_file as demo_plan_file
 from cmmlink.demo import write_part_path
 from cmmlink.errors import PlanError, StoreError
@@ -31,10 +34,11 @@ from cmmlink.parts import planned_inspection, planned_profile, profile_of
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan import FileDevice, Plan, load_plan, place_of
 from cmmlink.report.folder import prepare, write_results
+from cmmlink.report.stack_folder import write_stack
 from cmmlink.report.summary import identity, summary
 from cmmlink.terminal import LiveTable, print_summary
 from drivers.ascii_frames import AsciiDecoder
-from drivers.errors import DeviceError, LinkError, PointFileError
+from drivers.errors import DeviceError, LinkError, MeshError, PointFileError
 from drivers.point_file import PointFileSource
 from drivers.serial_scanner import SerialScanner, ports
 from drivers.source import ScanSource
@@ -75,6 +79,14 @@ class FitName(StrEnum):
     NONE = "none"
 
 
+class CutterName(StrEnum):
+    """What cuts a surface."""
+
+    AUTO = "auto"
+    OPEN3D = "open3d"
+    NUMPY = "numpy"
+
+
 class MethodName(StrEnum):
     """How deviations are found."""
 
@@ -103,7 +115,7 @@ def main() -> None:
             _fail("stopped by the operator", _STOPPED)
     except typer.TyperException as error:
         code = _fail(_usage(error), _UNUSABLE)
-    except (PlanError, InspectionError, PointFileError) as error:
+    except (PlanError, InspectionError, PointFileError, MeshError) as error:
         code = _fail(str(error), _UNUSABLE)
     except DeviceError as error:
         code = _fail(str(error), _DEVICE_FAILED)
@@ -282,8 +294,9 @@ def _source_of(plan: Plan) -> tuple[ScanSource, str]:
     return scanner, f"{device.type} {device.address}"
 
 
-def _carry_out(source: ScanSource, live: LiveInspection, started: RunStarted, sinks: Sequence[Sink], buffer_points: int) -> RunOutcome:
-    """Run to the end, or to Ctrl-C; a second one ends at once."""
+@contextmanager
+def _stopped_by_ctrl_c() -> Iterator[threading.Event]:
+    """An event that Ctrl-C sets; a second one ends at once."""
     stop = threading.Event()
 
     def interrupted(*_: object) -> None:
@@ -292,9 +305,15 @@ def _carry_out(source: ScanSource, live: LiveInspection, started: RunStarted, si
 
     before = signal.signal(signal.SIGINT, interrupted)
     try:
-        return run_inspection(source, live, sinks, started, buffer_points=buffer_points, clock=time.monotonic, stop=stop)
+        yield stop
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+def _carry_out(source: ScanSource, live: LiveInspection, started: RunStarted, sinks: Sequence[Sink], buffer_points: int) -> RunOutcome:
+    """Run to the end, or to Ctrl-C."""
+    with _stopped_by_ctrl_c() as stop:
+        return run_inspection(source, live, sinks, started, buffer_points=buffer_points, clock=time.monotonic, stop=stop)
 
 
 def _tell(outcome: RunOutcome, profile: NominalProfile, telling: Telling, started: RunStarted) -> int:
@@ -367,6 +386,85 @@ def _zone(tolerance: tuple[float, float], uncertainty: float) -> ToleranceZone:
     except ValueError as error:
         option = f"{limits} --uncertainty {uncertainty:g}" if uncertainty else limits
         raise PlanError(f"{option}: {error}") from None
+
+
+@app.command(cls=ManyHeights)
+def ct(
+    mesh: Annotated[Path, typer.Argument(metavar="MESH", help="Surface: STL, PLY, OBJ; or a plan (YAML) of all that follows.")],
+    nominal: Annotated[Path | None, typer.Option(metavar="FILE", help="The nominal profile.")] = None,
+    tolerance: Annotated[
+        tuple[float, float] | None, typer.Option(metavar="LO HI", help="Deviations allowed, mm, positive out of material.")
+    ] = None,
+    normal: Annotated[tuple[float, float, float], typer.Option(metavar="X Y Z", help="The part's axis in the scan.")] = (0.0, 0.0, 1.0),
+    heights: Annotated[list[float] | None, typer.Option(metavar="H [H ...]", help="Heights of the sections along the normal, mm.")] = None,
+    every: Annotated[float | None, typer.Option(metavar="STEP", help="A section every STEP mm, in place of --heights.")] = None,
+    start: Annotated[float | None, typer.Option("--from", metavar="A", help="First height with --every.")] = None,
+    end: Annotated[float | None, typer.Option("--to", metavar="B", help="Last height with --every.")] = None,
+    nominal_at: Annotated[list[str] | None, typer.Option(metavar="HEIGHT FILE", help="Another nominal for one section.")] = None,
+    method: Annotated[MethodName, typer.Option(help="How deviations are found.")] = MethodName.EXACT,
+    fit: Annotated[FitName, typer.Option(help="How each section comes onto its nominal.")] = FitName.BEST_FIT,
+    uncertainty: Annotated[float, typer.Option(metavar="U", help="Expanded uncertainty of a deviation, mm.")] = 0.0,
+    scale: Annotated[float, typer.Option(metavar="S", help="Units of the nominal file to mm (a chord, for airfoils).")] = 1.0,
+    mesh_scale: Annotated[float, typer.Option(metavar="S", help="Units of the surface file to mm.")] = 1.0,
+    closed: Annotated[bool | None, typer.Option("--closed/--open", help="Close the nominal, or leave it open.")] = None,
+    material: Annotated[Side | None, typer.Option(help="Side of the material, seen along the nominal.")] = None,
+    coverage_min: Annotated[float, typer.Option(help="Share of a nominal to be there before conform is proven.")] = 0.95,
+    cutter: Annotated[CutterName, typer.Option(help="auto: Open3D, and numpy for more than 50 sections; same points.")] = CutterName.AUTO,
+    weld: Annotated[float, typer.Option(metavar="MM", help="Loose ends no farther apart are one point.")] = 1e-6,
+    shortest: Annotated[float | None, typer.Option(metavar="MM", help="Shorter pieces are dust; 5 % of the longest if not given.")] = None,
+    pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="Draw them into the folder of --out.")] = True,
+    out: Out = None,
+    as_json: Json = False,
+) -> int:
+    """Inspect sections of a CT surface."""
+    if mesh.suffix.lower() in (".yaml", ".yml"):
+        return _ct(load_ct_plan(mesh), Telling(False, as_json, out), pictures)
+    if nominal is None or tolerance is None:
+        raise PlanError(f"{mesh}: a surface needs --nominal FILE and --tolerance LO HI")
+    settings: dict[str, object] = {
+        "part": {"name": mesh.stem},
+        "mesh": {"file": mesh, "scale": mesh_scale},
+        "nominal": {"file": nominal, "scale": scale, "closed": closed, "material": material.value if material else None},
+        "tolerance": {"lower_mm": tolerance[0], "upper_mm": tolerance[1], "uncertainty_mm": uncertainty},
+        "sections": {
+            "normal": normal,
+            "heights_mm": tuple(heights or ()),
+            "every_mm": every,
+            "from_mm": start,
+            "to_mm": end,
+            "nominal_at": own_nominals(nominal_at or ()),
+        },
+        "cut": {"cutter": cutter.value, "weld_mm": weld, "shortest_mm": shortest},
+        "registration": {"fit": fit.value, "method": method.value, "coverage_min": coverage_min},
+    }
+    return _ct(plan_from(settings), Telling(False, as_json, out), pictures)
+
+
+def _ct(plan: CtPlan, telling: Telling, pictures: bool) -> int:
+    """Inspect a stack, with a progress bar, and tell what came of it: the verdict first, whatever happens to the files."""
+    folder = telling.out or plan.out
+    prepare(folder)
+    bar = SectionBar(Console(stderr=True), visible=not telling.as_json and sys.stderr.isatty())
+    steps: list[Callable[[], None]] = []
+    with bar.shown(), _stopped_by_ctrl_c() as stop:
+        stack = inspect_stack(
+            plan,
+            clock=time.monotonic,
+            stop=stop,
+            on_start=lambda sections: steps.append(bar.round("inspected", sections)),
+            on_section=lambda _: steps[0](),
+        )
+    if telling.as_json:
+        _print_json(stack.facts())
+    else:
+        print_stack(Console(highlight=False, soft_wrap=not sys.stdout.isatty()), stack)
+    if folder is not None:
+        with bar.shown():
+            done = bar.round("written", len(stack.sections))
+            write_stack(folder, stack, plan.tolerance.zone, plan.part.name, pictures=pictures, on_section=done)
+        if not telling.as_json:
+            typer.echo(f"results in {folder}: result.json, sections.csv, a folder for each section{', stack.png' if pictures else ''}")
+    return _EXIT[stack.verdict]
 
 
 @app.command()

@@ -7,7 +7,7 @@ import numpy as np
 
 from cmmlink.errors import PlanError
 from cmmlink.nominal_files import NominalFile, load_nominal, material_side
-from cmmlink.plan import Plan
+from cmmlink.plan import Datum, Plan
 from inspection import LiveInspection, NominalProfile, RigidTransform, SectionPlane, discretize
 from inspection.nominal import Material
 
@@ -32,15 +32,18 @@ def planned_profile(plan: Plan) -> NominalProfile:
     return discretize(file.curve, finely.samples, finely.pole_angle_min_deg, finely.step_min, side)
 
 
+def pose_of(datum: Datum | None) -> RigidTransform | None:
+    """The known pose that a plan gives, if it gives one."""
+    return None if datum is None else RigidTransform(math.radians(datum.rotation_deg), np.array(datum.translation_mm))
+
+
 def planned_inspection(plan: Plan, profile: NominalProfile) -> LiveInspection:
     """A fresh inspection as a plan describes it."""
     registration, section = plan.registration, plan.section
-    datum = registration.datum
-    pose = None if datum is None else RigidTransform(math.radians(datum.rotation_deg), np.array(datum.translation_mm))
     return LiveInspection(
         profile,
         plan.tolerance.zone,
-        datum=pose,
+        datum=pose_of(registration.datum),
         fit=registration.fit,
         method=registration.method,
         tip_radius_mm=plan.probe.tip_radius_mm,

@@ -15,7 +15,7 @@ from drivers.source import LinkDown, LinkUp, ScanOpened
 from inspection import InspectionResult, LiveUpdate, ToleranceZone, Verdict
 
 WORDS = {Verdict.CONFORM: "CONFORM", Verdict.UNCERTAIN: "NOT PROVEN", Verdict.NONCONFORM: "NOT CONFORM"}
-_STYLES = {Verdict.CONFORM: "bold green", Verdict.UNCERTAIN: "bold yellow", Verdict.NONCONFORM: "bold red"}
+STYLES = {Verdict.CONFORM: "bold green", Verdict.UNCERTAIN: "bold yellow", Verdict.NONCONFORM: "bold red"}
 _REPAINTS_PER_S = 8
 _WHOLE = 0.95  # of the nominal's length: below it the summary says that the rest is unknown
 _MOST_STRETCHES = 10
@@ -111,13 +111,13 @@ class LiveTable:
         if math.isnan(self._worst):
             return "not yet"
         verdict = self._zone.verdict(self._worst)
-        return f"[{_STYLES[verdict]}]{WORDS[verdict]}[/] so far"
+        return f"[{STYLES[verdict]}]{WORDS[verdict]}[/] so far"
 
 
 def print_summary(console: Console, result: InspectionResult | None, counts: Counts, heading: str) -> None:
     """Print the verdict, the four numbers, and what the verdict on the profile rests on."""
     verdict = Verdict.UNCERTAIN if result is None else result.verdict
-    console.print(f"[{_STYLES[verdict]}]{WORDS[verdict]}[/]   {escape(heading)}".rstrip())
+    console.print(f"[{STYLES[verdict]}]{WORDS[verdict]}[/]   {escape(heading)}".rstrip())
     for reason in _reservations(result):
         console.print(f"  {reason}", style="yellow")
     console.print(f"received {counts.received} = judged {counts.judged} + rejected {counts.rejected}; lost {counts.lost} points")

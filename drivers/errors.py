@@ -5,6 +5,7 @@ DeviceError
   ProtocolError   what arrives is not what the plan's device sends
   DeviceRefused   the device answered, and said no
 PointFileError    a file of points cannot be used
+MeshError         a surface file, or a cut through it, cannot be used
 
 Libraries' own exceptions (pyserial, pymodbus) are translated in the one file that imports the library.
 A message says what happened, where (port or address), and what the operator can do.
@@ -29,3 +30,7 @@ class DeviceRefused(DeviceError):  # noqa: N818 - the name is fixed by DESIGN: i
 
 class PointFileError(ValueError):
     """A file of points cannot be used; the message names file, line, what was found and what is expected."""
+
+
+class MeshError(ValueError):
+    """A surface file or a cut through it cannot be used; the message names the file, the place in it, and what to do."""

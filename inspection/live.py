@@ -76,6 +76,7 @@ class LiveInspection:
     section         : plane for points in space (m, 3); off_section_max_mm rejects points farther from it
     coverage_min    : share of the nominal's length below which conformity is not proven
     reject_outliers : find gross outliers in the final registration and reject them
+    provisional     : False seeks no pose before `finish`, for points that are all there from the start; the result is the same
     """
 
     def __init__(
@@ -91,6 +92,7 @@ class LiveInspection:
         off_section_max_mm: float | None = None,
         coverage_min: float = 0.0,
         reject_outliers: bool = False,
+        provisional: bool = True,
     ) -> None:
         check_tip_radius(tip_radius_mm, nominal)
         if fit not in get_args(Fit):
@@ -102,7 +104,7 @@ class LiveInspection:
         self._plane = (section or SectionPlane(np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))).packed
         self._off_section_max = float("inf") if off_section_max_mm is None else off_section_max_mm
         self._judgement = (nominal.outward, tip_radius_mm, zone.lower_mm, zone.upper_mm, zone.uncertainty_mm)
-        self._reject_outliers = reject_outliers
+        self._reject_outliers, self._provisional = reject_outliers, provisional
         self._datum = RigidTransform.identity() if datum is None and fit == "none" else datum
         self._rows = _Rows()
         self._next_search = _BLOCK
@@ -138,7 +140,7 @@ class LiveInspection:
         rows, first = self._rows, self._rows.count
         rows.reserve(first + len(points))
         take_in(points, self._plane, self._off_section_max, rows.points, rows.rejection, first)
-        if self._datum is not None:
+        if self._datum is not None or not self._provisional:
             rows.count = first + len(points)
             self._judge(first, rows.count)
             return self._update(first)

@@ -1,0 +1,91 @@
+"""The folder of results of a stack: one object, one table, one map, and a folder for each section."""
+
+import csv
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+from cmmlink.ct import SectionOutcome, StackOutcome
+from cmmlink.errors import PlanError
+from cmmlink.report.deviations_csv import write_deviations
+from drivers.contour_source import Slice
+from inspection import ToleranceZone
+
+CONTOUR_HEADER = ("contour", "closed", "hole", "x_mm", "y_mm", "z_mm", "section_x_mm", "section_y_mm")
+_SECTION_FILES = ("contours.csv", "deviations.csv", "profile.png")
+_SECTION_KEYS = (
+    "height_mm", "asked_height_mm", "verdict", "received", "judged", "rejected", "out_of_tolerance", "max_deviation_mm", "min_deviation_mm",
+    "rms_mm", "profile_error_mm", "coverage", "contours", "holes", "open_contours", "set_aside", "cutter",
+)  # fmt: skip
+
+
+def write_stack(
+    folder: Path,
+    stack: StackOutcome,
+    zone: ToleranceZone,
+    title: str,
+    *,
+    pictures: bool = True,
+    on_section: Callable[[], None] = lambda: None,
+) -> None:
+    """Write result.json, sections.csv, stack.png and for each section its deviations, contours and picture."""
+    from cmmlink.report.picture import write_picture  # noqa: PLC0415 - matplotlib takes half a second that other commands need not pay
+    from cmmlink.report.stack_picture import write_stack_picture  # noqa: PLC0415
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        _clear(folder)
+        (folder / "result.json").write_text(json.dumps(stack.facts(), indent=2) + "\n", encoding="utf-8")
+        _write_sections(stack, folder / "sections.csv")
+        for number, section in enumerate(stack.sections, start=1):
+            own = folder / section_folder(number, section)
+            own.mkdir(exist_ok=True)
+            write_contours(section.slice, own / "contours.csv")
+            result = section.run.result
+            if result is not None and result.judged:
+                write_deviations(result, own / "deviations.csv")
+                if pictures:
+                    write_picture(result, section.profile, f"{title}, height {section.slice.height_mm:g} mm", own / "profile.png")
+            on_section()
+        if pictures:
+            write_stack_picture(stack, zone, title, folder / "stack.png")
+    except OSError as error:
+        raise PlanError(f"{folder}: the results cannot be written ({error.strerror}); choose another folder with --out") from None
+
+
+def _clear(folder: Path) -> None:
+    """Take away what an earlier run wrote here: it must not stand beside this one's result."""
+    earlier = [folder / name for name in ("result.json", "sections.csv", "stack.png")]
+    own = [path for path in folder.glob("section-*_*mm") if path.is_dir()]
+    for path in [*earlier, *(path / name for path in own for name in _SECTION_FILES)]:
+        path.unlink(missing_ok=True)
+    for path in own:
+        if not any(path.iterdir()):
+            path.rmdir()
+
+
+def section_folder(number: int, section: SectionOutcome) -> str:
+    """Name of a section's folder, like section-002_50.000mm."""
+    return f"section-{number:03d}_{section.slice.asked_mm:.3f}mm"
+
+
+def write_contours(cut: Slice, path: Path) -> None:
+    """Write every contour point, in machine and in section coordinates; closed contours do not repeat their first point."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(CONTOUR_HEADER)
+        for number, contour in enumerate(cut.contours, start=1):
+            head = (number, "closed" if contour.closed else "open", "hole" if contour.hole else "outer")
+            for machine, section in zip(contour.points_mm.tolist(), contour.section_mm.tolist(), strict=True):
+                writer.writerow((*head, *(f"{value:.6f}" for value in (*machine, *section))))
+
+
+def _write_sections(stack: StackOutcome, path: Path) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow((*_SECTION_KEYS, "worst_station_mm", "worst_deviation_mm", "warnings"))
+        for section in stack.sections:
+            facts = section.facts()
+            worst = facts["worst"] or {}
+            values = ["" if facts[key] is None else facts[key] for key in _SECTION_KEYS]
+            writer.writerow((*values, worst.get("station_mm", ""), worst.get("deviation_mm", ""), "; ".join(section.warnings)))

@@ -1,0 +1,81 @@
+"""The picture of a stack of sections: the map of deviations over station and height.
+
+State is told by mark as well as by colour: a triangle up where a stretch is above the zone, one down where it is below.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from cmmlink.ct import SectionOutcome, StackOutcome
+from cmmlink.report.picture import WORDS
+from inspection import ToleranceZone
+
+Array = NDArray[np.float64]
+
+_COLUMNS = 600
+_EMPTY = "#d4d7da"
+
+
+def write_stack_picture(stack: StackOutcome, zone: ToleranceZone, title: str, path: Path) -> None:
+    """Draw the map to a PNG file; where the nominals differ in length, over the share of the length."""
+    sections = sorted(stack.sections, key=lambda section: section.slice.height_mm)
+    lengths = np.array([section.profile.length_mm for section in sections])
+    common = bool(np.ptp(lengths) <= 0.001 * lengths[0])
+    scale = float(lengths[0]) if common else 100.0
+    figure = Figure(figsize=(12, 7), dpi=110, layout="constrained")
+    axes = figure.subplots()
+    axes.set_facecolor(_EMPTY)
+    half = 0.75 * (zone.upper_mm - zone.lower_mm)
+    edges = _edges(np.array([section.slice.height_mm for section in sections]))
+    rows = np.stack([_row(section) for section in sections])
+    columns = np.linspace(0.0, scale, _COLUMNS + 1)
+    colours = Normalize(zone.middle_mm - half, zone.middle_mm + half)
+    shown = axes.pcolormesh(columns, edges, np.ma.masked_invalid(rows), cmap="RdBu_r", norm=colours)
+    bar = figure.colorbar(shown, ax=axes, extend="both", label="deviation (mm), the farthest from the zone's middle in each field")
+    for limit in (zone.lower_mm, zone.upper_mm):
+        bar.ax.axhline(limit, color="black", lw=1.2)
+    _mark(axes, sections, scale)
+    where = "station (mm)" if common else "station (% of the section's length)"
+    axes.set(xlabel=where, ylabel="height along the normal (mm)", title=f"{len(sections)} sections; grey: nothing judged")
+    figure.suptitle(f"{title}    {WORDS[stack.verdict]}", fontsize=15, fontweight="bold")
+    figure.savefig(path)
+
+
+def _row(section: SectionOutcome) -> Array:
+    """(c,) deviation farthest from the middle of the zone in each column; NaN where nothing was judged."""
+    row = np.full(_COLUMNS, np.nan)
+    result = section.run.result
+    if result is None:
+        return row
+    judged = np.flatnonzero(np.isfinite(result.deviation_mm))
+    judged = judged[np.argsort(np.abs(result.deviation_mm[judged] - result.zone.middle_mm))]
+    column = np.clip((result.station_mm[judged] / section.profile.length_mm * _COLUMNS).astype(int), 0, _COLUMNS - 1)
+    row[column] = result.deviation_mm[judged]  # of several the last is kept: the farthest
+    return row
+
+
+def _edges(heights: Array) -> Array:
+    """Borders (k + 1,) of the rows: half way between neighbours."""
+    if len(heights) == 1:
+        return np.array([heights[0] - 0.5, heights[0] + 0.5])
+    middles = (heights[:-1] + heights[1:]) / 2
+    return np.concatenate([[2 * heights[0] - middles[0]], middles, [2 * heights[-1] - middles[-1]]])
+
+
+def _mark(axes: Axes, sections: Sequence[SectionOutcome], scale: float) -> None:
+    """A triangle in the middle of every stretch out of tolerance."""
+    for section in sections:
+        result, length = section.run.result, section.profile.length_mm
+        if result is None:
+            continue
+        for stretch in result.stretches:
+            width = (stretch.to_mm - stretch.from_mm) % length
+            station = (stretch.from_mm + width / 2) % length / length * scale
+            above = stretch.worst_mm > result.zone.upper_mm
+            axes.plot(station, section.slice.height_mm, "^" if above else "v", ms=6, mfc="none", mec="black", mew=1.0)

@@ -1,0 +1,402 @@
+"""Sections of a surface from file to verdict: the phantom's known truth, and the command as its user meets it."""
+
+import csv
+import json
+import sys
+import threading
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+
+from cmmlink import ct
+from cmmlink.cli import main
+from cmmlink.ct import SectionOutcome, StackOutcome, inspect_stack
+from cmmlink.ct_plan import CtPlan, load_ct_plan
+from cmmlink.errors import PlanError
+from drivers.errors import MeshError
+from drivers.open3d_process import Open3DMissing
+from inspection import RegistrationError, Verdict
+from tests.ct_phantom import GOE404, Defect, Phantom, airfoil, make_phantom, noise_mm, write_nominal, write_spline, write_stl
+from tests.drivers.meshes import Triangles, ascii_stl, binary_stl, box, tube, write
+
+VOXEL = 0.1
+DEFECT = Defect(height_mm=0.1, station_mm=40.0, part_height_mm=2.0)
+
+
+def inspect(plan: CtPlan) -> StackOutcome:
+    return inspect_stack(plan, clock=time.monotonic, stop=threading.Event())
+
+
+def plan_of(mesh: Path, nominal: Path, sections: dict[str, object], **further: object) -> CtPlan:
+    settings = {
+        "part": {"name": "blade"},
+        "mesh": {"file": mesh},
+        "nominal": {"file": nominal},
+        "tolerance": {"lower_mm": -0.1, "upper_mm": 0.1},
+        "sections": sections,
+        "cut": {"cutter": "numpy"},  # starting Open3D takes a second; both give the same points
+        **further,
+    }
+    return CtPlan.model_validate(settings)
+
+
+# The phantom ----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Scanned:
+    phantom: Phantom
+    part_heights_mm: list[float]
+    stack: StackOutcome
+
+
+@pytest.fixture(scope="module")
+def scanned(tmp_path_factory: pytest.TempPathFactory) -> Scanned:
+    folder = tmp_path_factory.mktemp("phantom")
+    phantom = make_phantom(seed=1, voxel_mm=VOXEL, height_mm=4.0, specks=25, defect=DEFECT)
+    part_heights = [0.4, 1.0, 2.0, 3.6]
+    heights = [phantom.machine_height_mm(height) for height in part_heights]
+    stl, nominal = write_stl(phantom, folder / "phantom.stl"), write_nominal(phantom, folder / "nominal.yaml")
+    plan = plan_of(stl, nominal, {"normal": tuple(phantom.normal), "heights_mm": tuple(heights)})
+    return Scanned(phantom, part_heights, inspect(plan))
+
+
+def found(section: SectionOutcome) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    result = section.run.result
+    assert result is not None
+    judged = np.isfinite(result.deviation_mm)
+    return result.station_mm[judged], result.deviation_mm[judged]
+
+
+def test_the_form_error_of_the_phantom_is_found_within_its_noise(scanned: Scanned) -> None:
+    for section, height in zip(scanned.stack.sections, scanned.part_heights_mm, strict=True):
+        station, deviation = found(section)
+        noise = noise_mm(scanned.phantom, height, station, deviation)
+        assert abs(noise.mean()) < 0.05 * VOXEL  # the threshold's bias
+        assert 0.08 * VOXEL < noise.std() < 0.16 * VOXEL  # 0.13 voxel is what such a scan gives
+        assert np.abs(noise).max() < 0.6 * VOXEL
+
+
+def test_every_point_is_accounted_for(scanned: Scanned) -> None:
+    for section in scanned.stack.sections:
+        facts = section.facts()
+        assert facts["received"] == facts["judged"] + facts["rejected"] == sum(len(c.points_mm) for c in section.judged) > 2500
+        assert facts["lost"] == 0
+        assert facts["coverage"] > 0.99
+
+
+def test_the_defect_is_found_where_it_is_and_only_there(scanned: Scanned) -> None:
+    at_defect, beside = scanned.stack.sections[2], scanned.stack.sections[3]
+    assert at_defect.verdict is Verdict.NONCONFORM
+    result = at_defect.run.result
+    assert result is not None
+    assert result.worst is not None
+    assert result.station_mm[result.worst] == pytest.approx(DEFECT.station_mm, abs=1.2)
+    true = float(scanned.phantom.form_error_mm(result.station_mm[[result.worst]], 2.0)[0])
+    assert result.deviation_mm[result.worst] == pytest.approx(true, abs=4 * 0.13 * VOXEL)
+    assert all(abs(s.from_mm - DEFECT.station_mm) < 3 and abs(s.to_mm - DEFECT.station_mm) < 3 for s in result.stretches)
+    assert beside.verdict is Verdict.CONFORM
+    assert scanned.stack.verdict is Verdict.NONCONFORM
+
+
+def test_the_dust_is_set_aside(scanned: Scanned) -> None:
+    set_aside = 0
+    for section, height in zip(scanned.stack.sections, scanned.part_heights_mm, strict=True):
+        cut_through = sum(abs(speck.part_height_mm - height) < 0.6 * speck.radius_mm for speck in scanned.phantom.dust)
+        assert section.slice.set_aside >= cut_through
+        assert len(section.slice.contours) == 1
+        set_aside += section.slice.set_aside
+    assert set_aside >= 5
+
+
+# Surfaces without noise ------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def spline() -> BSpline:
+    return airfoil(GOE404, 60.0)
+
+
+@pytest.fixture
+def blade(tmp_path: Path, spline: BSpline) -> tuple[Path, Path]:
+    """A straight blade from z = 0 to 20 mm, and its nominal."""
+    profile = spline(np.linspace(0, 1, 600))
+    return write(tmp_path / "blade.stl", binary_stl(tube(profile, np.array([0.0, 20.0])))), write_spline(spline, tmp_path / "blade.yaml")
+
+
+def chord_mm(spline: BSpline) -> float:
+    """How far the chords between 600 points stay off the profile."""
+    u = np.linspace(0, 1, 600)
+    ends, between = spline(u), spline((u[1:] + u[:-1]) / 2)
+    along = np.diff(ends, axis=0)
+    off = along[:, 0] * (between - ends[:-1])[:, 1] - along[:, 1] * (between - ends[:-1])[:, 0]
+    return float(np.max(np.abs(off) / np.linalg.norm(along, axis=1)))
+
+
+def tapered(spline: BSpline) -> Triangles:
+    """From full size at z = 0 to nine tenths at z = 20 mm, ruled along straight lines."""
+    profile = spline(np.linspace(0, 1, 600))
+    triangles = tube(profile, np.linspace(0.0, 20.0, 21))
+    triangles[:, :, :2] *= 1 - 0.005 * triangles[:, :, 2:]
+    return triangles
+
+
+def test_a_blade_as_nominal_conforms_closely(blade: tuple[Path, Path], spline: BSpline) -> None:
+    stack = inspect(plan_of(*blade, {"heights_mm": (5.0, 10.0)}))
+    assert stack.verdict is Verdict.CONFORM
+    for section in stack.sections:
+        assert np.abs(found(section)[1]).max() < 1.1 * chord_mm(spline)
+        assert section.warnings == ()
+
+
+def test_sections_of_a_tapered_blade_have_nominals_of_their_own(tmp_path: Path, spline: BSpline) -> None:
+    mesh = write(tmp_path / "tapered.stl", binary_stl(tapered(spline)))
+    common = write_spline(spline, tmp_path / "0.yaml")
+    own = [{"height_mm": z, "file": write_spline(spline, tmp_path / f"{z}.yaml", 1 - 0.005 * z)} for z in (4.0, 10.0)]
+    stack = inspect(plan_of(mesh, common, {"heights_mm": (10.0, 4.0, 0.2), "nominal_at": own}))
+    assert [section.verdict for section in stack.sections] == [Verdict.CONFORM] * 3
+    assert [section.nominal_file.name for section in stack.sections] == ["10.0.yaml", "4.0.yaml", "0.yaml"]
+    without = inspect(plan_of(mesh, common, {"heights_mm": (10.0, 4.0)}))
+    assert [section.verdict for section in without.sections] == [Verdict.NONCONFORM] * 2
+
+
+def test_a_nominal_for_no_section_is_refused(blade: tuple[Path, Path]) -> None:
+    with pytest.raises(PlanError, match=r"height 7 mm, which is none of the sections; the nearest is 6 mm"):
+        inspect(plan_of(*blade, {"heights_mm": (1.0, 6.0), "nominal_at": ({"height_mm": 7, "file": blade[1]},)}))
+
+
+@pytest.mark.parametrize(
+    ("where", "expected"),
+    [
+        ({"every_mm": 5.0}, [2.5, 7.5, 12.5, 17.5]),
+        ({"every_mm": 5.0, "from_mm": 3.0}, [3.0, 8.0, 13.0, 18.0]),
+        ({"every_mm": 0.1, "from_mm": 4.0, "to_mm": 4.3}, [4.0, 4.1, 4.2, 4.3]),
+        ({"every_mm": 7.0, "from_mm": 4.0, "to_mm": 4.3}, [4.0]),
+    ],
+)
+def test_a_section_every_step(blade: tuple[Path, Path], where: dict[str, object], expected: list[float]) -> None:
+    stack = inspect(plan_of(*blade, where))
+    assert [section.slice.asked_mm for section in stack.sections] == pytest.approx(expected, abs=1e-12)
+
+
+def test_a_hole_beside_the_outline_is_told_and_not_judged(tmp_path: Path, spline: BSpline) -> None:
+    outline = tube(spline(np.linspace(0, 1, 600)), np.array([0.0, 20.0]))
+    hole = box((20, 0.5, -1), (23, 3.5, 21))[:, ::-1]
+    mesh = write(tmp_path / "hollow.stl", binary_stl(np.concatenate([outline, hole])))
+    (section,) = inspect(plan_of(mesh, write_spline(spline, tmp_path / "n.yaml"), {"heights_mm": (5.0,)})).sections
+    assert section.verdict is Verdict.CONFORM
+    assert [len(section.slice.contours), len(section.judged)] == [2, 1]
+    assert any("1 of them holes, are not judged; the longest is 12.00 mm" in text for text in section.warnings)
+    assert section.facts()["holes"] == 1
+
+
+def test_a_part_of_the_surface_that_is_missing_makes_the_section_uncertain(tmp_path: Path, spline: BSpline) -> None:
+    triangles = tube(spline(np.linspace(0, 1, 600)), np.array([0.0, 20.0]))
+    middle = triangles[:, :, 0].mean(axis=1)
+    there = ~((middle > 20) & (middle < 30))  # a strip of both sides
+    mesh = write(tmp_path / "torn.stl", binary_stl(triangles[there]))
+    (section,) = inspect(plan_of(mesh, write_spline(spline, tmp_path / "n.yaml"), {"heights_mm": (5.0,)})).sections
+    assert section.verdict is Verdict.UNCERTAIN
+    assert len(section.judged) == 2  # the two open pieces, judged together
+    result = section.run.result
+    assert result is not None
+    assert 0.8 < result.coverage < 0.87
+    assert np.nanmax(np.abs(result.deviation_mm)) < 1.1 * chord_mm(spline)
+    assert any("2 open contour(s), left open" in text for text in section.warnings)
+
+
+def test_a_surface_of_another_part_is_refused(tmp_path: Path, blade: tuple[Path, Path]) -> None:
+    mesh = write(tmp_path / "box.stl", binary_stl(box((0, 0, 0), (60, 60, 20))))
+    with pytest.raises(RegistrationError, match=r"240\.00 mm long, the nominal 124\.\d+ mm: this is no section of the part"):
+        inspect(plan_of(mesh, blade[1], {"heights_mm": (5.0, 10.0)}))
+
+
+def test_one_section_that_fits_nothing_does_not_spoil_the_others(tmp_path: Path, spline: BSpline) -> None:
+    foot = box((0, -30, -10), (60, 30, -0.5))
+    mesh = write(tmp_path / "footed.stl", binary_stl(np.concatenate([foot, tube(spline(np.linspace(0, 1, 600)), np.array([0.0, 20.0]))])))
+    stack = inspect(plan_of(mesh, write_spline(spline, tmp_path / "n.yaml"), {"heights_mm": (-5.0, 5.0)}))
+    assert [section.verdict for section in stack.sections] == [Verdict.UNCERTAIN, Verdict.CONFORM]
+    assert stack.verdict is Verdict.UNCERTAIN
+    assert stack.sections[0].facts()["judged"] == 0
+    assert stack.sections[0].warnings
+
+
+def test_the_cutter_is_the_one_asked_for_and_gives_the_same_verdicts(blade: tuple[Path, Path]) -> None:
+    where: dict[str, object] = {"normal": (0.01, 0.02, 1), "heights_mm": (5.0,)}
+    by_numpy = inspect(plan_of(*blade, where)).facts()
+    by_default = inspect(plan_of(*blade, where, cut={})).facts()
+    assert by_numpy["slices"][0]["cutter"] == "numpy"
+    if by_default["slices"][0].pop("cutter") == "numpy":
+        assert any("Open3D cannot be loaded" in note for note in by_default["notes"])
+    by_numpy["slices"][0].pop("cutter")
+    assert by_default["slices"] == by_numpy["slices"]
+
+
+def test_a_cutter_that_breaks_down_in_the_middle_is_replaced_and_it_is_said(
+    blade: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Breaking:
+        name = "open3d of a test"
+
+        def cut(self, triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+            raise Open3DMissing("the process with Open3D ended (exit status -11)")
+
+    monkeypatch.setattr(ct, "_cutter", lambda *_: Breaking())
+    stack = inspect(plan_of(*blade, {"heights_mm": (5.0, 6.0)}))
+    assert [section.slice.cutter for section in stack.sections] == ["numpy", "numpy"]
+    assert any("cut by numpy: the process with Open3D ended" in note for note in stack.notes)
+
+
+# The command ----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Ran:
+    code: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def cmmlink(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> "Command":
+    return Command(monkeypatch, capsys)
+
+
+@dataclass(frozen=True)
+class Command:
+    monkeypatch: pytest.MonkeyPatch
+    capsys: pytest.CaptureFixture[str]
+
+    def __call__(self, *arguments: object) -> Ran:
+        self.monkeypatch.setattr(sys, "argv", ["cmmlink", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        told = self.capsys.readouterr()
+        code = ended.value.code
+        assert isinstance(code, int)
+        assert "Traceback" not in told.err
+        return Ran(code, told.out, told.err)
+
+
+def test_the_command_writes_results_for_the_stack_and_every_section(cmmlink: Command, blade: tuple[Path, Path], tmp_path: Path) -> None:
+    out = tmp_path / "results"
+    earlier = out / "section-007_99.000mm"
+    earlier.mkdir(parents=True)
+    write(earlier / "deviations.csv", "of an earlier run")
+    arguments = [
+        "--nominal",
+        blade[1],
+        "--tolerance",
+        -0.05,
+        0.05,
+        "--heights",
+        5,
+        10.5,
+        15,
+        "--normal",
+        0,
+        0,
+        2,
+        "--out",
+        out,
+        "--json",
+        "--cutter",
+        "numpy",
+    ]
+    ran = cmmlink("ct", blade[0], *arguments, "--out", out, "--json")
+    assert ran.code == 0
+    facts = json.loads(ran.out)
+    assert json.loads((out / "result.json").read_text()) == facts
+    assert facts["verdict"] == "conform"
+    assert [cut["height_mm"] for cut in facts["slices"]] == [5, 10.5, 15]
+    assert {"contours", "verdict", "worst", "registration", "stretches", "profile_error_mm", "set_aside"} <= set(facts["slices"][0])
+    assert sorted(path.name for path in out.iterdir()) == [
+        "result.json", "section-001_5.000mm", "section-002_10.500mm", "section-003_15.000mm", "sections.csv", "stack.png",
+    ]  # fmt: skip
+    own = out / "section-002_10.500mm"
+    assert sorted(path.name for path in own.iterdir()) == ["contours.csv", "deviations.csv", "profile.png"]
+    with (own / "contours.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == facts["slices"][1]["received"]
+    assert {row["z_mm"] for row in rows} == {"10.500000"}
+    assert {(row["closed"], row["hole"]) for row in rows} == {("closed", "outer")}
+    for picture in (out / "stack.png", own / "profile.png"):
+        assert picture.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+
+
+def test_the_exit_status_is_that_of_the_worst_section(cmmlink: Command, blade: tuple[Path, Path], tmp_path: Path, spline: BSpline) -> None:
+    mesh = write(tmp_path / "tapered.stl", ascii_stl(tapered(spline)))
+    options = ["--nominal", blade[1], "--tolerance", -0.1, 0.1, "--cutter", "numpy"]
+    assert cmmlink("ct", mesh, *options, "--heights", 0.2).code == 0
+    ran = cmmlink("ct", mesh, *options, "--heights", 0.2, 10)
+    assert ran.code == 1
+    assert "NOT CONFORM  2 sections" in ran.out
+    small = write_spline(spline, tmp_path / "small.yaml", 0.95)
+    assert cmmlink("ct", mesh, *options, "--heights", 0.2, 10, "--nominal-at", 10, small).code == 0
+    assert cmmlink("ct", mesh, *options, "--heights", 0.2, "--uncertainty", 0.099).code == 3
+
+
+def test_a_plan_says_the_same_as_options(cmmlink: Command, blade: tuple[Path, Path], tmp_path: Path) -> None:
+    text = (
+        "part: {name: blade}\nmesh: {file: blade.stl}\nnominal: {file: blade.yaml}\ntolerance: {lower_mm: -0.05, upper_mm: 0.05}\n"
+        "sections: {every_mm: 5, from_mm: 5, to_mm: 10}\ncut: {cutter: numpy}\n"
+    )
+    by_plan = cmmlink("ct", write(tmp_path / "plan.yaml", text), "--json")
+    options = ["--nominal", blade[1], "--tolerance", -0.05, 0.05, "--every", 5, "--from", 5, "--to", 10, "--cutter", "numpy"]
+    by_options = cmmlink("ct", blade[0], *options, "--json")
+    assert by_plan.code == by_options.code == 0
+    assert json.loads(by_plan.out)["slices"] == json.loads(by_options.out)["slices"]
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("sections: {heights_mm: [1], every_mm: 2}", "line 5: sections is a mapping; expected either heights_mm or every_mm"),
+        ("sections: {}", "expected either heights_mm or every_mm"),
+        ("sections: {heights_mm: [1, x]}", "sections.heights_mm[1] is 'x'; expected a number"),
+        ("sections: {heights: [1]}", "sections.heights is not a known key; did you mean heights_mm?"),
+        ("sections: {heights_mm: [1], normal: [0, 0, 0]}", "expected a direction other than [0, 0, 0]"),
+        ("sections: {heights_mm: [1]}\ncut: {cutter: knife}", "cut.cutter is 'knife'"),
+    ],
+)
+def test_a_bad_plan_is_told_with_its_line_and_key(tmp_path: Path, line: str, message: str) -> None:
+    text = "part: {name: b}\nmesh: {file: b.stl}\nnominal: {file: b.dat}\ntolerance: {lower_mm: -1, upper_mm: 1}\n" + line + "\n"
+    with pytest.raises(PlanError) as caught:
+        load_ct_plan(write(tmp_path / "plan.yaml", text))
+    assert message in str(caught.value)
+    assert str(tmp_path / "plan.yaml") in str(caught.value)
+
+
+def test_bad_input_is_one_message_and_status_2(cmmlink: Command, blade: tuple[Path, Path], tmp_path: Path) -> None:
+    mesh, nominal = blade
+    options = ["--nominal", nominal, "--tolerance", -0.05, 0.05, "--cutter", "numpy"]
+    cut_off = write(tmp_path / "cut.stl", mesh.read_bytes()[:1000])
+    cases: list[tuple[list[object], str]] = [
+        ([cut_off, *options, "--heights", 5], "truncated"),
+        ([tmp_path / "nowhere.stl", *options, "--heights", 5], "nowhere.stl"),
+        ([tmp_path / "part.step", *options, "--heights", 5], "expected .stl, .ply or .obj"),
+        ([mesh, *options, "--heights", 25], "misses the surface"),
+        ([mesh, *options], "either heights_mm or every_mm"),
+        ([mesh, *options, "--every", 0], "every_mm"),
+        ([mesh, *options, "--every", 1e-9], "expected 1 to 100000"),
+        ([mesh, *options, "--heights", 5, "--normal", 0, 0, 0], "direction"),
+        ([mesh, *options, "--heights", 5, "--nominal-at", "x", nominal], "--nominal-at x="),
+        ([mesh, "--heights", 5], "needs --nominal FILE and --tolerance LO HI"),
+        ([mesh, *options, "--heights", 5, "--nonsense", 1], "No such option"),
+    ]
+    for arguments, message in cases:
+        ran = cmmlink("ct", *arguments)
+        assert ran.code == 2, arguments
+        assert message in ran.err
+        assert ran.out == ""
+
+
+def test_a_bad_surface_names_the_place(tmp_path: Path, blade: tuple[Path, Path]) -> None:
+    mesh = write(tmp_path / "cut.stl", blade[0].read_bytes()[:-10])
+    with pytest.raises(MeshError, match=r"the file ends in triangle 1200 \(byte 60034\)"):
+        inspect(plan_of(mesh, blade[1], {"heights_mm": (5.0,)}))

@@ -1,0 +1,133 @@
+"""Open3D in its own process: found or not found, alive or gone, and its files good or bad."""
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivers.errors import MeshError
+from drivers.open3d_process import Open3DMissing, Open3DProcess, Open3DStatus, mend_open3d, open3d_status, status_from
+from tests.drivers.meshes import Triangles, box, write
+
+CUBE = box((0, 0, 0), (10, 10, 10))
+
+
+@pytest.fixture(scope="module")
+def open3d() -> Iterator[Open3DProcess]:
+    with Open3DProcess() as process:
+        if process.status().version is None:
+            pytest.skip(process.status().sentence())
+        yield process
+
+
+def ply(triangles: Triangles, vertices: int | None = None) -> str:
+    flat = triangles.reshape(-1, 3)
+    head = f"ply\nformat ascii 1.0\nelement vertex {vertices or len(flat)}\nproperty double x\nproperty double y\nproperty double z\n"
+    head += f"element face {len(triangles)}\nproperty list uchar int vertex_indices\nend_header\n"
+    rows = [f"{x!r} {y!r} {z!r}" for x, y, z in flat.tolist()] + [f"3 {3 * i} {3 * i + 1} {3 * i + 2}" for i in range(len(triangles))]
+    return head + "\n".join(rows) + "\n"
+
+
+def obj(triangles: Triangles) -> str:
+    rows = [f"v {x!r} {y!r} {z!r}" for x, y, z in triangles.reshape(-1, 3).tolist()]
+    return "\n".join(rows + [f"f {3 * i + 1} {3 * i + 2} {3 * i + 3}" for i in range(len(triangles))]) + "\n"
+
+
+def as_set(triangles: Triangles) -> set[tuple[float, ...]]:
+    return {tuple(corners) for corners in triangles.reshape(-1, 9).tolist()}
+
+
+def test_ply_and_obj_are_read_as_written(open3d: Open3DProcess, tmp_path: Path) -> None:
+    for name, text in (("cube.ply", ply(CUBE)), ("cube.obj", obj(CUBE))):
+        mesh = open3d.read(write(tmp_path / name, text), scale=2.0)
+        assert as_set(np.concatenate(list(mesh.pieces()))) == as_set(2 * CUBE)
+        assert mesh.kind == name[-3:].upper()
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("cut.ply", ply(CUBE)[:300]),
+        ("empty.ply", ""),
+        ("words.obj", "this is no surface\n"),
+        ("points.ply", ply(CUBE[:0], vertices=1) + "0 0 0\n"),
+        ("points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n"),
+        ("nan.obj", obj(CUBE).replace("v 10.0 10.0 10.0", "v nan 10.0 10.0")),
+    ],
+)
+def test_bad_ply_and_obj_files_give_one_clear_error(open3d: Open3DProcess, tmp_path: Path, name: str, content: str) -> None:
+    with pytest.raises(MeshError, match=name) as caught:
+        open3d.read(write(tmp_path / name, content))
+    assert "\n" not in str(caught.value)
+    assert open3d.status().version is not None
+    assert len(open3d.cut(CUBE[:4] - [0, 0, 5.0])) > 0  # it answers again, even where it crashed on the file
+
+
+def test_a_missing_ply_file(open3d: Open3DProcess, tmp_path: Path) -> None:
+    with pytest.raises(MeshError, match="no such file"):
+        open3d.read(tmp_path / "nowhere.ply")
+
+
+def test_a_process_that_ends_at_once_is_a_status_and_an_error_not_a_hang() -> None:
+    with Open3DProcess((sys.executable, "-c", "raise SystemExit(3)")) as process:
+        assert process.status().version is None
+        assert "exit status 3" in process.status().sentence()
+        with pytest.raises(Open3DMissing, match="exit status 3"):
+            process.cut(CUBE)
+
+
+def test_a_process_that_was_killed_is_started_again() -> None:
+    with Open3DProcess() as process:
+        name = process.name
+        above = CUBE - [0, 0, 5.0]
+        segments = process.cut(above[above[:, :, 2].min(axis=1) < 0])
+        process._child.kill()
+        process._child.wait()
+        assert np.array_equal(process.cut(above[above[:, :, 2].min(axis=1) < 0]), segments)
+        assert process.name == name
+
+
+def test_a_library_that_cannot_be_loaded_is_told_with_its_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    package = tmp_path / "open3d"
+    package.mkdir()
+    write(package / "__init__.py", "raise ImportError('libnowhere.so.7: cannot open shared object file')\n")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    status = open3d_status()
+    assert status.version is None
+    assert "libnowhere.so.7" in status.reason
+    assert status.sentence().startswith("Open3D cannot be loaded")
+
+
+def test_missing_libraries_name_the_exact_command() -> None:
+    hello = {"error": "libGL.so.1: cannot open", "installed": True, "missing": ["libusb-1.0.so.0", "libGL.so.1", "libEGL.so.1"]}
+    apt = status_from(hello, which=lambda name: "/usr/bin/apt-get" if name == "apt-get" else None)
+    assert apt.mend == ("apt-get", "install", "--yes", "libusb-1.0-0", "libgl1", "libegl1")
+    assert apt.sentence().endswith("mend it with: apt-get install --yes libusb-1.0-0 libgl1 libegl1")
+    dnf = status_from(hello, which=lambda name: "/usr/bin/dnf" if name == "dnf" else None)
+    assert dnf.mend == ("dnf", "install", "--assumeyes", "libusb1", "mesa-libGL", "mesa-libEGL")
+    assert status_from(hello, which=lambda name: None).mend is None
+
+
+def test_open3d_that_is_not_installed_names_the_exact_command() -> None:
+    status = status_from({"error": "No module named 'open3d'", "installed": False, "missing": []}, which=lambda name: None)
+    assert status.mend is not None
+    assert status.mend[:4] == (sys.executable, "-m", "pip", "install")
+    assert "0.20" in status.mend[4]
+
+
+@pytest.mark.parametrize(("is_root", "exit_status", "mended"), [(True, 0, True), (True, 100, False), (False, 0, False)])
+def test_mending_runs_apt_only_as_root(is_root: bool, exit_status: int, mended: bool) -> None:
+    ran: list[tuple[str, ...]] = []
+    status = Open3DStatus(None, ("libGL.so.1",), ("apt-get", "install", "--yes", "libgl1"))
+
+    def run(command: object) -> int:
+        ran.append(tuple(command))  # type: ignore[arg-type]
+        return exit_status
+
+    assert mend_open3d(status, run, is_root) is mended
+    if mended:
+        assert ran == [("apt-get", "update", "--quiet"), ("apt-get", "install", "--yes", "libgl1")]
+    if not is_root:
+        assert ran == []
