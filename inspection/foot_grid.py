@@ -215,7 +215,7 @@ def _arc_length(rows: Array, start_mm: Array) -> Array:
 
 def _powers(x: Array, count: int) -> Array:
     """Powers 0 .. count - 1 of x, along a new first axis; multiplied out, so that every processor gives the same bits."""
-    return np.cumprod(np.stack([np.ones_like(x), *[x] * (count - 1)]), axis=0)
+    return np.asarray(np.cumprod(np.stack([np.ones_like(x), *[x] * (count - 1)]), axis=0), dtype=np.float64)
 
 
 def _through(t: Array, value: Array) -> Array:
