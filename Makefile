@@ -1,7 +1,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test
+.PHONY: demo test soak
 demo: .venv/installed
 	$(BIN)/cmmlink demo --out demo-result
 
@@ -11,6 +11,10 @@ test: .venv/test-installed
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/pytest -n 2
+
+# A hundred recording processes killed at random moments; every acknowledged point must be there.
+soak: .venv/test-installed
+	$(BIN)/python -m tests.integration.killed soak 100
 
 # One clear line for the two things newcomers meet: an old Python, and Debian's Python without its venv package.
 .venv/bin/python:

@@ -13,7 +13,8 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from datetime import datetime
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
@@ -27,12 +28,17 @@ from cmmlink.ct_command import ManyHeights, SectionBar, own_nominals, plan_from,
 from cmmlink.ct_plan import CtPlan, load_ct_plan
 from cmmlink.demo import plan_file as demo_plan_file
 from cmmlink.demo import write_part_path
-from cmmlink.errors import PlanError, StoreError
+from cmmlink.errors import PlanError, RunError, StoreError
 from cmmlink.events import RunStarted, Sink
+from cmmlink.export import export_run
 from cmmlink.nominal_files import NominalFile, load_nominal, material_side
 from cmmlink.parts import planned_inspection, planned_profile, profile_of
 from cmmlink.pipeline import RunOutcome, run_inspection
-from cmmlink.plan import FileDevice, Plan, load_plan, place_of
+from cmmlink.plan import Device, FileDevice, Plan, load_plan, place_of
+from cmmlink.recorder import Basis, Evidence, Recorder, software
+from cmmlink.records import check_chain, default_folder, describe, find_run, list_runs, reading, recorded_run, recording
+from cmmlink.replay import Replay
+from cmmlink.replay import replay as replayed
 from cmmlink.report.folder import prepare, write_results
 from cmmlink.report.stack_folder import write_stack
 from cmmlink.report.summary import identity, summary
@@ -41,7 +47,7 @@ from drivers.ascii_frames import AsciiDecoder
 from drivers.errors import DeviceError, LinkError, MeshError, PointFileError
 from drivers.point_file import PointFileSource
 from drivers.serial_scanner import SerialScanner, ports
-from drivers.source import ScanSource
+from drivers.source import Decoder, ScanSource
 from inspection import InspectionError, LiveInspection, NominalProfile, ToleranceZone, Verdict, rehearse
 
 app = typer.Typer(
@@ -61,6 +67,8 @@ _DEMO_RATE_HZ, _DEMO_POINTS = 2000, 4000
 PlanFile = Annotated[Path, typer.Argument(metavar="PLAN.yaml", help="The inspection plan.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of words.")]
 Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for deviations.csv, result.json and profile.png.")]
+Records = Annotated[Path | None, typer.Option("--records", metavar="DIR", help="Folder of the run records.")]
+RunName = Annotated[str, typer.Argument(metavar="RUN", help="The id of a run, the beginning of one, or last.")]
 Headless = Annotated[bool, typer.Option("--headless", help="No page, no live table.")]
 
 
@@ -105,6 +113,7 @@ class Telling:
     headless: bool
     as_json: bool
     out: Path | None
+    records: Path | None = None
 
 
 def main() -> None:
@@ -115,7 +124,7 @@ def main() -> None:
             _fail("stopped by the operator", _STOPPED)
     except typer.TyperException as error:
         code = _fail(_usage(error), _UNUSABLE)
-    except (PlanError, InspectionError, PointFileError, MeshError) as error:
+    except (PlanError, RunError, InspectionError, PointFileError, MeshError) as error:
         code = _fail(str(error), _UNUSABLE)
     except DeviceError as error:
         code = _fail(str(error), _DEVICE_FAILED)
@@ -160,6 +169,7 @@ def demo(
     seed: Annotated[int, typer.Option(min=0, metavar="N", help="Another seed is another part.")] = 1,
     defect: Annotated[str | None, typer.Option(metavar="MM@STATION", help="A local defect, like 0.12@40.")] = None,
     out: Out = Path("demo-result"),
+    records: Records = None,
     as_json: Json = False,
 ) -> int:
     """Run the whole chain on a simulated device, no set-up."""
@@ -172,7 +182,7 @@ def demo(
         write_part_path(profile.curve, path)
         arguments = ["--path", str(path), *_demo_motion(plan, profile, seed, bump)]
         with _simulator("serial", arguments) as address:
-            return _run(plan.with_address(address), profile, Telling(headless, as_json, out), simulated=True)
+            return _run(plan.with_address(address), profile, Telling(headless, as_json, out, records), simulated=True)
 
 
 def _demo_motion(plan: Plan, profile: NominalProfile, seed: int, defect: tuple[float, float] | None) -> list[str]:
@@ -234,13 +244,14 @@ def run(
     plan_file: PlanFile,
     headless: Headless = False,
     out: Out = None,
+    records: Records = None,
     as_json: Json = False,
 ) -> int:
     """Acquire and inspect with the device of a plan."""
     plan = load_plan(plan_file)
     profile = _checked_profile(plan, plan_file)
     prepare(out or plan.out)
-    return _run(plan, profile, Telling(headless, as_json, out or plan.out))
+    return _run(plan, profile, Telling(headless, as_json, out or plan.out, records or plan.records))
 
 
 def _checked_profile(plan: Plan, plan_file: Path) -> NominalProfile:
@@ -269,9 +280,21 @@ def _run(plan: Plan, profile: NominalProfile, telling: Telling, simulated: bool 
     started = RunStarted(plan.part.name, plan.part.serial_number or "", plan.operator or "", device, simulated)
     table = LiveTable(Console(stderr=True), plan.tolerance.zone)
     quiet = telling.headless or telling.as_json or not sys.stderr.isatty()
-    with nullcontext() if quiet else table:
-        outcome = _carry_out(source, live, started, [] if quiet else [table], plan.buffer_points)
-    return _tell(outcome, profile, telling, started)
+    with (
+        recording(telling.records or default_folder(), _today) as store,
+        Recorder(store, _basis(plan), clock=time.monotonic, today=_today) as recorder,
+        nullcontext() if quiet else table,
+    ):
+        outcome = _carry_out(source, live, started, [recorder, *([] if quiet else [table])], plan.buffer_points)
+    return _tell(outcome, profile, telling, started, recorder.evidence)
+
+
+def _today() -> datetime:
+    return datetime.now().astimezone()
+
+
+def _basis(plan: Plan) -> Basis:
+    return Basis(plan.effective_yaml(), plan.nominal.file.name, plan.nominal.file.read_bytes(), software())
 
 
 def _rehearsed(profile: NominalProfile) -> None:
@@ -290,8 +313,13 @@ def _source_of(plan: Plan) -> tuple[ScanSource, str]:
     device = plan.device
     if isinstance(device, FileDevice):
         return PointFileSource(device.file, device.scale), f"file {device.file.name}"
-    scanner = SerialScanner(device.address, AsciiDecoder(), baud_rate=device.baud_rate, silence_s=device.silence_s)
+    scanner = SerialScanner(device.address, decoder_of(device) or AsciiDecoder(), baud_rate=device.baud_rate, silence_s=device.silence_s)
     return scanner, f"{device.type} {device.address}"
+
+
+def decoder_of(device: Device) -> Decoder | None:
+    """The decoder of what a device sends; None where its points themselves are what is recorded."""
+    return None if isinstance(device, FileDevice) else AsciiDecoder()
 
 
 @contextmanager
@@ -316,9 +344,9 @@ def _carry_out(source: ScanSource, live: LiveInspection, started: RunStarted, si
         return run_inspection(source, live, sinks, started, buffer_points=buffer_points, clock=time.monotonic, stop=stop)
 
 
-def _tell(outcome: RunOutcome, profile: NominalProfile, telling: Telling, started: RunStarted) -> int:
+def _tell(outcome: RunOutcome, profile: NominalProfile, telling: Telling, started: RunStarted, evidence: Evidence | None = None) -> int:
     """Print and write the outcome, the verdict first, whatever happens to the files; the exit code."""
-    facts = summary(outcome.result, outcome.counts) | identity(started)
+    facts = summary(outcome.result, outcome.counts) | identity(started) | (asdict(evidence) if evidence else {})
     message = str(outcome.failure or outcome.refusal or "")
     if outcome.ending == "aborted":
         message = message or "stopped by the operator: the scan is not complete"
@@ -327,11 +355,18 @@ def _tell(outcome: RunOutcome, profile: NominalProfile, telling: Telling, starte
     if telling.as_json:
         _print_json(facts)
     else:
-        print_summary(Console(highlight=False, soft_wrap=not sys.stdout.isatty()), outcome.result, outcome.counts, f"{_title(started)}, {started.device}")
+        print_summary(
+            Console(highlight=False, soft_wrap=not sys.stdout.isatty()),
+            outcome.result,
+            outcome.counts,
+            f"{_title(started)}, {started.device}",
+        )
     if telling.out is not None:
         written = write_results(telling.out, facts, outcome.result, profile, _title(started))
         if not telling.as_json:
             typer.echo(f"results in {telling.out}: {', '.join(written)}")
+    if evidence is not None and not telling.as_json:
+        typer.echo(f"recorded as run {evidence.run}")
     if outcome.failure is not None:
         return _DEVICE_FAILED
     return _UNUSABLE if outcome.result is None else _EXIT[outcome.result.verdict]
@@ -545,3 +580,116 @@ def simulate(context: typer.Context, device: Annotated[str, typer.Argument(metav
     except (ValueError, OSError) as error:
         raise LinkError(f"the simulated device cannot serve {settings.address}: {error}") from None
     return 0
+
+
+@app.command()
+def runs(records: Records = None, as_json: Json = False) -> int:
+    """List the recorded runs."""
+    found = list_runs(records or default_folder(), _today)
+    if as_json:
+        _print_json({"runs": found})
+        return 0
+    for entry in found:
+        part = " ".join(filter(None, [entry["part"], entry["serial_number"]]))
+        verdict = entry["verdict"] or "-"
+        received = "-" if entry["received"] is None else entry["received"]
+        typer.echo(
+            f"{entry['run']}  {(entry['started'] or '-')[:19]:<19}  {entry['state']:<11}  {verdict:<10}  {received:>9} points  {part}"
+        )
+    if not found:
+        typer.echo(f"no run was recorded yet in {records or default_folder()}")
+    return 0
+
+
+@app.command()
+def show(name: RunName, records: Records = None, as_json: Json = False) -> int:
+    """Show one recorded run."""
+    with reading(records or default_folder(), _today) as store:
+        found = describe(store, find_run(store, name))
+    if as_json:
+        _print_json(found)
+        return 0
+    for key in ("run", "started", "ended", "state", "message", "verdict", "part", "serial_number", "operator", "device", "chain_sha256"):
+        if found[key]:
+            typer.echo(f"{key:<14} {found[key]}{' (simulated)' if key == 'device' and found['simulated'] else ''}")
+    for key in ("software", "recorded"):
+        typer.echo(f"{key:<14} {', '.join(f'{name} {value}' for name, value in found[key].items() if value)}")
+    for event in found["events"]:
+        told = ", ".join(f"{name} {value}" for name, value in event.items() if name not in ("event", "time_s", "after_points"))
+        typer.echo(f"  {event['time_s'] - found['clock_s']:9.3f} s  after {event['after_points']} points: {event['event']} {told}")
+    typer.echo("\n" + found["plan"].rstrip())
+    return 0
+
+
+@app.command()
+def export(
+    name: RunName,
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files.")],
+    records: Records = None,
+    as_json: Json = False,
+) -> int:
+    """Write a recorded run as csv, npy, json and raw bytes."""
+    with reading(records or default_folder(), _today) as store:
+        run_id = find_run(store, name)
+        written = export_run(store, run_id, out)
+    if as_json:
+        _print_json({"run": run_id, "files": [str(path) for path in written]})
+    else:
+        typer.echo("\n".join(str(path) for path in written))
+    return 0
+
+
+@app.command()
+def replay(
+    name: RunName,
+    tolerance: Annotated[tuple[float, float] | None, typer.Option(metavar="LO HI", help="Evaluate with another tolerance, mm.")] = None,
+    method: Annotated[MethodName | None, typer.Option(help="Evaluate with another method.")] = None,
+    out: Out = None,
+    records: Records = None,
+    as_json: Json = False,
+) -> int:
+    """Evaluate a recorded run once more; with nothing changed the result is the same to the last bit."""
+    with reading(records or default_folder(), _today) as store:
+        recorded = recorded_run(store, find_run(store, name))
+        again = replayed(store, recorded, decoder_of, tolerance=tolerance, method=method.value if method else None)
+    facts = again.facts | {"replay_of": recorded.run, "chain_sha256": recorded.chain_sha256, "identical": again.identical}
+    facts |= {"changed": [asdict(change) for change in again.changed], "differs": [asdict(change) for change in again.differs]}
+    if out is not None:
+        write_results(out, facts, again.outcome.result, again.profile, f"{recorded.header['part']}, run {recorded.run} replayed")
+    if as_json:
+        _print_json(facts)
+    else:
+        _print_replay(again, recorded.run)
+    if again.identical is False and not again.changed:
+        return _fail(f"run {recorded.run}: nothing was changed, yet the result is not the recorded one", _NO_RECORD)
+    return _UNUSABLE if again.outcome.result is None else _EXIT[again.outcome.result.verdict]
+
+
+def _print_replay(again: Replay, run_id: str) -> None:
+    heading = f"run {run_id}, evaluated again"
+    print_summary(Console(highlight=False, soft_wrap=not sys.stdout.isatty()), again.outcome.result, again.outcome.counts, heading)
+    for title, changes in (("changed", again.changed), ("differs", again.differs)):
+        for change in changes:
+            typer.echo(f"{title}: {change.key} {change.recorded} -> {change.replayed}")
+    if again.identical is None:
+        typer.echo(f"run {run_id} has no recorded result to compare with")
+    elif again.identical:
+        typer.echo(f"identical to the recorded result of run {run_id}, to the last bit")
+
+
+@app.command()
+def verify(
+    name: Annotated[str | None, typer.Argument(metavar="[RUN]", help="One run; without it all records.")] = None,
+    records: Records = None,
+    as_json: Json = False,
+) -> int:
+    """Recompute the hash chain and name the first record that was altered."""
+    with reading(records or default_folder(), _today, close_interrupted=False) as store:
+        found = check_chain(store, find_run(store, name) if name else None)
+    if as_json:
+        _print_json(found)
+    elif found["altered"]:
+        return _fail(found["first"]["message"], _NO_RECORD)
+    else:
+        typer.echo(f"nothing was altered: {found['records']} records, chain {found['chain_sha256']}")
+    return _NO_RECORD if found["altered"] else 0

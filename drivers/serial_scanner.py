@@ -13,7 +13,7 @@ from contextlib import closing
 import serial
 from serial.tools import list_ports
 
-from .errors import LinkError, ProtocolError
+from .errors import DeviceError, LinkError, ProtocolError
 from .link import kept_up
 from .source import Arrival, Damaged, Decoder, ScanClosed, WireBytes
 
@@ -73,7 +73,7 @@ class SerialScanner:
                     self._write(port, self._decoder.request())
                     return
                 self._judge(watch.saw(data, found, self._clock()))
-        except LinkError:
+        except DeviceError:  # whatever ends the scan, the begun frame is accounted for
             yield from self._decoder.interrupted()
             raise
 

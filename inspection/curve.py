@@ -108,7 +108,7 @@ class NurbsCurve:
         """Signed curvature (m,) in 1/mm, positive where the curve turns left."""
         _, first, second = self.derivatives(u, 2)
         speed = np.hypot(first[:, 0], first[:, 1])
-        return np.asarray((first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / speed**3)
+        return np.asarray((first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / (speed * speed * speed))
 
     def station_mm(self, u: ArrayLike) -> Array:
         """Arc length (m,) from the start of the curve to the parameters u (m,)."""

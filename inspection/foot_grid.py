@@ -186,8 +186,7 @@ def _is_quintic(curve: NurbsCurve, low: Array, high: Array, span_low: Array, spa
 
 def _taylor(curve: NurbsCurve, middle: Array, width: Array, order: int) -> Array:
     """Coefficients (p, 2, order + 1) of C(middle + width t)."""
-    powers = np.arange(order + 1)
-    factor = width ** powers[:, None] / np.cumprod(np.maximum(powers, 1.0))[:, None]  # (order + 1, p)
+    factor = _powers(width, order + 1) / np.cumprod(np.maximum(np.arange(order + 1), 1.0))[:, None]  # (order + 1, p)
     return np.ascontiguousarray((curve.derivatives(middle, order) * factor[:, :, None]).transpose(1, 2, 0))
 
 
@@ -208,10 +207,30 @@ def _arc_length(rows: Array, start_mm: Array) -> Array:
     c = rows[:, :12].reshape(-1, 2, 6)
     first, last = rows[:, 14:15], rows[:, 15:16]
     t = (first + last) / 2 + (last - first) / 2 * np.cos((2 * np.arange(7) + 1) * np.pi / 14)  # (p, 7)
-    velocity = np.einsum("pdk,ptk->ptd", c[:, :, 1:] * np.arange(1, 6), t[:, :, None] ** np.arange(5))
+    velocity = np.einsum("pdk,kpt->ptd", c[:, :, 1:] * np.arange(1, 6), _powers(t, 5))
     speed = np.hypot(velocity[..., 0], velocity[..., 1])
-    fitted = np.linalg.solve(t[:, :, None] ** np.arange(7), speed[:, :, None])[:, :, 0] / np.arange(1, 8)
-    return np.column_stack([start_mm - fitted @ (-0.5) ** np.arange(1, 8), fitted])
+    fitted = _through(t, speed) / np.arange(1, 8)
+    return np.column_stack([start_mm - (fitted * (-0.5) ** np.arange(1, 8)).sum(axis=1), fitted])
+
+
+def _powers(x: Array, count: int) -> Array:
+    """Powers 0 .. count - 1 of x, along a new first axis; multiplied out, so that every processor gives the same bits."""
+    return np.asarray(np.cumprod(np.stack([np.ones_like(x), *[x] * (count - 1)]), axis=0), dtype=np.float64)
+
+
+def _through(t: Array, value: Array) -> Array:
+    """Coefficients (p, n), lowest first, of the polynomials through n values each: Newton's differences, then multiplied out.
+
+    Not LAPACK, whose last bits depend on the processor.
+    """
+    n = t.shape[1]
+    newton = value.copy()
+    for order in range(1, n):
+        newton[:, order:] = (newton[:, order:] - newton[:, order - 1 : -1]) / (t[:, order:] - t[:, : n - order])
+    result = np.zeros_like(value)
+    for order in range(n - 1, -1, -1):  # Horner: result <- result (t - t[order]) + newton[order]
+        result[:, 1:], result[:, 0] = result[:, :-1] - t[:, order, None] * result[:, 1:], newton[:, order] - t[:, order] * result[:, 0]
+    return result
 
 
 def _links(curve: NurbsCurve, low: Array) -> tuple[Index, Index, Array, Array]:

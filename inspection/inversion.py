@@ -51,7 +51,7 @@ def inversion(points_mm: Array, nominal: NominalProfile) -> Feet:
         foot_mm=point,
         distance_mm=np.copysign(np.hypot(reach[:, 0], reach[:, 1]), dot(reach, normal)),
         gradient=normal,
-        curvature=(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / speed**3,
+        curvature=(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / (speed * speed * speed),
         station_mm=curve.station_mm(u),
         vertex=np.full(len(u), INSIDE, dtype=np.uint8),
     )

@@ -165,6 +165,8 @@ class LiveInspection:
         rows, count = self._rows, self._rows.count
         usable = np.flatnonzero(np.isin(rows.rejection[:count], _USABLE))
         registration = given_pose(self._datum, len(usable)) if self._datum is not None else self._registered(rows.points[usable])
+        if self._datum is None:  # so that a replay on another processor judges at the very same pose
+            registration = replace(registration, nominal_from_section=registration.nominal_from_section.rounded())
         settled = rows.copy()
         settled.rejection[usable[registration.outliers]] = Rejection.OUTLIER
         self._judge_rows(settled, registration.nominal_from_section, 0, count)

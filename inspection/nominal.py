@@ -216,7 +216,7 @@ def _profile(curve: NurbsCurve, material: Material, pieces: list[Array], grid: F
         "points_mm": point,
         "tangent": tangent,
         "normal": normal,
-        "curvature": (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / speed**3,
+        "curvature": (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / (speed * speed * speed),
         "station_mm": curve.station_mm(u),
         "speed": speed,
         "next_site": following,

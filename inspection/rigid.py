@@ -8,6 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
+_ANGLE_GRID, _SHIFT_GRID = 2.0**40, 2.0**30  # steps per rad and per mm: 0.9e-12 rad and 0.9e-9 mm, and exact in binary
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RigidTransform:
@@ -39,6 +41,11 @@ class RigidTransform:
         turned = rotated(points, self.rotation_rad)
         turned += self.translation_mm
         return turned
+
+    def rounded(self) -> "RigidTransform":
+        """The motion to within a picometre in a metre, free of the last bits, in which processors and their libraries differ."""
+        angle, shift = round(self.rotation_rad * _ANGLE_GRID) / _ANGLE_GRID, np.round(self.translation_mm * _SHIFT_GRID) / _SHIFT_GRID
+        return RigidTransform(angle, shift)
 
     def inverse(self) -> "RigidTransform":
         """The motion back."""

@@ -4,13 +4,14 @@ import csv
 import math
 from pathlib import Path
 
+from cmmlink.chunks import JudgedRows
 from inspection import InspectionResult, Rejection, Verdict
 from inspection.result import NOT_JUDGED
 
 HEADER = ("index", "x_mm", "y_mm", "station_mm", "foot_x_mm", "foot_y_mm", "deviation_mm", "verdict")
 
 
-def write_deviations(result: InspectionResult, path: Path) -> None:
+def write_deviations(result: InspectionResult | JudgedRows, path: Path) -> None:
     """Write the actual points in nominal coordinates, their feet, deviations and verdicts; rejected points say why."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
@@ -18,7 +19,7 @@ def write_deviations(result: InspectionResult, path: Path) -> None:
         writer.writerows(_row(result, index) for index in range(result.received))
 
 
-def _row(result: InspectionResult, index: int) -> tuple[str | int, ...]:
+def _row(result: InspectionResult | JudgedRows, index: int) -> tuple[str | int, ...]:
     x, y = result.actual_mm[index]
     foot_x, foot_y = result.foot_mm[index]
     values = (x, y, result.station_mm[index], foot_x, foot_y, result.deviation_mm[index])

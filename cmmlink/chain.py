@@ -1,0 +1,97 @@
+"""The hash chain over everything that is recorded: each record's SHA-256 covers the record before it.
+
+A record that is changed, deleted, added or moved breaks the chain at its place. What a chain inside a file cannot show is a
+file written anew as a whole, hashes and all; therefore every result file carries the last hash of its run.
+"""
+
+import hashlib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+from zlib import crc32
+
+Kind = Literal["run", "plan", "nominal", "wire", "points", "events", "registration", "deviations", "result", "end"]
+
+GENESIS = bytes(32)  # what the first record follows
+
+
+@dataclass(frozen=True, slots=True)
+class Draft:
+    """What is to be recorded. `count` says how many things the body holds (reads, points, events); 1 for a document."""
+
+    run: str
+    kind: Kind
+    body: bytes
+    count: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """What stands in the file. `time_s` is the time of writing, in seconds since 1970 UTC; numbers run from 1 without a gap."""
+
+    number: int
+    run: str
+    kind: str
+    time_s: float
+    count: int
+    body: bytes
+    crc32: int
+    sha256: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Alteration:
+    """The first record that is not as it was written."""
+
+    number: int
+    run: str
+    kind: str
+    problem: str
+
+    def __str__(self) -> str:
+        kind = f" ({self.kind} of run {self.run})" if self.run else ""
+        return f"record {self.number}{kind}: {self.problem}"
+
+
+def chained(draft: Draft, number: int, time_s: float, previous: bytes) -> Record:
+    """Give a draft its place in the chain."""
+    sha256 = _sha256(number, draft.run, draft.kind, time_s, draft.count, draft.body, previous)
+    return Record(number, draft.run, draft.kind, time_s, draft.count, draft.body, crc32(draft.body), sha256)
+
+
+def first_alteration(records: Iterable[Record], number: int, previous: bytes) -> tuple[Alteration | None, int, bytes]:
+    """Recompute the chain over records in the order of their numbers, which begin with `number` after the hash `previous`.
+
+    Returns the first alteration, or None, and the number and hash that the next record follows.
+    """
+    for record in records:
+        if record.number != number:
+            missing = Alteration(number, "", "", "is missing: it was deleted, or its number was changed")
+            return missing, number, previous
+        problem = _problem(record, previous)
+        if problem:
+            return Alteration(number, str(record.run), str(record.kind), problem), number, previous
+        number, previous = number + 1, record.sha256
+    return None, number, previous
+
+
+def is_damaged(record: Record) -> bool:
+    """Tell whether a body is not what its CRC says; quick, but no proof against intent."""
+    return not isinstance(record.body, bytes) or record.crc32 != crc32(record.body)  # tampering may have left text
+
+
+def _problem(record: Record, previous: bytes) -> str:
+    try:
+        expected = _sha256(record.number, record.run, record.kind, record.time_s, record.count, record.body, previous)
+    except (TypeError, ValueError, AttributeError):  # a column may hold a value of any type once a file was tampered with
+        return "holds a value of another type than was written"
+    if record.sha256 != expected:
+        return "was altered, or does not follow the record before it: its hash does not fit"
+    return "its CRC was altered" if is_damaged(record) else ""
+
+
+def _sha256(number: int, run: str, kind: str, time_s: float, count: int, body: bytes, previous: bytes) -> bytes:
+    head = f"{number:d}\n{run}\n{kind}\n{time_s!r}\n{count:d}\n{len(body)}\n"
+    digest = hashlib.sha256(previous + head.encode())
+    digest.update(body)
+    return digest.digest()

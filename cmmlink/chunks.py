@@ -1,0 +1,161 @@
+"""The bodies of records: what a run says, as bytes and back. Little-endian on every machine, no gaps, all values exact.
+
+- wire: n as uint32, n arrival times (float64), n sizes (uint32), the bytes of all reads
+- points, 40 bytes each: all sequence numbers (int64), all device times (float64), all x y z (float64)
+- deviations, 50 bytes each: all actual points and feet (x y as float64), stations, deviations (float64), verdicts, rejections (int8)
+- all others: JSON (UTF-8, sorted keys), or the file as it was (plan, nominal)
+"""
+
+import dataclasses
+import json
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmmlink.errors import StoreError
+from drivers.source import Arrival, PointBatch, WireBytes
+from inspection import InspectionResult
+
+POINT_BYTES = 40
+_JUDGED_BYTES = 50
+_JUDGED_ROWS = 20_000  # of a record of deviations: about a megabyte
+_ARRIVALS = {kind.__name__: kind for kind in get_args(Arrival)}
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """An arrival other than bytes and points, and where it stands: after so many reads and so many points of the run."""
+
+    time_s: float
+    reads: int
+    points: int
+    arrival: Arrival
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JudgedRows:
+    """The rows of a result as recorded; see InspectionResult for their meaning."""
+
+    actual_mm: NDArray[np.float64]
+    foot_mm: NDArray[np.float64]
+    station_mm: NDArray[np.float64]
+    deviation_mm: NDArray[np.float64]
+    verdicts: NDArray[np.int8]
+    rejection: NDArray[np.int8]
+
+    @property
+    def received(self) -> int:
+        """Number of rows."""
+        return len(self.verdicts)
+
+
+def pack_document(document: object) -> bytes:
+    """Spell a document of plain values as JSON; the same document always gives the same bytes."""
+    return json.dumps(document, sort_keys=True, ensure_ascii=False, separators=(",", ":")).encode()
+
+
+def unpack_document(body: bytes) -> Any:
+    """Read a document."""
+    return json.loads(body)
+
+
+def pack_reads(reads: Sequence[WireBytes]) -> bytes:
+    """Pack consecutive reads."""
+    times = np.array([read.time_s for read in reads], dtype="<f8")
+    sizes = np.array([len(read.data) for read in reads], dtype="<u4")
+    return b"".join([len(reads).to_bytes(4, "little"), times.tobytes(), sizes.tobytes(), *(read.data for read in reads)])
+
+
+def unpack_reads(body: bytes) -> list[WireBytes]:
+    """Unpack reads."""
+    count = int.from_bytes(body[:4], "little")
+    start = 4 + 12 * count
+    if start > len(body):
+        raise StoreError(f"a record of wire bytes says it holds {count} reads but has only {len(body)} bytes")
+    times = np.frombuffer(body, "<f8", count, 4).tolist()
+    ends = start + np.cumsum(np.frombuffer(body, "<u4", count, 4 + 8 * count), dtype=np.int64)
+    begins = [start, *ends[:-1].tolist()]
+    return [WireBytes(time_s, body[begin:end]) for time_s, begin, end in zip(times, begins, ends.tolist(), strict=True)]
+
+
+def pack_points(batches: Sequence[PointBatch], most: int) -> Iterator[tuple[int, bytes]]:
+    """Pack consecutive points into bodies of at most so many; gives the number of points with each."""
+    sequence = np.concatenate([batch.sequence for batch in batches])
+    time_s = np.concatenate([batch.time_s for batch in batches])
+    points = np.concatenate([batch.points_mm for batch in batches])
+    for first in range(0, len(sequence), most):
+        rows = slice(first, first + most)
+        columns = (sequence[rows].astype("<i8"), time_s[rows].astype("<f8"), points[rows].astype("<f8"))
+        yield len(columns[0]), b"".join(column.tobytes() for column in columns)
+
+
+def unpack_points(body: bytes) -> PointBatch:
+    """Unpack points."""
+    count, rest = divmod(len(body), POINT_BYTES)
+    if rest:
+        raise StoreError(f"a record of points has {len(body)} bytes, no multiple of {POINT_BYTES}")
+    sequence = np.frombuffer(body, "<i8", count).astype(np.int64)
+    time_s = np.frombuffer(body, "<f8", count, 8 * count).astype(np.float64)
+    points = np.frombuffer(body, "<f8", 3 * count, 16 * count).astype(np.float64)
+    return PointBatch(sequence, time_s, points.reshape(count, 3))
+
+
+def pack_moments(moments: Iterable[Moment]) -> bytes:
+    """Pack arrivals with their place."""
+    return pack_document(
+        [
+            {
+                "event": type(moment.arrival).__name__,
+                "time_s": moment.time_s,
+                "reads": moment.reads,
+                "points": moment.points,
+                "values": dataclasses.asdict(moment.arrival),
+            }
+            for moment in moments
+        ]
+    )
+
+
+def unpack_moments(body: bytes) -> list[Moment]:
+    """Unpack arrivals. Raises StoreError for an arrival that this version does not know."""
+    return [_moment(entry) for entry in unpack_document(body)]
+
+
+def _moment(entry: dict[str, Any]) -> Moment:
+    if entry["event"] not in _ARRIVALS:
+        raise StoreError(f"the record holds an event {entry['event']!r} that this version of cmmlink does not know")
+    return Moment(entry["time_s"], entry["reads"], entry["points"], _ARRIVALS[entry["event"]](**entry["values"]))
+
+
+def pack_judged(result: InspectionResult | JudgedRows) -> Iterator[tuple[int, bytes]]:
+    """Pack the rows of a result into bodies; gives the number of rows with each."""
+    floats = (result.actual_mm, result.foot_mm, result.station_mm, result.deviation_mm)
+    for first in range(0, result.received, _JUDGED_ROWS):
+        rows = slice(first, first + _JUDGED_ROWS)
+        columns = [column[rows].astype("<f8").tobytes() for column in floats]
+        columns += [column[rows].astype("i1").tobytes() for column in (result.verdicts, result.rejection)]
+        yield len(result.verdicts[rows]), b"".join(columns)
+
+
+def unpack_judged(bodies: Iterable[bytes]) -> JudgedRows:
+    """Unpack the rows of a result from all its bodies."""
+    parts = [_judged(body) for body in bodies]
+    if not parts:
+        return _judged(b"")
+    return JudgedRows(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in dataclasses.fields(JudgedRows)))
+
+
+def _judged(body: bytes) -> JudgedRows:
+    count, rest = divmod(len(body), _JUDGED_BYTES)
+    if rest:
+        raise StoreError(f"a record of deviations has {len(body)} bytes, no multiple of {_JUDGED_BYTES}")
+
+    def floats(place: int, width: int) -> NDArray[np.float64]:
+        values = np.frombuffer(body, "<f8", width * count, 8 * place * count).astype(np.float64)
+        return values.reshape(count, width) if width > 1 else values
+
+    codes = np.frombuffer(body, np.int8, 2 * count, 48 * count)
+    return JudgedRows(floats(0, 2), floats(2, 2), floats(4, 1), floats(5, 1), codes[:count], codes[count:])

@@ -1,0 +1,164 @@
+"""The recorder: all of a run is kept, acknowledged means committed, and a failing disk stops the scan."""
+
+import sqlite3
+import threading
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cmmlink.chunks import POINT_BYTES, unpack_judged
+from cmmlink.errors import StoreError
+from cmmlink.events import Arrived, Event, Judged, RunFinished, RunStarted
+from cmmlink.recorder import Acknowledged, Basis, Recorder
+from cmmlink.records import describe, list_runs, moments_of, points_of, reading, reads_of, registrations_of
+from cmmlink.store import FILE_NAME, Store
+from drivers.source import Arrival, Heartbeat, PointBatch, WireBytes
+from tests.cmmlink.recorded import Script, record, scan_arrivals, today
+
+
+def with_wire(arrivals: list[Arrival]) -> list[Arrival]:
+    found: list[Arrival] = []
+    for index, arrival in enumerate(arrivals):
+        found += [WireBytes(index / 7, bytes([index % 256]) * (index % 50)), arrival]
+    return found
+
+
+def test_everything_that_arrived_is_kept_as_it_was(tmp_path: Path) -> None:
+    arrivals = with_wire(scan_arrivals())
+    outcome, recorder = record(tmp_path, Script(*arrivals))
+    with reading(tmp_path, today) as store:
+        reads = list(reads_of(store, recorder.run))
+        batches = list(points_of(store, recorder.run))
+        moments = list(moments_of(store, recorder.run))
+        rows = unpack_judged(record.body for record in store.records(recorder.run, "deviations"))
+        told = describe(store, recorder.run)
+    assert reads == [arrival for arrival in arrivals if isinstance(arrival, WireBytes)]
+    sent = [arrival for arrival in arrivals if isinstance(arrival, PointBatch)]
+    for name in ("sequence", "time_s", "points_mm"):
+        expected = np.concatenate([getattr(batch, name) for batch in sent])
+        np.testing.assert_array_equal(np.concatenate([getattr(batch, name) for batch in batches]), expected, strict=True)
+    assert [moment.arrival for moment in moments] == [a for a in arrivals if not isinstance(a, WireBytes | PointBatch)]
+    places = [
+        (sum(isinstance(a, WireBytes) for a in before), sum(len(a) for a in before if isinstance(a, PointBatch)))
+        for before in (arrivals[:index] for index, a in enumerate(arrivals) if not isinstance(a, WireBytes | PointBatch))
+    ]
+    assert [(moment.reads, moment.points) for moment in moments] == places
+    assert outcome.result is not None
+    for name in ("actual_mm", "foot_mm", "station_mm", "deviation_mm", "verdicts", "rejection"):
+        np.testing.assert_array_equal(getattr(rows, name), getattr(outcome.result, name), strict=True)
+    assert told["result"]["verdict"] == told["verdict"] == outcome.result.verdict.word
+    assert (told["state"], told["received"]) == ("complete", outcome.counts.received)
+
+
+def test_the_registrations_history_ends_at_the_settled_pose(tmp_path: Path) -> None:
+    outcome, recorder = record(tmp_path, Script(*scan_arrivals(batch=600)))
+    with reading(tmp_path, today) as store:
+        history = registrations_of(store, recorder.run)
+    assert outcome.result is not None
+    assert history
+    assert {pose["state"] for pose in history} == {"provisional"}
+    pose = outcome.result.registration.nominal_from_section
+    np.testing.assert_allclose(history[-1]["translation_mm"], pose.translation_mm, atol=1e-3)
+    assert [pose["points"] for pose in history] == sorted(pose["points"] for pose in history)
+
+
+def test_what_is_acknowledged_another_process_can_read(tmp_path: Path) -> None:
+    """Looked up through a connection of its own at the moment of the acknowledgement."""
+    seen: list[tuple[int, int]] = []
+
+    def acknowledge(acknowledged: Acknowledged) -> None:
+        with closing(sqlite3.connect(tmp_path / FILE_NAME)) as connection:
+            (size,) = connection.execute("SELECT sum(length(body)) FROM record WHERE kind = 'points'").fetchone()
+        seen.append((acknowledged.points, size // POINT_BYTES))
+
+    record(tmp_path, Script(*scan_arrivals()), acknowledge=acknowledge, commit_s=0.001)
+    assert seen
+    assert all(acknowledged == readable for acknowledged, readable in seen)
+    assert seen[-1][0] == 600
+
+
+def test_a_slow_disk_makes_the_run_wait_and_nothing_is_dropped(tmp_path: Path) -> None:
+    basis = Basis("plan", "nominal", b"", {})
+    with (
+        Store(tmp_path, writing=True, now=lambda: 0.0) as store,
+        Recorder(store, basis, clock=lambda: 0.0, today=today, commit_s=0.01, queue_bytes=2000) as recorder,
+    ):
+        recorder(started := _started())
+        for index in range(200):
+            recorder(Arrived(0.0, WireBytes(float(index), bytes(500))))
+    assert started.part == "part"
+    with reading(tmp_path, today) as store:
+        assert [read.time_s for read in reads_of(store, recorder.run)] == list(range(200))
+
+
+def _started() -> RunStarted:
+    return RunStarted("part", "1", "operator", "device", True)
+
+
+class Endless:
+    """A source that is alive until it is stopped; `then` is called after the first arrivals."""
+
+    def __init__(self, *first: Arrival, then: threading.Event) -> None:
+        self._first, self._then, self._stopped = first, then, threading.Event()
+
+    def stop(self) -> None:
+        self._stopped.set()
+
+    def arrivals(self) -> Iterator[Arrival]:
+        yield from self._first
+        self._then.wait(30)
+        while not self._stopped.is_set():
+            yield Heartbeat()
+            self._stopped.wait(0.001)
+
+
+def test_a_record_that_cannot_be_kept_stops_the_scan(tmp_path: Path) -> None:
+    acknowledged, spoiled = threading.Event(), threading.Event()
+
+    def spoil(_: Acknowledged) -> None:
+        if not acknowledged.is_set():
+            acknowledged.set()
+            with closing(sqlite3.connect(tmp_path / FILE_NAME)) as connection, connection:
+                connection.execute("ALTER TABLE record RENAME TO taken_away")
+            spoiled.set()
+
+    source = Endless(*scan_arrivals()[:3], then=spoiled)
+    with pytest.raises(StoreError, match=r"so it has no result; 50 points are safe in run .*no such table"):
+        record(tmp_path, source, acknowledge=spoil, commit_s=0.01)
+    assert source._stopped.is_set()
+
+
+def test_a_program_that_fails_leaves_a_run_that_says_so(tmp_path: Path) -> None:
+    def failing(event: Event) -> None:
+        if isinstance(event, Judged):
+            raise RuntimeError("a defect elsewhere")
+
+    with pytest.raises(RuntimeError):
+        record(tmp_path, Script(*scan_arrivals()[:-1]), before=[failing])
+    (entry,) = list_runs(tmp_path, today)
+    assert entry["state"] == "interrupted"
+    with reading(tmp_path, today) as store:
+        told = describe(store, entry["run"])
+        assert "a defect elsewhere" in told["message"]
+        assert sum(len(batch) for batch in points_of(store, entry["run"])) == 600
+
+
+def test_a_result_that_cannot_be_recorded_is_not_given(tmp_path: Path) -> None:
+    """The disk fails between the last point and the result."""
+
+    def spoil(event: Event) -> None:
+        if isinstance(event, RunFinished):
+            with closing(sqlite3.connect(tmp_path / FILE_NAME)) as connection, connection:
+                connection.execute(
+                    "CREATE TRIGGER full BEFORE INSERT ON record WHEN NEW.kind = 'result' BEGIN SELECT RAISE(ABORT, 'full'); END"
+                )
+
+    with pytest.raises(StoreError, match=r"so it has no result; 600 points are safe in run .*full"):
+        record(tmp_path, Script(*scan_arrivals()), before=[spoil])
+    with closing(sqlite3.connect(tmp_path / FILE_NAME)) as connection:
+        connection.execute("DROP TRIGGER full")
+    (entry,) = list_runs(tmp_path, today)
+    assert (entry["state"], entry["received"], entry["verdict"]) == ("interrupted", 612, None)

@@ -1,0 +1,174 @@
+"""A recorded run gives its result again, bit for bit, whatever went wrong on the line; on another machine too."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cmmlink.demo import part_path
+from cmmlink.events import Arrived, Event, RunFinished
+from cmmlink.records import list_runs, reading, recorded_run
+from cmmlink.replay import Replay, replay
+from drivers.ascii_frames import AsciiDecoder
+from drivers.serial_scanner import SerialScanner
+from drivers.source import PointBatch
+from inspection import Verdict
+from tests.cmmlink.recorded import Script, decoder_of, no_decoder, record, scan_arrivals, small_profile, today
+from tests.integration.killed import ROOT
+from tests.integration.simulated import simulated
+
+COUNT = 500
+SCATTERED = ["flip:0.002@10", "lost-bytes:0.001", "inserted-bytes:0.001"]
+FAULTS: list[list[str]] = [
+    [],
+    ["flip:0.001"],
+    ["flip:0.01@5"],
+    ["lost-bytes:0.002"],
+    ["inserted-bytes:0.002"],
+    ["burst:300@250"],
+    ["burst:900@100"],
+    ["lost-frames:0.05"],
+    ["repeated-frames:0.05"],
+    ["reordered-frames:0.05"],
+    ["invalid:0.1"],
+    ["gap:60@200"],
+    ["stall:0.3@250"],
+    ["silence:9@400"],
+    ["die@350"],
+    ["unplug:0.2@300"],
+    ["unplug:0.2@300", "flip:0.005"],
+    ["lost-frames:0.02", "repeated-frames:0.02", "reordered-frames:0.02", "flip:0.002", "invalid:0.02"],
+    [*SCATTERED, "gap:30@300"],
+    [*SCATTERED, "die@300"],
+]
+OTHER_MACHINE = {"OPENBLAS_CORETYPE": "Nehalem", "OPENBLAS_NUM_THREADS": "1", "NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX512_ICL"}
+
+
+def recorded_scan(folder: Path, *faults: str, stop: threading.Event | None = None, abort_at: int | None = None) -> str:
+    """Record one scan of the simulated device; gives the run's id."""
+    points = 0
+
+    def abort(event: Event) -> None:
+        nonlocal points
+        points += len(event.arrival) if isinstance(event, Arrived) and isinstance(event.arrival, PointBatch) else 0
+        if stop is not None and abort_at is not None and points >= abort_at:
+            stop.set()
+
+    path = part_path(small_profile().curve, 2000)
+    if abort_at is not None:
+        faults = (*faults, f"stall:30@{abort_at}")  # the operator does not wait for the end of it
+    options = ["--tip-radius-mm", "1", "--rotation-deg", "30", *(f"--fault={fault}" for fault in faults)]
+    folder.mkdir(exist_ok=True)
+    with simulated("serial", "127.0.0.1:0", folder, *options, count=COUNT, path_mm=path) as device:
+        source = SerialScanner(device.address, AsciiDecoder(), silence_s=0.5, reconnect_s=2.0 if "unplug" in str(faults) else 0.0)
+        outcome, recorder = record(folder, source, stop=stop, before=[abort])
+    ending = (
+        "aborted"
+        if stop is not None
+        else "interrupted"
+        if {"die", "silence"} & {fault[:7].split("@")[0] for fault in faults}
+        else "complete"
+    )
+    assert outcome.ending == ending
+    assert outcome.result is not None
+    return recorder.run
+
+
+def replayed(folder: Path, run: str, **changes: object) -> Replay:
+    with reading(folder, today) as store:
+        return replay(store, recorded_run(store, run), decoder_of, **changes)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("faults", FAULTS, ids=" ".join)
+def test_nothing_changed_is_identical(faults: list[str], tmp_path: Path) -> None:
+    run = recorded_scan(tmp_path, *faults)
+    again = replayed(tmp_path, run)
+    assert again.identical is True
+    assert (again.changed, again.differs) == ((), ())
+    with reading(tmp_path, today) as store:
+        recorded = recorded_run(store, run)
+    assert recorded.facts == again.facts
+    assert recorded.end is not None
+    assert again.outcome.ending == recorded.end["state"]
+
+
+def test_an_aborted_run_is_replayed_as_one(tmp_path: Path) -> None:
+    run = recorded_scan(tmp_path, stop=threading.Event(), abort_at=400)
+    again = replayed(tmp_path, run)
+    assert again.identical is True
+    assert again.outcome.ending == "aborted"
+    assert again.outcome.counts.received == 400
+
+
+def test_a_run_cut_off_before_its_result_is_evaluated_from_what_was_kept(tmp_path: Path) -> None:
+    def failing(event: Event) -> None:
+        if isinstance(event, RunFinished):
+            raise RuntimeError("a defect")
+
+    with pytest.raises(RuntimeError):
+        record(tmp_path, Script(*scan_arrivals()), before=[failing])
+    with reading(tmp_path, today) as store:
+        (begin, _), *_ = store.begins_and_ends()
+        again = replay(store, recorded_run(store, begin.run), no_decoder)
+    assert again.identical is None
+    assert again.outcome.ending == "interrupted"
+    assert (again.facts["received"], again.facts["complete"], again.facts["verdict"]) == (612, False, "uncertain")
+
+
+def test_points_are_replayed_where_there_are_no_wire_bytes(tmp_path: Path) -> None:
+    _, recorder = record(tmp_path, Script(*scan_arrivals()))
+    with reading(tmp_path, today) as store:
+        again = replay(store, recorded_run(store, recorder.run), no_decoder)
+    assert again.identical is True
+    assert (again.outcome.counts.rejected, again.outcome.counts.lost) == (12, 3)
+
+
+def test_another_tolerance_is_a_new_evaluation_that_says_so(tmp_path: Path) -> None:
+    run = recorded_scan(tmp_path)
+    again = replayed(tmp_path, run, tolerance=(-0.001, 0.001))
+    assert again.identical is False
+    assert [(change.key, change.replayed) for change in again.changed] == [("tolerance.lower_mm", -0.001), ("tolerance.upper_mm", 0.001)]
+    assert again.outcome.result is not None
+    assert again.outcome.result.verdict is Verdict.NONCONFORM
+    assert {"verdict", "out_of_tolerance"} <= {change.key for change in again.differs}
+    deviations = {"max_deviation_mm", "min_deviation_mm", "rms_mm", "registration.rotation_deg"}
+    assert not deviations & {change.key for change in again.differs}
+
+
+def test_another_method_is_a_new_evaluation_that_says_so(tmp_path: Path) -> None:
+    again = replayed(tmp_path, recorded_scan(tmp_path), method="pcp")
+    assert again.identical is False
+    assert [(change.key, change.recorded, change.replayed) for change in again.changed] == [("registration.method", "exact", "pcp")]
+    assert ("method", "exact", "pcp") in [(change.key, change.recorded, change.replayed) for change in again.differs]
+
+
+def test_the_recorded_nominal_counts_not_the_file_of_that_name_today(tmp_path: Path) -> None:
+    run = recorded_scan(tmp_path)
+    with reading(tmp_path, today) as store:
+        recorded = recorded_run(store, run)
+        moved = recorded.plan.replace("nominal.csv", "gone.csv")
+        assert moved != recorded.plan
+        again = replay(store, type(recorded)(recorded.header, moved, recorded.nominal, recorded.end, recorded.facts, ""), decoder_of)
+    assert again.identical is True
+
+
+def test_replay_on_another_machine_is_identical(tmp_path: Path) -> None:
+    """The file alone, in another folder, on a processor without this one's vector instructions (as far as the libraries go)."""
+    recorded_scan(tmp_path / "here", *SCATTERED)
+    recorded_scan(tmp_path / "here", "lost-frames:0.1", "die@450")
+    (tmp_path / "there").mkdir()
+    shutil.copy(tmp_path / "here" / "station.sqlite", tmp_path / "there")
+    environment = os.environ | OTHER_MACHINE
+    for entry in list_runs(tmp_path / "there", today):
+        command = [sys.executable, "-m", "cmmlink", "replay", entry["run"], "--records", str(tmp_path / "there"), "--json"]
+        ended = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, env=environment, check=False)
+        told = json.loads(ended.stdout)
+        assert told["identical"] is True, told["differs"]
+        assert told["changed"] == []
+    assert np.isfinite(told["rms_mm"])
