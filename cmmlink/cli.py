@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import textwrap
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -327,7 +328,12 @@ def _tell(outcome: RunOutcome, profile: NominalProfile, telling: Telling, starte
     if telling.as_json:
         _print_json(facts)
     else:
-        print_summary(Console(highlight=False, soft_wrap=not sys.stdout.isatty()), outcome.result, outcome.counts, f"{_title(started)}, {started.device}")
+        print_summary(
+            Console(highlight=False, soft_wrap=not sys.stdout.isatty()),
+            outcome.result,
+            outcome.counts,
+            f"{_title(started)}, {started.device}",
+        )
     if telling.out is not None:
         written = write_results(telling.out, facts, outcome.result, profile, _title(started))
         if not telling.as_json:
@@ -535,7 +541,8 @@ def simulate(context: typer.Context, device: Annotated[str, typer.Argument(metav
 
     known = devices()
     if device in ("-h", "--help"):
-        settings_from(["--help"], f"cmmlink simulate {{{','.join(sorted(known))}}}")
+        typer.echo(textwrap.fill(f"cmmlink simulate DEVICE, one of: {', '.join(sorted(known))}", 80) + "\n")
+        settings_from(["--help"], "cmmlink simulate DEVICE")
     if device not in known:
         problem = f"no simulated device is called {device}" if device else "name the device to simulate"
         raise PlanError(f"{problem}; known: {', '.join(sorted(known))}; `cmmlink simulate --help` shows their options")
