@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import textwrap
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -570,7 +571,8 @@ def simulate(context: typer.Context, device: Annotated[str, typer.Argument(metav
 
     known = devices()
     if device in ("-h", "--help"):
-        settings_from(["--help"], f"cmmlink simulate {{{','.join(sorted(known))}}}")
+        typer.echo(textwrap.fill(f"cmmlink simulate DEVICE, one of: {', '.join(sorted(known))}", 80) + "\n")
+        settings_from(["--help"], "cmmlink simulate DEVICE")
     if device not in known:
         problem = f"no simulated device is called {device}" if device else "name the device to simulate"
         raise PlanError(f"{problem}; known: {', '.join(sorted(known))}; `cmmlink simulate --help` shows their options")

@@ -14,9 +14,9 @@ from cmmlink.pipeline import RunOutcome, run_inspection
 from drivers.errors import DeviceError, LinkError
 from drivers.source import Arrival, Damaged, Heartbeat, Lost, PointBatch, Rejected, ScanClosed, ScanOpened, WireBytes
 from inspection import LiveInspection, NominalProfile, RigidTransform, ToleranceZone, Verdict
-from tests.cmmlink.round_part import round_points, round_profile
+from tests.cmmlink.oval_part import oval_points, oval_profile, station_mm
 
-STARTED = RunStarted("disc", "0012", "A. Operator", "a list", False)
+STARTED = RunStarted("oval", "0012", "A. Operator", "a list", False)
 PATIENCE_S = 30.0
 
 
@@ -45,7 +45,7 @@ class Listed:
 
 @pytest.fixture(scope="module")
 def profile() -> NominalProfile:
-    return round_profile()
+    return oval_profile()
 
 
 @pytest.fixture
@@ -74,7 +74,7 @@ def balanced(counts: Counts) -> bool:
 
 
 def test_a_whole_scan_is_judged_to_the_last_point(live: LiveInspection) -> None:
-    source = Listed([ScanOpened("list", "1", 360), *batches(round_points(0.03), 50), ScanClosed(360)])
+    source = Listed([ScanOpened("list", "1", 360), *batches(oval_points(0.03), 50), ScanClosed(360)])
     outcome = carried_out(source, live)
     assert (outcome.ending, outcome.failure, outcome.refusal) == ("complete", None, None)
     assert outcome.result is not None
@@ -85,7 +85,7 @@ def test_a_whole_scan_is_judged_to_the_last_point(live: LiveInspection) -> None:
 
 
 def test_the_four_numbers_add_up_whatever_arrives(profile: NominalProfile) -> None:
-    points = round_points(0.0)
+    points = oval_points(0.0)
     points[7] = np.nan
     off_section = batches(points, 90)
     off_section[1] = replace(off_section[1], points_mm=off_section[1].points_mm + np.array([0, 0, 5.0]))
@@ -108,7 +108,7 @@ def test_the_four_numbers_add_up_whatever_arrives(profile: NominalProfile) -> No
 
 
 def test_events_come_in_the_order_of_things(live: LiveInspection) -> None:
-    arrivals: list[Arrival] = [ScanOpened("list", "1", 360), *batches(round_points(0.0), 100), ScanClosed(360)]
+    arrivals: list[Arrival] = [ScanOpened("list", "1", 360), *batches(oval_points(0.0), 100), ScanClosed(360)]
     events: list[Event] = []
     outcome = carried_out(Listed(arrivals), live, events.append)
     assert events[0] is STARTED
@@ -124,14 +124,14 @@ def test_events_come_in_the_order_of_things(live: LiveInspection) -> None:
 def test_every_sink_hears_everything(live: LiveInspection) -> None:
     one: list[Event] = []
     two: list[Event] = []
-    carried_out(Listed([*batches(round_points(0.0), 100), ScanClosed(360)]), live, one.append, two.append)
+    carried_out(Listed([*batches(oval_points(0.0), 100), ScanClosed(360)]), live, one.append, two.append)
     assert len(one) == len(two) > 4
     assert all(a is b for a, b in zip(one, two, strict=True))
 
 
 def test_a_failing_source_ends_with_what_was_received_and_no_proof(live: LiveInspection) -> None:
     broken = LinkError("port: the link was lost")
-    outcome = carried_out(Listed([*batches(round_points(0.0), 60)[:3], broken]), live)
+    outcome = carried_out(Listed([*batches(oval_points(0.0), 60)[:3], broken]), live)
     assert (outcome.ending, outcome.failure) == ("interrupted", broken)
     assert (outcome.counts.received, outcome.counts.judged) == (180, 180)
     assert outcome.result is not None
@@ -139,14 +139,14 @@ def test_a_failing_source_ends_with_what_was_received_and_no_proof(live: LiveIns
 
 
 def test_a_part_seen_to_be_bad_stays_bad_when_the_source_fails(live: LiveInspection) -> None:
-    outcome = carried_out(Listed([*batches(round_points(0.2), 60)[:3], LinkError("gone")]), live)
+    outcome = carried_out(Listed([*batches(oval_points(0.2), 60)[:3], LinkError("gone")]), live)
     assert outcome.result is not None
     assert outcome.result.verdict == Verdict.NONCONFORM
 
 
 @pytest.mark.parametrize("defect", [KeyError("x"), ZeroDivisionError("y"), RuntimeError("z")])
 def test_a_defect_in_a_driver_ends_the_run_with_a_message(live: LiveInspection, defect: Exception) -> None:
-    outcome = carried_out(Listed([*batches(round_points(0.0), 100)[:2], defect]), live)
+    outcome = carried_out(Listed([*batches(oval_points(0.0), 100)[:2], defect]), live)
     assert outcome.ending == "interrupted"
     assert isinstance(outcome.failure, DeviceError)
     assert str(outcome.failure) == f"the driver failed unexpectedly: {defect!r}"
@@ -182,7 +182,7 @@ def sink_that_fails_on(kind: type[Event]) -> Sink:
 
 @pytest.mark.parametrize("kind", [Arrived, Judged])
 def test_a_failing_sink_stops_acquisition_and_its_error_is_passed_on(live: LiveInspection, kind: type[Event]) -> None:
-    source = Listed(itertools.chain(itertools.cycle(batches(round_points(0.0), 100))))  # a device that never ends
+    source = Listed(itertools.chain(itertools.cycle(batches(oval_points(0.0), 100))))  # a device that never ends
     with pytest.raises(OSError, match="the disk is full"):
         carried_out(source, live, sink_that_fails_on(kind))
     assert source.stopped.is_set()
@@ -207,7 +207,7 @@ def stopping_after(points: int, stop: threading.Event) -> Callable[[Event], None
 
 def test_a_stop_ends_an_endless_scan_and_judges_all_that_was_received(live: LiveInspection) -> None:
     stop = threading.Event()
-    source = Listed(itertools.cycle(batches(round_points(0.0), 20)))
+    source = Listed(itertools.cycle(batches(oval_points(0.0), 20)))
     outcome = carried_out(source, live, stopping_after(200, stop), buffer_points=40, stop=stop)
     assert (outcome.ending, outcome.failure) == ("aborted", None)
     assert outcome.result is not None
@@ -222,7 +222,7 @@ def test_a_slow_consumer_holds_the_source_up_and_loses_nothing(live: LiveInspect
 
     def counted() -> Iterator[Arrival]:
         nonlocal produced
-        for batch in batches(round_points(0.01), 5):
+        for batch in batches(oval_points(0.01), 5):
             with further:
                 produced += 1
                 further.notify_all()
@@ -238,7 +238,7 @@ def test_a_slow_consumer_holds_the_source_up_and_loses_nothing(live: LiveInspect
     assert outcome.result is not None
     assert outcome.counts.buffer_peak == 10
     assert outcome.counts.received == outcome.counts.judged == 360
-    np.testing.assert_allclose(outcome.result.station_mm, (np.arange(360) + 0.5) / 360 * 20 * np.pi, atol=1e-6)
+    np.testing.assert_allclose(outcome.result.station_mm, [station_mm(i) for i in range(360)], atol=1e-6)
 
 
 def test_a_buffer_that_holds_nothing_is_refused_before_anything_starts(live: LiveInspection) -> None:

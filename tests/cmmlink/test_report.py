@@ -17,7 +17,7 @@ from cmmlink.report.folder import prepare, write_results
 from cmmlink.report.picture import magnification, write_picture
 from cmmlink.report.summary import identity, summary
 from inspection import InspectionResult, LiveInspection, NominalProfile, RigidTransform, ToleranceZone
-from tests.cmmlink.round_part import LENGTH_MM, RADIUS_MM, round_points, round_profile, station_mm
+from tests.cmmlink.oval_part import LENGTH_MM, oval_feet, oval_points, oval_profile, station_mm
 
 PROMISED = {
     "verdict": str,
@@ -41,12 +41,12 @@ FURTHER = {"coverage", "complete", "tolerance", "rejected_by_reason", "damaged_b
 
 @pytest.fixture(scope="module")
 def profile() -> NominalProfile:
-    return round_profile()
+    return oval_profile()
 
 
 def inspected(profile: NominalProfile, deviation_mm: Any, **settings: Any) -> InspectionResult:
     live = LiveInspection(profile, ToleranceZone(-0.05, 0.07, 0.01), datum=RigidTransform.identity(), **settings)
-    live.add(round_points(deviation_mm))
+    live.add(oval_points(deviation_mm))
     return live.finish()
 
 
@@ -75,9 +75,9 @@ def test_the_summary_has_the_promised_keys_and_says_what_was_put_in(profile: Nom
 
 def test_the_worst_point_and_the_stretches_are_where_they_were_made(profile: NominalProfile) -> None:
     facts = summary(inspected(profile, bumped()), Counts())
-    worst, angle = facts["worst"], station_mm(42) / RADIUS_MM
+    worst, (x, y) = facts["worst"], oval_points(bumped())[42]
     assert set(worst) == {"station_mm", "x_mm", "y_mm", "deviation_mm"}
-    at = (station_mm(42), (RADIUS_MM + 0.2) * np.cos(angle), (RADIUS_MM + 0.2) * np.sin(angle), 0.2)
+    at = (station_mm(42), x, y, 0.2)
     assert (worst["station_mm"], worst["x_mm"], worst["y_mm"], worst["deviation_mm"]) == pytest.approx(at, abs=1e-6)
     first, second = facts["stretches"]
     assert set(first) == {"from_mm", "to_mm", "worst_mm"}
@@ -88,7 +88,7 @@ def test_the_worst_point_and_the_stretches_are_where_they_were_made(profile: Nom
 def test_the_registration_is_told_in_degrees_and_mm(profile: NominalProfile) -> None:
     pose = RigidTransform(np.radians(90.0), np.array([1.0, -2.0]))
     live = LiveInspection(profile, ToleranceZone(-0.05, 0.05), datum=pose)
-    live.add(RigidTransform(np.radians(-90.0), np.zeros(2)).apply(round_points(0.0) - [1.0, -2.0]))
+    live.add(RigidTransform(np.radians(-90.0), np.zeros(2)).apply(oval_points(0.0) - [1.0, -2.0]))
     registration = summary(live.finish(), Counts())["registration"]
     assert {"rotation_deg", "translation_mm", "iterations", "converged"} <= set(registration)
     assert registration["rotation_deg"] == pytest.approx(90.0)
@@ -128,9 +128,7 @@ def test_deviations_csv_has_a_row_for_every_point(profile: NominalProfile, tmp_p
     assert tuple(rows[0]) == HEADER
     assert HEADER == ("index", "x_mm", "y_mm", "station_mm", "foot_x_mm", "foot_y_mm", "deviation_mm", "verdict")
     assert [int(row["index"]) for row in rows] == list(range(360))
-    points = round_points(bumped())
-    foot = points * (RADIUS_MM / np.linalg.norm(points, axis=1))[:, None]
-    truth = np.column_stack([points, [station_mm(i) for i in range(360)], foot, bumped()])
+    truth = np.column_stack([oval_points(bumped()), [station_mm(i) for i in range(360)], oval_feet(), bumped()])
     np.testing.assert_allclose([[float(row[name]) for name in HEADER[1:7]] for row in rows], truth, atol=0.51e-6)
     words = np.where(np.abs(bumped() - 0.01) > 0.07, "nonconform", "conform")
     assert [row["verdict"] for row in rows] == words.tolist()
@@ -138,7 +136,7 @@ def test_deviations_csv_has_a_row_for_every_point(profile: NominalProfile, tmp_p
 
 def test_a_rejected_point_keeps_its_row_and_says_why(profile: NominalProfile, tmp_path: Path) -> None:
     live = LiveInspection(profile, ToleranceZone(-0.05, 0.05), datum=RigidTransform.identity())
-    live.add([[10.0, 0.0], [np.nan, 1.0], [0.0, 10.3]])
+    live.add([[10.0, 0.0], [np.nan, 1.0], [0.0, 8.3]])
     write_deviations(live.finish(), tmp_path / "deviations.csv")
     rows = rows_of(tmp_path / "deviations.csv")
     assert [row["verdict"] for row in rows] == ["conform", "rejected: not finite", "nonconform"]
@@ -156,8 +154,8 @@ ABOVE, BELOW, GOOD, BAND = "#c2410c", "#6d28d9", "#2a7fa5", "#dfe7ee"
 
 def test_the_picture_shows_band_whiskers_and_what_is_out(profile: NominalProfile, tmp_path: Path) -> None:
     good, bad = tmp_path / "good.png", tmp_path / "bad.png"
-    write_picture(inspected(profile, 0.02), profile, "disc", good)
-    write_picture(inspected(profile, bumped()), profile, "disc", bad)
+    write_picture(inspected(profile, 0.02), profile, "oval", good)
+    write_picture(inspected(profile, bumped()), profile, "oval", bad)
     assert imread(good).shape[:2] == (880, 1320)
     assert min(pixels_of(good, BAND), pixels_of(bad, BAND)) > 10_000
     assert pixels_of(good, GOOD) > 100
@@ -169,20 +167,20 @@ def test_the_picture_shows_band_whiskers_and_what_is_out(profile: NominalProfile
 def test_the_magnification_is_a_round_number_that_shows_the_band(profile: NominalProfile) -> None:
     factor = magnification(inspected(profile, 0.0), profile)
     assert factor in {step * power for step in (1, 2, 5) for power in (1, 10, 100)}
-    assert 0.024 <= factor * 0.12 / np.hypot(20, 20) <= 0.06
+    assert 0.024 <= factor * 0.12 / np.hypot(20, 16) <= 0.06
 
 
 def test_the_folder_holds_what_it_says(profile: NominalProfile, tmp_path: Path) -> None:
     folder = tmp_path / "a" / "b"
     facts = summary(inspected(profile, bumped()), Counts())
-    written = write_results(folder, facts, inspected(profile, bumped()), profile, "disc")
+    written = write_results(folder, facts, inspected(profile, bumped()), profile, "oval")
     assert sorted(written) == sorted(path.name for path in folder.iterdir()) == ["deviations.csv", "profile.png", "result.json"]
     assert json.loads((folder / "result.json").read_text(encoding="utf-8")) == facts
 
 
 def test_an_earlier_result_does_not_stay_beside_a_run_without_one(profile: NominalProfile, tmp_path: Path) -> None:
-    write_results(tmp_path, {}, inspected(profile, 0.0), profile, "disc")
-    assert write_results(tmp_path, {"verdict": "uncertain"}, None, profile, "disc") == ["result.json"]
+    write_results(tmp_path, {}, inspected(profile, 0.0), profile, "oval")
+    assert write_results(tmp_path, {"verdict": "uncertain"}, None, profile, "oval") == ["result.json"]
     assert [path.name for path in tmp_path.iterdir()] == ["result.json"]
 
 
@@ -199,5 +197,5 @@ def test_a_folder_that_takes_no_files_is_named(tmp_path: Path, name: str) -> Non
         prepare(tmp_path / name)
 
 
-def test_the_disc_is_as_long_as_its_circumference(profile: NominalProfile) -> None:
+def test_the_oval_is_as_long_as_its_circumference(profile: NominalProfile) -> None:
     assert profile.length_mm == pytest.approx(LENGTH_MM, rel=1e-12)

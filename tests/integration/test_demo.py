@@ -1,0 +1,208 @@
+"""The demonstration as a process of its own: simulated device, serial line, pipeline, verdict, files."""
+
+import csv
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+ROOT = Path(__file__).resolve().parents[2]
+PATIENCE_S = 60.0
+POINTS = 4000
+POSIX = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals and signals to a group exist on POSIX systems only")
+
+
+class Demonstration:
+    """The demonstration running without a terminal."""
+
+    def __init__(self, folder: Path, *options: str) -> None:
+        command = [sys.executable, "-m", "cmmlink", "demo", "--headless", "--json", "--out", str(folder), *options]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT)
+
+    def ended(self) -> tuple[int, dict[str, Any]]:
+        """Exit code and JSON object of a demonstration that has nothing to complain of."""
+        out, err = self.process.communicate(timeout=PATIENCE_S)
+        assert [line for line in err.splitlines() if not line.startswith("cmmlink: compiling")] == []
+        return self.process.returncode, json.loads(out)
+
+
+@contextmanager
+def demonstrations(*settings: tuple[Path | str, ...]) -> Iterator[list[Demonstration]]:
+    """Several demonstrations side by side."""
+    running = [Demonstration(Path(folder), *map(str, options)) for folder, *options in settings]
+    try:
+        yield running
+    finally:
+        for one in running:
+            one.process.kill()
+            one.process.communicate()
+
+
+def judged_points(folder: Path) -> NDArray[np.float64]:
+    """Stations and deviations (m, 2) of deviations.csv, in the order of the scan."""
+    with (folder / "deviations.csv").open(newline="", encoding="utf-8") as file:
+        return np.array([(float(row["station_mm"]), float(row["deviation_mm"])) for row in csv.DictReader(file)])
+
+
+def conforms(code: int, facts: dict[str, Any]) -> None:
+    assert (code, facts["verdict"], facts["stretches"], facts["out_of_tolerance"]) == (0, "conform", [], 0)
+    assert (facts["received"], facts["judged"], facts["rejected"], facts["lost"]) == (POINTS, POINTS, 0, 0)
+    assert (facts["part"], facts["serial_number"], facts["simulated"]) == ("NACA 4512 section", "DEMO-1", True)
+    assert 0.01 < facts["max_deviation_mm"] - facts["min_deviation_mm"] < 0.06  # the form error that the device was told
+
+
+def has_the_defect(code: int, facts: dict[str, Any]) -> None:
+    assert (code, facts["verdict"], facts["received"], facts["judged"]) == (1, "nonconform", POINTS, POINTS)
+    (stretch,) = facts["stretches"]
+    assert 39 < stretch["from_mm"] < 40 < stretch["to_mm"] < 41
+    assert facts["worst"]["station_mm"] == pytest.approx(40, abs=1)
+    assert facts["worst"]["deviation_mm"] == pytest.approx(0.12, abs=0.01)
+
+
+def test_the_demonstration_conforms_and_finds_a_defect_where_and_as_high_as_it_was_made(tmp_path: Path) -> None:
+    with demonstrations((tmp_path / "sound",), (tmp_path / "bad", "--defect", "0.12@40")) as (sound, bad):
+        (sound_code, sound_facts), (bad_code, bad_facts) = sound.ended(), bad.ended()
+    conforms(sound_code, sound_facts)
+    has_the_defect(bad_code, bad_facts)
+
+    # The same seed is the same part but for the defect: what differs is the bump alone.
+    without, with_defect = judged_points(tmp_path / "sound"), judged_points(tmp_path / "bad")
+    assert len(without) == len(with_defect) == POINTS
+    bump = with_defect[:, 1] - without[:, 1]
+    assert bump.max() == pytest.approx(0.12, abs=0.002)
+    assert without[bump.argmax(), 0] == pytest.approx(40, abs=0.2)
+    assert np.abs(bump[np.abs(without[:, 0] - 40) > 3]).max() < 0.002
+
+
+def test_another_seed_is_another_part_in_another_place(tmp_path: Path) -> None:
+    with demonstrations((tmp_path / "2", "--seed", "2"), (tmp_path / "3", "--seed", "3")) as running:
+        (code_2, two), (code_3, three) = (one.ended() for one in running)
+    assert (code_2, code_3) == (0, 0)
+    # Seed n lies turned by 37 + 11 n degrees on the simulated machine, at (210, 145) mm.
+    for seed, facts in ((2, two), (3, three)):
+        turned = -np.radians(37 + 11 * seed)
+        at = np.array([[np.cos(turned), -np.sin(turned)], [np.sin(turned), np.cos(turned)]]) @ [-210, -145]
+        assert facts["registration"]["rotation_deg"] == pytest.approx(np.degrees(turned), abs=0.05)
+        np.testing.assert_allclose(facts["registration"]["translation_mm"], at, atol=0.1)
+        assert facts["received"] == facts["judged"] == POINTS
+    assert abs(two["max_deviation_mm"] - three["max_deviation_mm"]) > 1e-4
+    assert abs(two["rms_mm"] - three["rms_mm"]) > 1e-5
+
+
+class Terminal:
+    """A command in a terminal of its own; POSIX only."""
+
+    def __init__(self, *arguments: str) -> None:
+        import pty
+
+        self.screen = ""
+        self._main, terminal = pty.openpty()
+        environment = dict(os.environ, TERM="xterm-256color", COLUMNS="110", LINES="40")
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "cmmlink", *arguments],
+            stdin=terminal,
+            stdout=terminal,
+            stderr=terminal,
+            cwd=ROOT,
+            env=environment,
+            start_new_session=True,
+        )
+        os.close(terminal)
+
+    def read(self) -> bool:
+        """Take what the command has painted; False once it has left the terminal."""
+        try:
+            data = os.read(self._main, 65536)
+        except OSError:  # how Linux tells the end
+            data = b""
+        self.screen += data.decode("utf-8", "replace")
+        return bool(data)
+
+    def received(self) -> int:
+        """Points received, by the last table on the screen."""
+        return int((re.findall(r"(\d+) received", self.screen) or ["0"])[-1])
+
+    def until_received(self, points: int) -> None:
+        while self.received() < points:
+            assert self.read(), self.screen
+
+    def to_the_end(self) -> int:
+        while self.read():
+            pass
+        return self.process.wait(PATIENCE_S)
+
+    def close(self) -> None:
+        self.process.kill()
+        self.process.wait()
+        os.close(self._main)
+
+
+@contextmanager
+def terminal(*arguments: str) -> Iterator[Terminal]:
+    running = Terminal(*arguments)
+    try:
+        yield running
+    finally:
+        running.close()
+
+
+def child_of(pid: int) -> int:
+    """The one child of a process."""
+    listed = subprocess.run(["ps", "-axo", "pid=,ppid="], capture_output=True, text=True, check=True).stdout
+    (child,) = [int(line.split()[0]) for line in listed.splitlines() if line.split()[1] == str(pid)]
+    return child
+
+
+def partial(folder: Path, at_least: int) -> dict[str, Any]:
+    """The result of a run that was cut short: a sound part of it, honestly counted and not proven."""
+    facts: dict[str, Any] = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+    assert at_least <= facts["received"] < POINTS
+    assert facts["received"] == facts["judged"] + facts["rejected"]
+    assert (facts["verdict"], facts["complete"]) == ("uncertain", False)
+    assert len(judged_points(folder)) == facts["received"]
+    return facts
+
+
+@POSIX
+def test_a_killed_device_ends_the_run_with_a_message_and_what_was_received(tmp_path: Path) -> None:
+    with terminal("demo", "--out", str(tmp_path)) as screen:
+        screen.until_received(1000)
+        os.kill(child_of(screen.process.pid), signal.SIGKILL)
+        assert screen.to_the_end() == 4
+    facts = partial(tmp_path, 1000)
+    assert re.search(r"cmmlink: .*the link was lost", screen.screen)
+    assert "NOT PROVEN" in screen.screen
+    assert "the scan was cut short" in screen.screen
+    assert f"received {facts['received']} = judged {facts['judged']} + rejected {facts['rejected']}; " in screen.screen
+
+
+@POSIX
+def test_ctrl_c_ends_the_run_with_a_message_and_what_was_received(tmp_path: Path) -> None:
+    with terminal("demo", "--out", str(tmp_path)) as screen:
+        screen.until_received(1000)
+        os.killpg(screen.process.pid, signal.SIGINT)  # as a terminal does: to the run and all in its group
+        assert screen.to_the_end() == 3
+    partial(tmp_path, 1000)
+    assert "cmmlink: stopped by the operator: the scan is not complete" in screen.screen
+    assert "Traceback" not in screen.screen
+
+
+@POSIX
+def test_the_live_table_shows_the_run_and_leaves_the_summary(tmp_path: Path) -> None:
+    with terminal("demo", "--defect", "0.12@40", "--out", str(tmp_path)) as screen:
+        assert screen.to_the_end() == 1
+    table, _, summary = screen.screen.rpartition("CONFORM")
+    for words in ("registration", "provisional, can move", "points/s", "SIMULATED", "so far", "/4000", "worst"):
+        assert words in table, words
+    assert "received 4000 = judged 4000 + rejected 0; lost 0 points" in summary
+    assert "\x1b[?25h" in screen.screen.rpartition("\x1b[?25l")[2]  # the cursor is shown again
