@@ -35,7 +35,7 @@ from cmmlink.export import export_run
 from cmmlink.nominal_files import NominalFile, load_nominal, material_side
 from cmmlink.parts import planned_inspection, planned_profile, profile_of
 from cmmlink.pipeline import RunOutcome, run_inspection
-from cmmlink.plan import Device, FileDevice, Plan, load_plan, place_of
+from cmmlink.plan import Device, FileDevice, ModbusDevice, Plan, SerialDevice, load_plan, place_of
 from cmmlink.recorder import Basis, Evidence, Recorder, software
 from cmmlink.records import check_chain, default_folder, describe, find_run, list_runs, reading, recorded_run, recording
 from cmmlink.replay import Replay
@@ -44,8 +44,9 @@ from cmmlink.report.folder import prepare, write_results
 from cmmlink.report.stack_folder import write_stack
 from cmmlink.report.summary import identity, summary
 from cmmlink.terminal import LiveTable, print_summary
-from drivers.ascii_frames import AsciiDecoder
+from drivers.axis import Beam, ConstantFeed, FollowedAxis
 from drivers.errors import DeviceError, LinkError, MeshError, PointFileError
+from drivers.formats import decoder
 from drivers.point_file import PointFileSource
 from drivers.serial_scanner import SerialScanner, ports
 from drivers.source import Decoder, ScanSource
@@ -314,13 +315,60 @@ def _source_of(plan: Plan) -> tuple[ScanSource, str]:
     device = plan.device
     if isinstance(device, FileDevice):
         return PointFileSource(device.file, device.scale), f"file {device.file.name}"
-    scanner = SerialScanner(device.address, decoder_of(device) or AsciiDecoder(), baud_rate=device.baud_rate, silence_s=device.silence_s)
-    return scanner, f"{device.type} {device.address}"
+    try:
+        return _on_its_axis(device), f"{device.type} {device.address}"
+    except ValueError as error:
+        raise PlanError(f"device: {error}") from None
+
+
+def _on_its_axis(device: SerialDevice | ModbusDevice) -> ScanSource:
+    """The source of a device, with its distances made points where the plan has an axis."""
+    source, axis = _link_of(device), device.axis
+    if axis is None:
+        return source
+    beam = Beam(axis.origin_mm, axis.distance_direction, axis.axis_direction)
+    if axis.follow is not None:
+        return FollowedAxis(source, _link_of(axis.follow), beam)
+    assert axis.feed_mm_s is not None
+    return ConstantFeed(source, beam, axis.feed_mm_s)
+
+
+def _link_of(device: SerialDevice | ModbusDevice) -> ScanSource:
+    if isinstance(device, SerialDevice):
+        return SerialScanner(
+            device.address,
+            decoder(device.format, **device.options),
+            baud_rate=device.baud_rate,
+            parity=device.parity,
+            silence_s=device.silence_s,
+            reconnect_s=device.reconnect_s,
+        )
+    from drivers.modbus_scanner import ModbusScanner  # noqa: PLC0415 - pymodbus is loaded for those who need it
+    from drivers.register_map import load_map  # noqa: PLC0415
+
+    return ModbusScanner(
+        device.address,
+        load_map(device.map),
+        device_id=device.device_id,
+        count=device.points,
+        baud_rate=device.baud_rate,
+        parity=device.parity,
+        timeout_s=device.timeout_s,
+        silence_s=device.silence_s,
+        reconnect_s=device.reconnect_s,
+    )
 
 
 def decoder_of(device: Device) -> Decoder | None:
     """The decoder of what a device sends; None where its points themselves are what is recorded."""
-    return None if isinstance(device, FileDevice) else AsciiDecoder()
+    if isinstance(device, FileDevice) or device.axis is not None:
+        return None
+    if isinstance(device, SerialDevice):
+        return decoder(device.format, **device.options)
+    from drivers.register_decoder import RegisterDecoder  # noqa: PLC0415 - with the maps, only where Modbus is spoken
+    from drivers.register_map import load_map  # noqa: PLC0415
+
+    return RegisterDecoder(load_map(device.map), count=device.points)
 
 
 @contextmanager

@@ -14,10 +14,23 @@ A plan needs four keys; everything else has the default shown. Relative paths ar
       upper_mm: 0.05
       uncertainty_mm: 0.0           # expanded uncertainty U (95 %) of one deviation, ISO 14253-1
     device:
-      type: serial                  # ASCII lines over a serial port
-      address: COM3                 # port name, or socket://host:port
+      type: serial                  # a stream over a serial port or a TCP socket
+      address: COM3                 # port name, or host:port
+      format: ascii                 # ascii, binary, optoncdt, riftek, riftek-ascii
+      options: {}                   # of the format, like {range_mm: 50, rate_hz: 1000, count: 5000}
       baud_rate: 115200
+      parity: N                     # N, E, O
       silence_s: 5.0                # a device silent for longer has failed
+      reconnect_s: 0.0              # how long a lost link is tried again
+      axis: null                    # for distance sensors: {feed_mm_s: 10, origin_mm: [0, 0, 0], distance_direction: [0, 1, 0],
+                                    # axis_direction: [1, 0, 0]}; or, instead of feed_mm_s, follow: {another device}
+    # device:
+    #   type: modbus                # registers over TCP (host:port) or RTU (a port name)
+    #   address: 192.168.1.10:502
+    #   map: gocator                # or generic-ring, generic-fifo, riftek-rf60x, or a yaml file of yours
+    #   device_id: 1
+    #   points: null                # the scan ends after so many, for devices that tell no end
+    #   timeout_s: 1.0              # longer than the slowest answer
     # device: {type: file, file: points.csv, scale: 1.0}    a file of points in place of a device
     probe: {tip_radius_mm: 0.0}     # above 0: the points are ball centres
     section:                        # the plane of the section in machine coordinates
@@ -108,13 +121,57 @@ class Tolerance(_Settings):
         return ToleranceZone(self.lower_mm, self.upper_mm, self.uncertainty_mm)
 
 
+class Axis(_Settings):
+    """What makes points of the distances of a one-dimensional sensor: a constant feed, or a second device that tells the position."""
+
+    origin_mm: Vector = (0.0, 0.0, 0.0)
+    distance_direction: Vector = (0.0, 1.0, 0.0)
+    axis_direction: Vector = (1.0, 0.0, 0.0)
+    feed_mm_s: float | None = None
+    follow: "Annotated[SerialDevice | ModbusDevice, Field(discriminator='type')] | None" = None
+
+    @field_validator("distance_direction", "axis_direction")
+    @classmethod
+    def _unit(cls, direction: Vector) -> Vector:
+        if abs(hypot(*direction) - 1.0) > 1e-6:
+            raise ValueError("a direction of length 1, like [0, 1, 0]")
+        return direction
+
+    @model_validator(mode="after")
+    def _one_of_two(self) -> "Axis":
+        if (self.feed_mm_s is None) == (self.follow is None):
+            raise ValueError("either feed_mm_s or follow")
+        return self
+
+
 class SerialDevice(_Settings):
-    """A device that sends ASCII lines over a serial port."""
+    """A device that streams over a serial port or a TCP socket, in one of the formats of drivers, with that format's options."""
 
     type: Literal["serial"]
-    address: Text = Field(description="a port name like COM3 or /dev/ttyUSB0, or socket://host:port")
+    address: Text = Field(description="a port name like COM3 or /dev/ttyUSB0, or host:port")
     baud_rate: Annotated[int, Field(gt=0)] = 115200
     silence_s: Positive = 5.0
+    reconnect_s: Annotated[float, Field(ge=0)] = 0.0
+    format: Text = "ascii"
+    options: dict[str, Annotated[int | float | str, Field(union_mode="left_to_right")]] = {}
+    parity: Literal["N", "E", "O"] = "N"
+    axis: Axis | None = None
+
+
+class ModbusDevice(_Settings):
+    """A device whose points are read from registers, over TCP (host:port) or RTU (a port name), as its map describes."""
+
+    type: Literal["modbus"]
+    address: Text = Field(description="host:port, or the port name of an RTU line")
+    map: Text = Field(description="a register map: a yaml file, or the name of a shipped one like generic-ring or gocator")
+    device_id: Annotated[int, Field(ge=0, le=255)] = 1
+    points: Annotated[int, Field(ge=1)] | None = None
+    baud_rate: Annotated[int, Field(gt=0)] = 19200
+    parity: Literal["N", "E", "O"] = "E"
+    timeout_s: Positive = 1.0
+    silence_s: Positive = 5.0
+    reconnect_s: Annotated[float, Field(ge=0)] = 0.0
+    axis: Axis | None = None
 
 
 class FileDevice(_Settings):
@@ -125,7 +182,8 @@ class FileDevice(_Settings):
     scale: Positive = 1.0
 
 
-Device = Annotated[SerialDevice | FileDevice, Field(discriminator="type")]
+Device = Annotated[SerialDevice | ModbusDevice | FileDevice, Field(discriminator="type")]
+Axis.model_rebuild()
 
 
 class Probe(_Settings):
@@ -242,6 +300,8 @@ def _with_paths_from(folder: Path, plan: Plan) -> Plan:
     device = plan.device
     if isinstance(device, FileDevice):
         device = device.model_copy(update={"file": folder / device.file})
+    elif isinstance(device, ModbusDevice) and Path(device.map).suffix:
+        device = device.model_copy(update={"map": str(folder / device.map)})
     return plan.model_copy(
         update={
             "nominal": plan.nominal.model_copy(update={"file": folder / plan.nominal.file}),

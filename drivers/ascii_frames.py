@@ -79,7 +79,7 @@ class AsciiDecoder:
         self._clock = WrappingClock(WRAP, 1e6)
         self._sequence: list[int] = []
         self._raw_us: list[int] = []
-        self._xyz: list[tuple[float, float, float]] = []
+        self._xyz: list[float] = []
 
     def _lines(self, lines: list[bytes]) -> None:
         """Take whole lines: points in sequence here, where speed counts, everything else elsewhere."""
@@ -93,7 +93,7 @@ class AsciiDecoder:
                 if int(sequence) == expected and flags == b"0" and not self._closed:
                     self._sequence.append(expected)
                     self._raw_us.append(int(raw_us))
-                    self._xyz.append((float(x), float(y), float(z)))
+                    self._xyz += (float(x), float(y), float(z))
                     expected += 1
                     continue
             counter.expected = expected
@@ -139,7 +139,7 @@ class AsciiDecoder:
             return
         self._sequence.append(place.sequence)
         self._raw_us.append(int(raw_us))
-        self._xyz.append((float(x), float(y), float(z)))
+        self._xyz += (float(x), float(y), float(z))
 
     def _opened(self, body: bytes, found: re.Match[bytes]) -> None:
         if body == self._header and self._counter.expected == 0:
@@ -188,8 +188,11 @@ class AsciiDecoder:
         if self._mm_per_unit is None:
             self._out.append(Rejected(len(sequence), "no scan header arrived: the unit is unknown"))
             return
-        points_mm = np.array(xyz, dtype=np.float64) * self._mm_per_unit
-        self._out.append(PointBatch(np.array(sequence, dtype=np.int64), self._clock.seconds(np.array(raw_us, dtype=np.int64)), points_mm))
+        points_mm = np.array(xyz).reshape(-1, 3)
+        if self._mm_per_unit != 1.0:
+            points_mm = points_mm * self._mm_per_unit
+        time_s = np.array(self._clock.ticks(raw_us)) / 1e6
+        self._out.append(PointBatch(np.array(sequence), time_s, points_mm))
 
     def _handed_over(self) -> list[Arrival]:
         self._flush()

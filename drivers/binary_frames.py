@@ -79,7 +79,7 @@ class BinaryDecoder:
     def _begin(self) -> None:
         self._counter = SequenceCounter(1 << 16)
         self._clock = WrappingClock(1 << 32, 1e6)
-        self._opened = self._closed = False
+        self._opened = self._closed = self._in_blocks = False
         self._last_us: int | None = None
         self._last_sequence = -1
         self._us_per_point = 0.0
@@ -180,7 +180,7 @@ class BinaryDecoder:
         return end + 4 - at
 
     def _block_points(self, first: int, t_us: NDArray[np.int64], points: NDArray[np.void]) -> None:
-        self._away = False
+        self._away, self._in_blocks = False, True  # the clock of blocks does not wrap
         count = len(points)
         if first >= self._counter.expected and not points["flags"].any() and not self._closed:
             self._lose(self._counter.place(first, near=first).lost)
@@ -205,7 +205,8 @@ class BinaryDecoder:
 
     def _batch(self, sequence: NDArray[np.int64], t_us: NDArray[np.int64], xyz: NDArray[np.int32]) -> None:
         self._learn_pace(int(sequence[-1]), int(t_us[-1]))
-        self._out.append(PointBatch(sequence, self._clock.seconds(t_us), xyz / UNITS_PER_MM))
+        time_s = t_us / 1e6 if self._in_blocks else self._clock.seconds(t_us)
+        self._out.append(PointBatch(sequence, time_s, xyz / UNITS_PER_MM))
 
     def _learn_pace(self, sequence: int, raw_us: int) -> None:
         """Follow the time from point to point; a pause counts little."""

@@ -16,6 +16,7 @@ Points are (0, 0, distance); an axis puts them where they belong.
 import re
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .errors import DeviceRefused, ProtocolError
 from .sequence import SequenceCounter, WrappingClock
@@ -33,6 +34,8 @@ ERRORS = {
 FIRST_IN_RANGE, LAST_IN_RANGE = 643, 64877
 SCALE = 102.0 / 65520.0
 COUNTER_RANGE, CLOCK_RANGE, TICKS_PER_SECOND = 1 << 18, 1 << 32, 1e5
+TAGS = np.array([192, 192, 192], dtype=np.uint8)
+RUN = 1024  # blocks looked at together
 PROMPT = b"->"
 SHORTEST_REPLY, LONGEST_REPLY = 3, 4096
 OUTPUTS = re.compile(r"\b(DIST1|DIST_RAW|DIST|SHUTTER|COUNTER|TIMESTAMP(?:_?LO|_?HI)?|INTENSITY|STATE)\b")
@@ -86,7 +89,11 @@ class OptoncdtDecoder:
         """Decode the next bytes."""
         data = self._text + data
         at = 0
-        for found in WORDS.finditer(data):
+        while True:
+            at += self._run(data, at)
+            found = WORDS.search(data, at)
+            if found is None:
+                break
             self._other_bytes(data[at : found.start()])
             self._word(*found.group())
             at = found.end()
@@ -100,6 +107,49 @@ class OptoncdtDecoder:
             self._say(Damaged(pending, "cut off where the link ended"))
         self._text, self._block, self._asked = b"", [], False
         return self._handed_over()
+
+    def _run(self, data: bytes, start: int) -> int:
+        """Take whole, sound blocks that follow on, many at once; return the number of bytes used."""
+        if self._outputs is None or self._last is None or self._held or self._block or self._closed or self._counter is None:
+            return 0
+        words = len(self._outputs)
+        count = min((len(data) - start) // (3 * words), RUN)
+        if self._count is not None:
+            count = min(count, int(self._count) - 1 - (self._counter.expected - self._first))
+        if count < 2:
+            return 0
+        raw = np.frombuffer(data, np.uint8, count * 3 * words, start).reshape(count, words, 3)
+        tags = np.array([[0, 64, 128]] + (words - 1) * [[0, 64, 192]])  # the first word of a block, and the further ones
+        sound = ((raw & TAGS) == tags).all(axis=(1, 2))
+        values = (raw.astype(np.int64) & 63) @ (1, 1 << 6, 1 << 12)  # (count, words)
+        place = {name: index for index, name in enumerate(self._outputs)}
+        counters = values[:, place["COUNTER"]]
+        ticks = (values[:, place["TIMESTAMPHI"]] & 0xFFFF) << 16 | (values[:, place["TIMESTAMPLO"]] & 0xFFFF)
+        steps = np.diff(ticks, prepend=_ticks(self._last)) % CLOCK_RANGE
+        good = sound & (np.diff(counters, prepend=self._last["COUNTER"]) % COUNTER_RANGE == 1)
+        if self._rate_hz is not None:
+            good &= np.abs(steps * self._rate_hz / TICKS_PER_SECOND - 1.0) <= 0.5
+        distance = values[:, 0]
+        good &= (distance >= FIRST_IN_RANGE) & (distance <= LAST_IN_RANGE)
+        distance_mm = np.asarray(self._range_mm / 100.0 * (SCALE * distance - 1.0), dtype=np.float64)
+        if self._largest_step_mm is not None:
+            before_mm = distance_mm[0] if self._before_mm is None else self._before_mm
+            good &= np.abs(np.diff(distance_mm, prepend=before_mm)) <= self._largest_step_mm
+        count = count if good.all() else int(good.argmin())
+        if count:
+            self._take_run(count, ticks[:count], distance_mm[:count])
+            self._last = dict(zip(self._outputs, values[count - 1].tolist(), strict=True))
+        return count * 3 * words
+
+    def _take_run(self, count: int, ticks: NDArray[np.int64], distance_mm: NDArray[np.float64]) -> None:
+        assert self._counter is not None
+        self._flush()
+        first = self._counter.expected
+        self._counter.expected = first + count
+        self._before_mm = float(distance_mm[-1])
+        points_mm = np.zeros((count, 3))
+        points_mm[:, 2] = distance_mm
+        self._out.append(PointBatch(first - self._first + np.arange(count), self._clock.seconds(ticks), points_mm))
 
     def _other_bytes(self, data: bytes) -> None:
         """Take what stands between two words: replies, or damage."""

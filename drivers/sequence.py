@@ -82,13 +82,18 @@ class WrappingClock:
     def __init__(self, modulus: int, ticks_per_second: float) -> None:
         self._modulus = modulus
         self._ticks_per_second = ticks_per_second
-        self._last_raw: int | None = None
-        self._last = 0
+        self._last: int | None = None
 
     def seconds(self, raw: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return the time of each reading, (m,), m > 0."""
-        before, start = (int(raw[0]), int(raw[0])) if self._last_raw is None else (self._last_raw, self._last)
-        half = self._modulus // 2
-        unwrapped = start + np.cumsum((np.diff(raw, prepend=before) + half) % self._modulus - half)
-        self._last_raw, self._last = int(raw[-1]), int(unwrapped[-1])
-        return np.asarray(unwrapped / self._ticks_per_second)
+        return np.array(self.ticks(raw.tolist())) / self._ticks_per_second
+
+    def ticks(self, raw: list[int]) -> list[int]:
+        """Return the unwrapped readings."""
+        last = raw[0] if self._last is None else self._last
+        half, modulus, unwrapped = self._modulus // 2, self._modulus, []
+        for reading in raw:
+            last += (reading - last + half) % modulus - half
+            unwrapped.append(last)
+        self._last = last
+        return unwrapped

@@ -30,13 +30,16 @@ class RingDevice(RegisterDevice):
         self.size = RING_AT + ENTRIES * 11
         self.stored: list[int] = []  # numbers of the points that were written
         self.entries = np.zeros((self.count, 11 if self.with_flags else 10), dtype=np.uint16)
+        self.ring = np.zeros((ENTRIES, self.entries.shape[1]), dtype=np.uint16)
         self._encode()
 
     def take(self, taken: int) -> None:
         """Write the points up to `taken`, but those the device drops."""
         dropped = self.injector.event("overflow", taken)
         for index in range(self.taken, taken):
-            self.stored += self.injector.arrange(index)
+            for number in self.injector.arrange(index):
+                self.ring[len(self.stored) % ENTRIES] = self.entries[number]
+                self.stored.append(number)
         if dropped:
             self.overflow = 1
             del self.stored[-int(dropped) :]
@@ -48,16 +51,11 @@ class RingDevice(RegisterDevice):
 
     def read(self, table: int, address: int, count: int) -> Words:
         """Return status and ring."""
-        registers = np.zeros(max(self.size, address + count), dtype=np.uint16)
+        if address >= RING_AT and self.with_flags:
+            return self.ring.reshape(-1)[address - RING_AT : address - RING_AT + count]
+        registers = np.zeros(address + count + 12, dtype=np.uint16)
         registers[:12] = self._status()
-        if address + count > RING_AT:
-            self._lay_out(registers)
         return registers[address : address + count]
-
-    def _lay_out(self, registers: Words) -> None:
-        newest = self.stored[-ENTRIES:]
-        places = (np.arange(len(self.stored) - len(newest), len(self.stored))) % ENTRIES
-        registers[RING_AT : RING_AT + ENTRIES * 11].reshape(ENTRIES, 11)[places] = self.entries[newest]
 
     def _status(self) -> Words:
         state = 2 if self.taken >= self.count else 1
@@ -96,9 +94,6 @@ class FifoDevice(RingDevice):
     def appearing(self, function: int, address: int, count: int) -> int:
         """Let as many points appear as one request hands over."""
         return FIFO_MOST // 10 if function == READ_FIFO else 0
-
-    def _lay_out(self, registers: Words) -> None:
-        """Show nothing: the queue is reached by function 24 only."""
 
     def fifo(self, address: int) -> Words:
         """Hand over the oldest points; those that found no room are lost."""

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from cmmlink.errors import PlanError
-from cmmlink.plan import FileDevice, Plan, SerialDevice, load_plan
+from cmmlink.plan import FileDevice, ModbusDevice, Plan, SerialDevice, load_plan
 from inspection.tolerance import ToleranceZone
 
 SHORT = """\
@@ -114,8 +114,11 @@ MISTAKES = {
     "empty value": (SHORT.replace("-0.05", ""), "line 4: tolerance.lower_mm is empty; expected a number"),
     "infinite": (SHORT.replace("1e2", "inf"), "line 2: nominal.scale is 'inf'; expected a finite number"),
     "zero scale": (SHORT.replace("1e2", "0"), "line 2: nominal.scale is '0'; expected greater than 0"),
-    "device type": (SHORT.replace("serial, ", "seriel, "), "line 6: device.type is 'seriel'; did you mean serial? Allowed: serial, file"),
-    "no device type": (SHORT.replace("type: serial, ", ""), "line 6: device.type is missing; Allowed: serial, file"),
+    "device type": (
+        SHORT.replace("serial, ", "seriel, "),
+        "line 6: device.type is 'seriel'; did you mean serial? Allowed: serial, modbus, file",
+    ),
+    "no device type": (SHORT.replace("type: serial, ", ""), "line 6: device.type is missing; Allowed: serial, modbus, file"),
     "device key": (
         SHORT.replace("address", "adress"),
         "line 6: device.adress is not a known key; did you mean address? Allowed: type, address, baud_rate, silence_s",
@@ -227,3 +230,18 @@ def test_hostile_plan_is_read_or_refused(tmp_path: Path, content: bytes) -> None
     except PlanError as error:
         message = str(error)
     assert message.startswith(f"{path}: ")
+
+
+def test_devices_behind_registers_and_distance_sensors(tmp_path: Path) -> None:
+    modbus = load_plan(
+        written(tmp_path, SHORT.replace("{type: serial, address: COM3}", "{type: modbus, address: 'h:502', map: mine.yaml}"))
+    )
+    assert isinstance(modbus.device, ModbusDevice)
+    assert (modbus.device.map, modbus.device.timeout_s, modbus.device.parity) == (str(tmp_path / "mine.yaml"), 1.0, "E")
+    fed = "{type: serial, address: COM3, format: riftek, options: {range_mm: 50, rate_hz: 1000}, axis: {feed_mm_s: 10}}"
+    sensor = load_plan(written(tmp_path, SHORT.replace("{type: serial, address: COM3}", fed))).device
+    assert isinstance(sensor, SerialDevice)
+    assert sensor.axis is not None
+    assert (sensor.format, sensor.options, sensor.axis.feed_mm_s) == ("riftek", {"range_mm": 50, "rate_hz": 1000}, 10.0)
+    with pytest.raises(PlanError, match="either feed_mm_s or follow"):
+        load_plan(written(tmp_path, SHORT.replace("{type: serial, address: COM3}", fed.replace("feed_mm_s: 10", ""))))

@@ -31,12 +31,11 @@ class Account:
 
 def account(arrivals: Iterable[Arrival]) -> Account:
     book = Account()
+    batches: list[PointBatch] = []
     for arrival in arrivals:
         match arrival:
             case PointBatch():
-                book.sequence += arrival.sequence.tolist()
-                book.time_s += arrival.time_s.tolist()
-                book.points_mm += map(tuple, arrival.points_mm.tolist())
+                batches.append(arrival)
             case Damaged():
                 book.counts["Damaged", arrival.reason] += arrival.byte_count
             case Rejected() | Lost():
@@ -45,6 +44,10 @@ def account(arrivals: Iterable[Arrival]) -> Account:
                 book.counts["WireBytes", ""] += len(arrival.data)
             case _:
                 book.others.append(arrival)
+    if batches:
+        book.sequence = np.concatenate([batch.sequence for batch in batches]).tolist()
+        book.time_s = np.concatenate([batch.time_s for batch in batches]).tolist()
+        book.points_mm = list(map(tuple, np.concatenate([batch.points_mm for batch in batches]).tolist()))
     return book
 
 

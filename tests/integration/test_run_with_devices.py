@@ -1,0 +1,95 @@
+"""`cmmlink run` with simulated devices from plan to exit code: every point is accounted for."""
+
+import json
+import subprocess
+import sys
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.integration.simulated import Simulated, simulated
+
+ROOT = Path(__file__).resolve().parents[2]
+TURN = np.linspace(0.0, 2.0 * np.pi, 4001)
+PART_MM = np.column_stack([40.0 * np.cos(TURN) + 4.0 * np.cos(2.0 * TURN), 15.0 * np.sin(TURN)])
+COUNT = 2000
+
+PLAN = """\
+part: {{name: oval}}
+nominal: {{file: nominal.csv, closed: true}}
+tolerance: {{lower_mm: -0.05, upper_mm: 0.05}}
+device: {device}
+"""
+
+
+def run(folder: Path, device: str) -> tuple[int, dict[str, Any], str]:
+    np.savetxt(folder / "nominal.csv", PART_MM[::20], delimiter=",")
+    plan = folder / "plan.yaml"
+    plan.write_text(PLAN.format(device=device), encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-m", "cmmlink", "run", str(plan), "--json"], cwd=ROOT, capture_output=True, text=True, timeout=100, check=False
+    )
+    assert done.stdout, done.stderr
+    return done.returncode, json.loads(done.stdout), done.stderr
+
+
+def scanned_oval(folder: Path, *options: str, name: str = "modbus-ring") -> AbstractContextManager[Simulated]:
+    return simulated(name, "127.0.0.1:0", folder, *options, path_mm=PART_MM, count=COUNT, speed_mm_s=200.0, noise_mm=0.001)
+
+
+@pytest.mark.parametrize(
+    ("name", "settings"),
+    [
+        ("serial", "type: serial"),
+        ("binary", "type: serial, format: binary"),
+        ("binary-block", "type: serial, format: binary"),
+        ("modbus-ring", "type: modbus, map: generic-ring"),
+        ("modbus-fifo", "type: modbus, map: generic-fifo"),
+    ],
+)
+def test_a_conforming_part_is_found_to_conform(name: str, settings: str, tmp_path: Path) -> None:
+    with scanned_oval(tmp_path, "--unpaced", name=name) as device:
+        code, facts, errors = run(tmp_path, f"{{{settings}, address: '{device.address}'}}")
+    assert (code, facts["verdict"]) == (0, "conform"), errors
+    assert (facts["received"], facts["judged"], facts["rejected"], facts["lost"]) == (COUNT, COUNT, 0, 0)
+
+
+def test_losses_and_rejections_stand_in_the_result(tmp_path: Path) -> None:
+    faults = ["--unpaced", "--fault=lost-frames:0.02", "--fault=invalid:0.02", "--fault=sentinel:0.02", "--fault=unplug:0.1@500"]
+    with simulated(
+        "modbus-ring", "127.0.0.1:0", tmp_path, *faults, path_mm=PART_MM, count=COUNT, speed_mm_s=200.0, noise_mm=0.001
+    ) as device:
+        code, facts, errors = run(tmp_path, f"{{type: modbus, map: generic-ring, address: '{device.address}', reconnect_s: 20}}")
+        tally = device.tally()
+    assert code == 0, errors
+    assert facts["lost"] == tally["lost-frames"] > 0
+    assert facts["rejected"] > 0
+    assert facts["received"] == facts["judged"] + facts["rejected"] == COUNT - facts["lost"]
+
+
+def test_a_device_that_dies_half_way_ends_with_code_4_and_what_was_received(tmp_path: Path) -> None:
+    with simulated(
+        "modbus-ring", "127.0.0.1:0", tmp_path, "--unpaced", "--fault=die@1000", path_mm=PART_MM, count=COUNT, speed_mm_s=200.0
+    ) as device:
+        code, facts, errors = run(tmp_path, f"{{type: modbus, map: generic-ring, address: '{device.address}'}}")
+    assert code == 4
+    assert "the link was lost" in errors
+    assert 0 < facts["received"] < COUNT
+
+
+def test_a_map_with_a_mistake_is_named_with_its_file(tmp_path: Path) -> None:
+    (tmp_path / "mine.yaml").write_text(
+        "device: mine\npattern: newest\npoints: {at: 0, fields: {x: {at: 0, type: int16}}}\n", encoding="utf-8"
+    )
+    np.savetxt(tmp_path / "nominal.csv", PART_MM[::20], delimiter=",")
+    plan = tmp_path / "plan.yaml"
+    plan.write_text(PLAN.format(device="{type: modbus, map: mine.yaml, address: '127.0.0.1:1'}"), encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-m", "cmmlink", "check", str(plan)], cwd=ROOT, capture_output=True, text=True, timeout=100, check=False
+    )
+    assert done.returncode == 2
+    assert "mine.yaml, line 2: pattern:" in done.stderr
+    assert "Traceback" not in done.stderr
