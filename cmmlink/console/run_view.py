@@ -1,0 +1,280 @@
+"""What the page shows of one run: a sink that keeps the newest state and nothing else, in constant memory.
+
+The run calls it and goes on at once; pages look whenever they are ready. Nothing is queued, so a slow page never slows a run.
+"""
+
+import math
+import threading
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any, Literal
+
+import numpy as np
+
+from cmmlink.console.extremes import DEVIATION, FOOT_X, NORMAL_X, STATION, VERDICT, ChangedBins, Extremes
+from cmmlink.events import Arrived, Counts, Event, Judged, RunFinished, RunStarted
+from drivers.source import Heartbeat, LinkDown, PointBatch, ScanClosed, ScanOpened
+from inspection import InspectionResult, LiveUpdate, NominalProfile, ToleranceZone, Verdict
+from inspection.result import coverage
+
+Phase = Literal["starting", "measuring", "ending", "finished"]
+
+WORDS = {Verdict.CONFORM: "CONFORM", Verdict.UNCERTAIN: "NOT PROVEN", Verdict.NONCONFORM: "NOT CONFORM"}
+_RATE_OVER_S = 1.0
+_RATE_STEP_S = 0.05
+_COVERAGE_EVERY_S = 0.25
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RunFacts:
+    """What is known of a run before it begins, and what it is judged by."""
+
+    number: str
+    plan: str
+    profile: NominalProfile
+    zone: ToleranceZone
+    coverage_min: float
+    buffer_points: int
+    began: datetime
+
+
+class RunView:
+    """The state of one run as a page shows it.
+
+    clock : the run's clock, s; now : the time of day
+    """
+
+    def __init__(self, facts: RunFacts, clock: Callable[[], float], now: Callable[[], datetime]) -> None:
+        self.facts = facts
+        self._clock, self._now = clock, now
+        self._lock = threading.Lock()
+        self._extremes = Extremes(facts.profile.length_mm, facts.zone.middle_mm)
+        self._started = RunStarted("", "", "", "", False)
+        self._phase: Phase = "starting"
+        self._counts = Counts()
+        self._link: Literal["connecting", "up", "down", "closed"] = "connecting"
+        self._expected: int | None = None
+        self._device_name = ""
+        self._received: deque[tuple[float, int]] = deque()
+        self._alive_s = -math.inf
+        self._latency_s = math.nan
+        self._verdict_at: datetime | None = None
+        self._update: LiveUpdate | None = None
+        self._out = 0
+        self._coverage, self._coverage_s = 0.0, -math.inf
+        self._finished: RunFinished | None = None
+        self._failure = self._remark = ""
+
+    def __call__(self, event: Event) -> None:
+        """Take one event of the run."""
+        with self._lock:
+            if isinstance(event, RunStarted):
+                self._started = event
+            elif isinstance(event, Arrived):
+                self._arrived(event)
+            elif isinstance(event, Judged):
+                self._judged(event)
+            else:
+                self._ended(event)
+
+    def fail(self, message: str) -> None:
+        """The run broke off without a word of its own."""
+        with self._lock:
+            self._failure, self._phase = message, "finished"
+
+    def remark(self, words: str) -> None:
+        """Something the operator should read beside the verdict."""
+        with self._lock:
+            self._remark = words
+
+    def end_soon(self) -> None:
+        """The operator ended or aborted the run; what was received is still being judged."""
+        with self._lock:
+            if self._phase != "finished":
+                self._phase = "ending"
+
+    @property
+    def over(self) -> bool:
+        """Whether the run has come to its end."""
+        return self._phase == "finished"
+
+    def points_since(self, version: int, generation: int) -> tuple[ChangedBins, datetime | None]:
+        """The bins that changed after `version`, and when the newest verdict in them was given."""
+        with self._lock:
+            return self._extremes.changed_since(version, generation), self._verdict_at
+
+    def state(self) -> dict[str, Any]:
+        """Everything in numbers and words, ready for JSON."""
+        with self._lock:
+            finished = self._finished
+            counts = self._counts
+            return {
+                "number": self.facts.number,
+                "plan": self.facts.plan,
+                "part": self._started.part,
+                "serial_number": self._started.serial_number,
+                "operator": self._started.operator,
+                "device": self._device_name or self._started.device,
+                "address": self._started.device,
+                "simulated": self._started.simulated,
+                "began": self.facts.began.isoformat(timespec="seconds"),
+                "phase": self._phase,
+                "ending": "failed" if self._failure else finished.ending if finished else None,
+                "message": self._failure or (finished.message if finished else ""),
+                "remark": self._remark,
+                "link": self._link,
+                "streaming": self._streaming(),
+                "received": counts.received,
+                "judged": counts.judged,
+                "rejected": counts.rejected,
+                "pending": counts.pending,
+                "lost": counts.lost,
+                "damaged_bytes": counts.damaged_bytes,
+                "rejected_by_reason": dict(counts.rejected_by_reason),
+                "expected": self._expected,
+                "rate_per_s": self._rate(),
+                "buffered": counts.buffered,
+                "buffer_peak": counts.buffer_peak,
+                "buffer_capacity": self.facts.buffer_points,
+                "stalls": counts.stalls,
+                "latency_s": _finite(self._latency_s),
+                "verdict_at_ms": self._verdict_at.timestamp() * 1e3 if self._verdict_at else None,
+                "registration": self._registration(),
+                "coverage": self._coverage,
+                "coverage_min": self.facts.coverage_min,
+                "out_of_tolerance": self._out,
+                "worst": self._worst(),
+                "verdict": self._verdict(),
+                "length_mm": self.facts.profile.length_mm,
+                "zone": {name: getattr(self.facts.zone, name) for name in ("lower_mm", "upper_mm", "uncertainty_mm")},
+            }
+
+    def _arrived(self, event: Arrived) -> None:
+        arrival = event.arrival
+        if isinstance(arrival, LinkDown):
+            self._link = "down"
+            return
+        self._link = "up"
+        if self._phase == "starting":
+            self._phase = "measuring"
+        if isinstance(arrival, (PointBatch, Heartbeat)):
+            self._alive_s = event.time_s
+        elif isinstance(arrival, ScanOpened):
+            self._expected, self._device_name = arrival.expected, " ".join(filter(None, (arrival.device, arrival.serial_number)))
+        elif isinstance(arrival, ScanClosed):
+            self._link = "closed"
+
+    def _judged(self, event: Judged) -> None:
+        update = event.update
+        if update.first == 0:
+            self._extremes.clear()
+            self._out = 0
+        self._extremes.add(update.station_mm, update.deviation_mm, update.foot_mm, update.actual_mm, update.verdicts)
+        self._out += int(np.count_nonzero(update.verdicts == Verdict.NONCONFORM))
+        self._update, self._counts, self._latency_s = update, event.counts, event.age_s
+        if event.counts.judged:
+            self._verdict_at = self._now()
+        self._note_rate(event.time_s, event.counts.received)
+        if event.time_s - self._coverage_s > _COVERAGE_EVERY_S:
+            self._coverage, self._coverage_s = coverage(self._extremes.stations_mm, self.facts.profile), event.time_s
+
+    def _ended(self, event: RunFinished) -> None:
+        self._phase, self._finished, self._counts = "finished", event, event.counts
+        self._link = "down" if event.ending == "interrupted" else "closed"
+        if event.result is not None:
+            self._settle(event.result)
+
+    def _settle(self, result: InspectionResult) -> None:
+        """Replace everything provisional by the result."""
+        self._extremes.clear()
+        self._extremes.add(result.station_mm, result.deviation_mm, result.foot_mm, result.actual_mm, result.verdicts)
+        self._coverage, self._out = result.coverage, result.out_of_tolerance
+        self._verdict_at = self._now()
+
+    def _note_rate(self, time_s: float, received: int) -> None:
+        if self._received and time_s - self._received[-1][0] < _RATE_STEP_S:
+            return
+        self._received.append((time_s, received))
+        while len(self._received) > 2 and time_s - self._received[0][0] > _RATE_OVER_S:
+            self._received.popleft()
+
+    def _rate(self) -> float:
+        """Points per second over the last second; falls to nothing when nothing comes."""
+        if self._phase == "finished" or len(self._received) < 2:
+            return 0.0
+        (first_s, first), (last_s, last) = self._received[0], self._received[-1]
+        span_s = max(last_s - first_s, self._clock() - last_s)
+        return round((last - first) / span_s, 1) if span_s > 0 else 0.0
+
+    def _streaming(self) -> bool:
+        return self._phase in ("measuring", "ending") and self._link == "up" and self._clock() - self._alive_s < _RATE_OVER_S
+
+    def _registration(self) -> dict[str, Any]:
+        result = self._finished.result if self._finished else None
+        if result is not None:
+            return {"state": "settled", "can_move_mm": 0.0, "fit": result.fit, "rms_mm": _finite(result.registration.rms_mm)}
+        update = self._update
+        if update is None:
+            return {"state": "seeking", "can_move_mm": None, "fit": None, "rms_mm": None}
+        rms = update.registration.rms_mm if update.registration else math.nan
+        return {"state": update.state, "can_move_mm": _finite(update.can_move_mm), "fit": None, "rms_mm": _finite(rms)}
+
+    def _worst(self) -> dict[str, Any] | None:
+        worst = self._extremes.worst
+        if worst is None:
+            return None
+        x, y = worst[FOOT_X : FOOT_X + 2] + worst[DEVIATION] * worst[NORMAL_X : NORMAL_X + 2]
+        return {
+            "station_mm": float(worst[STATION]),
+            "deviation_mm": float(worst[DEVIATION]),
+            "x_mm": float(x),
+            "y_mm": float(y),
+            "verdict": Verdict(int(worst[VERDICT])).word,
+        }
+
+    def _verdict(self) -> dict[str, Any]:
+        """The word, whether it is final, and why it is so."""
+        if self._failure:
+            return {"word": WORDS[Verdict.UNCERTAIN], "final": True, "why": "the run broke off"}
+        if self._finished is not None:
+            return self._final_verdict(self._finished)
+        provisional = self._update is None or self._update.state != "settled"
+        if self._out:
+            why = f"{_points(self._out)} out of tolerance so far"
+            return {"word": WORDS[Verdict.NONCONFORM], "final": False, "why": why + (", provisional" if provisional else "")}
+        if not self._counts.judged:
+            waiting = self._update is not None and self._update.state == "seeking"
+            return {"word": WORDS[Verdict.UNCERTAIN], "final": False, "why": "seeking the part" if waiting else "waiting for points"}
+        return {"word": WORDS[Verdict.UNCERTAIN], "final": False, "why": f"{self._coverage:.0%} measured, nothing out of tolerance so far"}
+
+    def _final_verdict(self, finished: RunFinished) -> dict[str, Any]:
+        result = finished.result
+        if result is None:
+            return {"word": WORDS[Verdict.UNCERTAIN], "final": True, "why": "no part found"}
+        return {"word": WORDS[result.verdict], "final": True, "why": _why(result, finished.ending, self.facts.coverage_min)}
+
+
+def _why(result: InspectionResult, ending: str, coverage_min: float) -> str:
+    """One line under the verdict."""
+    if result.verdict is Verdict.NONCONFORM:
+        places = f", {len(result.stretches)} places" if len(result.stretches) > 1 else ""
+        return f"{_points(result.out_of_tolerance)} out of tolerance{places}"
+    if result.verdict is Verdict.CONFORM:
+        return f"all {_points(result.judged)} within tolerance"
+    if ending != "complete":
+        return "the scan was aborted" if ending == "aborted" else "the scan was cut short"
+    if not result.judged:
+        return "no point could be judged"
+    if result.coverage < coverage_min:
+        return f"only {result.coverage:.1%} measured, {coverage_min:.1%} needed"
+    return "too close to a limit for the uncertainty"
+
+
+def _points(count: int) -> str:
+    return f"{count:,} point{'s' if count != 1 else ''}"
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

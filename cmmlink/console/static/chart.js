@@ -1,0 +1,87 @@
+// Run chart: the worst deviation of the last parts, with their own limits; the verdict by shape.
+
+import { INK, Sheet, mark, niceStep, signed } from "./sheet.js";
+
+const MOST = 20;
+
+export class Chart {
+  constructor(element, large) {
+    this.large = large;
+    this.sheet = new Sheet(element, () => this.draw());
+    this.runs = [];
+  }
+
+  show(runs) {
+    this.runs = runs.filter((run) => run.worst_mm !== null).slice(0, MOST).reverse();
+    this.draw();
+  }
+
+  draw() {
+    const { sheet, runs } = this, pen = sheet.pen("ground");
+    if (!sheet.width) return;
+    const left = sheet.text * 4.4, right = sheet.width - sheet.text, top = sheet.text * 0.6, bottom = sheet.height - sheet.text * (this.large ? 2 : 0.6);
+    if (!runs.length) {
+      pen.fillStyle = INK.soft;
+      pen.textAlign = "center";
+      pen.textBaseline = "middle";
+      pen.fillText("no part was measured yet", sheet.width / 2, sheet.height / 2);
+      return;
+    }
+    const values = runs.flatMap((run) => [run.worst_mm, run.lower_mm, run.upper_mm]);
+    const low = Math.min(...values), high = Math.max(...values), room = (high - low) * 0.12 || 0.01;
+    const px = (k) => left + ((k + 0.5) / MOST) * (right - left);
+    const py = (value) => bottom - ((value - low + room) / (high - low + 2 * room)) * (bottom - top);
+    this.limits(pen, px, py, left);
+    pen.strokeStyle = INK.faint;
+    pen.lineWidth = 1.5;
+    pen.beginPath();
+    runs.forEach((run, k) => pen[k ? "lineTo" : "moveTo"](px(k), py(run.worst_mm)));
+    pen.stroke();
+    runs.forEach((run, k) => this.point(pen, run, px(k), py(run.worst_mm), k === runs.length - 1));
+    if (this.large) this.serials(pen, px, bottom);
+  }
+
+  limits(pen, px, py, left) {
+    const half = px(1) - px(0);
+    pen.fillStyle = INK.band;
+    this.runs.forEach((run, k) => pen.fillRect(px(k) - half / 2, py(run.upper_mm), half, py(run.lower_mm) - py(run.upper_mm)));
+    pen.fillStyle = INK.soft;
+    pen.textAlign = "right";
+    pen.textBaseline = "middle";
+    const last = this.runs.at(-1);
+    for (const limit of [last.upper_mm, last.lower_mm]) pen.fillText(signed(limit, 3), left - 6, py(limit));
+    pen.strokeStyle = INK.faint;
+    pen.beginPath();
+    pen.moveTo(left, py(0));
+    pen.lineTo(px(MOST - 0.5), py(0));
+    pen.stroke();
+  }
+
+  point(pen, run, x, y, newest) {
+    const size = this.large ? 6 : 4;
+    if (run.verdict === "nonconform") mark(pen, run.worst_mm > (run.lower_mm + run.upper_mm) / 2 ? "over" : "under", x, y, size + 1);
+    else if (run.verdict === "conform") {
+      pen.fillStyle = INK.in;
+      pen.beginPath();
+      pen.arc(x, y, size - 0.5, 0, 7);
+      pen.fill();
+    } else mark(pen, "unsure", x, y, size);
+    if (!newest) return;
+    pen.strokeStyle = INK.text;
+    pen.lineWidth = 1.5;
+    pen.beginPath();
+    pen.arc(x, y, size + 4, 0, 7);
+    pen.stroke();
+  }
+
+  serials(pen, px, bottom) {
+    const { sheet, runs } = this;
+    const every = niceStep(20, (px(19) - px(0)) / (sheet.text * 6));
+    pen.fillStyle = INK.soft;
+    pen.textAlign = "center";
+    pen.textBaseline = "top";
+    runs.forEach((run, k) => {
+      if ((runs.length - 1 - k) % every === 0) pen.fillText((run.serial_number || run.run).slice(-10), px(k), bottom + 6);
+    });
+  }
+}
