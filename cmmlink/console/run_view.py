@@ -6,25 +6,53 @@ The run calls it and goes on at once; pages look whenever they are ready. Nothin
 import math
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cmmlink.console.extremes import DEVIATION, FOOT_X, NORMAL_X, STATION, VERDICT, ChangedBins, Extremes
 from cmmlink.events import Arrived, Counts, Event, Judged, RunFinished, RunStarted
+from cmmlink.report.summary import number, summary
 from drivers.source import Heartbeat, LinkDown, PointBatch, ScanClosed, ScanOpened
-from inspection import InspectionResult, LiveUpdate, NominalProfile, ToleranceZone, Verdict
+from inspection import LiveUpdate, NominalProfile, ToleranceZone, Verdict
 from inspection.result import coverage
 
 Phase = Literal["starting", "measuring", "ending", "finished"]
 
 WORDS = {Verdict.CONFORM: "CONFORM", Verdict.UNCERTAIN: "NOT PROVEN", Verdict.NONCONFORM: "NOT CONFORM"}
+_COUNTED = ("received", "judged", "rejected", "lost", "damaged_bytes", "rejected_by_reason")
 _RATE_OVER_S = 1.0
 _RATE_STEP_S = 0.05
 _COVERAGE_EVERY_S = 0.25
+
+
+class Rows(Protocol):
+    """The judged points of a result: what an InspectionResult has, and what the records keep of one."""
+
+    @property
+    def station_mm(self) -> NDArray[np.float64]: ...  # noqa: D102
+    @property
+    def deviation_mm(self) -> NDArray[np.float64]: ...  # noqa: D102
+    @property
+    def foot_mm(self) -> NDArray[np.float64]: ...  # noqa: D102
+    @property
+    def actual_mm(self) -> NDArray[np.float64]: ...  # noqa: D102
+    @property
+    def verdicts(self) -> NDArray[np.int8]: ...  # noqa: D102
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ended:
+    """How a run ended: its ending, why there is no result, the result's numbers as the command line gives them, and its rows."""
+
+    ending: str
+    message: str
+    facts: Mapping[str, Any]
+    rows: Rows | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,7 +92,7 @@ class RunView:
         self._update: LiveUpdate | None = None
         self._out = 0
         self._coverage, self._coverage_s = 0.0, -math.inf
-        self._finished: RunFinished | None = None
+        self._ended: Ended | None = None
         self._failure = self._remark = ""
 
     def __call__(self, event: Event) -> None:
@@ -77,7 +105,14 @@ class RunView:
             elif isinstance(event, Judged):
                 self._judged(event)
             else:
-                self._ended(event)
+                self._end(Ended(event.ending, event.message, summary(event.result, event.counts), event.result), event.counts)
+
+    def recall(self, started: RunStarted, ended: Ended) -> None:
+        """Show a run as the records hold it."""
+        facts = ended.facts
+        with self._lock:
+            self._started = started
+            self._end(ended, Counts(**{name: facts[name] for name in _COUNTED if name in facts}))
 
     def fail(self, message: str) -> None:
         """The run broke off without a word of its own."""
@@ -108,7 +143,7 @@ class RunView:
     def state(self) -> dict[str, Any]:
         """Everything in numbers and words, ready for JSON."""
         with self._lock:
-            finished = self._finished
+            ended = self._ended
             counts = self._counts
             return {
                 "number": self.facts.number,
@@ -121,8 +156,8 @@ class RunView:
                 "simulated": self._started.simulated,
                 "began": self.facts.began.isoformat(timespec="seconds"),
                 "phase": self._phase,
-                "ending": "failed" if self._failure else finished.ending if finished else None,
-                "message": self._failure or (finished.message if finished else ""),
+                "ending": "failed" if self._failure else ended.ending if ended else None,
+                "message": self._failure or (ended.message if ended else ""),
                 "remark": self._remark,
                 "link": self._link,
                 "streaming": self._streaming(),
@@ -139,7 +174,7 @@ class RunView:
                 "buffer_peak": counts.buffer_peak,
                 "buffer_capacity": self.facts.buffer_points,
                 "stalls": counts.stalls,
-                "latency_s": _finite(self._latency_s),
+                "latency_s": number(self._latency_s),
                 "verdict_at_ms": self._verdict_at.timestamp() * 1e3 if self._verdict_at else None,
                 "registration": self._registration(),
                 "coverage": self._coverage,
@@ -180,18 +215,16 @@ class RunView:
         if event.time_s - self._coverage_s > _COVERAGE_EVERY_S:
             self._coverage, self._coverage_s = coverage(self._extremes.stations_mm, self.facts.profile), event.time_s
 
-    def _ended(self, event: RunFinished) -> None:
-        self._phase, self._finished, self._counts = "finished", event, event.counts
-        self._link = "down" if event.ending == "interrupted" else "closed"
-        if event.result is not None:
-            self._settle(event.result)
-
-    def _settle(self, result: InspectionResult) -> None:
+    def _end(self, ended: Ended, counts: Counts) -> None:
         """Replace everything provisional by the result."""
-        self._extremes.clear()
-        self._extremes.add(result.station_mm, result.deviation_mm, result.foot_mm, result.actual_mm, result.verdicts)
-        self._coverage, self._out = result.coverage, result.out_of_tolerance
-        self._verdict_at = self._now()
+        self._phase, self._ended, self._counts = "finished", ended, counts
+        self._link = "down" if ended.ending == "interrupted" else "closed"
+        self._coverage, self._out = ended.facts["coverage"], ended.facts["out_of_tolerance"]
+        rows = ended.rows
+        if rows is not None:
+            self._extremes.clear()
+            self._extremes.add(rows.station_mm, rows.deviation_mm, rows.foot_mm, rows.actual_mm, rows.verdicts)
+            self._verdict_at = self._now()
 
     def _note_rate(self, time_s: float, received: int) -> None:
         if self._received and time_s - self._received[-1][0] < _RATE_STEP_S:
@@ -212,14 +245,13 @@ class RunView:
         return self._phase in ("measuring", "ending") and self._link == "up" and self._clock() - self._alive_s < _RATE_OVER_S
 
     def _registration(self) -> dict[str, Any]:
-        result = self._finished.result if self._finished else None
-        if result is not None:
-            return {"state": "settled", "can_move_mm": 0.0, "fit": result.fit, "rms_mm": _finite(result.registration.rms_mm)}
-        update = self._update
-        if update is None:
-            return {"state": "seeking", "can_move_mm": None, "fit": None, "rms_mm": None}
-        rms = update.registration.rms_mm if update.registration else math.nan
-        return {"state": update.state, "can_move_mm": _finite(update.can_move_mm), "fit": None, "rms_mm": _finite(rms)}
+        """Where the registration stands, by how much values can still move, and how many other poses fit as well."""
+        found = self._ended.facts["registration"] if self._ended else None
+        if found is not None:
+            return {"state": "settled", "can_move_mm": 0.0, "other_poses": len(found.get("other_poses", []))}
+        if self._update is None:
+            return {"state": "seeking", "can_move_mm": None, "other_poses": 0}
+        return {"state": self._update.state, "can_move_mm": number(self._update.can_move_mm), "other_poses": 0}
 
     def _worst(self) -> dict[str, Any] | None:
         worst = self._extremes.worst
@@ -238,8 +270,8 @@ class RunView:
         """The word, whether it is final, and why it is so."""
         if self._failure:
             return {"word": WORDS[Verdict.UNCERTAIN], "final": True, "why": "the run broke off"}
-        if self._finished is not None:
-            return self._final_verdict(self._finished)
+        if self._ended is not None:
+            return _final_verdict(self._ended, self.facts.coverage_min)
         provisional = self._update is None or self._update.state != "settled"
         if self._out:
             why = f"{_points(self._out)} out of tolerance so far"
@@ -249,32 +281,30 @@ class RunView:
             return {"word": WORDS[Verdict.UNCERTAIN], "final": False, "why": "seeking the part" if waiting else "waiting for points"}
         return {"word": WORDS[Verdict.UNCERTAIN], "final": False, "why": f"{self._coverage:.0%} measured, nothing out of tolerance so far"}
 
-    def _final_verdict(self, finished: RunFinished) -> dict[str, Any]:
-        result = finished.result
-        if result is None:
-            return {"word": WORDS[Verdict.UNCERTAIN], "final": True, "why": "no part found"}
-        return {"word": WORDS[result.verdict], "final": True, "why": _why(result, finished.ending, self.facts.coverage_min)}
+
+def _final_verdict(ended: Ended, coverage_min: float) -> dict[str, Any]:
+    verdict = Verdict[ended.facts["verdict"].upper()]
+    return {"word": WORDS[verdict], "final": True, "why": _why(ended, verdict, coverage_min)}
 
 
-def _why(result: InspectionResult, ending: str, coverage_min: float) -> str:
+def _why(ended: Ended, verdict: Verdict, coverage_min: float) -> str:
     """One line under the verdict."""
-    if result.verdict is Verdict.NONCONFORM:
-        places = f", {len(result.stretches)} places" if len(result.stretches) > 1 else ""
-        return f"{_points(result.out_of_tolerance)} out of tolerance{places}"
-    if result.verdict is Verdict.CONFORM:
-        return f"all {_points(result.judged)} within tolerance"
-    if ending != "complete":
-        return "the scan was aborted" if ending == "aborted" else "the scan was cut short"
-    if not result.judged:
+    facts = ended.facts
+    if facts["registration"] is None:
+        return "no part found" if facts["received"] else "no point was received"
+    if verdict is Verdict.NONCONFORM:
+        places = f", {len(facts['stretches'])} places" if len(facts["stretches"]) > 1 else ""
+        return f"{_points(facts['out_of_tolerance'])} out of tolerance{places}"
+    if verdict is Verdict.CONFORM:
+        return f"all {_points(facts['judged'])} within tolerance"
+    if ended.ending != "complete":
+        return "the scan was aborted" if ended.ending == "aborted" else "the scan was cut short"
+    if not facts["judged"]:
         return "no point could be judged"
-    if result.coverage < coverage_min:
-        return f"only {result.coverage:.1%} measured, {coverage_min:.1%} needed"
+    if facts["coverage"] < coverage_min:
+        return f"only {facts['coverage']:.1%} measured, {coverage_min:.1%} needed"
     return "too close to a limit for the uncertainty"
 
 
 def _points(count: int) -> str:
     return f"{count:,} point{'s' if count != 1 else ''}"
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

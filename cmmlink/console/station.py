@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from cmmlink.console.alarms import Alarms
-from cmmlink.console.run_view import RunFacts, RunView
+from cmmlink.console.run_view import Ended, RunFacts, RunView
 from cmmlink.errors import PlanError, StoreError
-from cmmlink.events import Event, RunFinished, RunStarted, Sink
+from cmmlink.events import Event, RunStarted, Sink
 from cmmlink.parts import planned_inspection, planned_profile
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan import FileDevice, Plan, load_plan
@@ -72,7 +72,7 @@ class Recorded:
     profile: NominalProfile
     began: datetime
     started: RunStarted
-    finished: RunFinished
+    ended: Ended
 
 
 class Records(Protocol):
@@ -300,8 +300,7 @@ class Station:
             recorded.began,
         )
         view = RunView(facts, self._means.clock, lambda: recorded.began)
-        view(recorded.started)
-        view(recorded.finished)
+        view.recall(recorded.started, recorded.ended)
         return view
 
     def exported(self, run: str) -> bytes:

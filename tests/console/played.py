@@ -20,21 +20,22 @@ Array = NDArray[np.float64]
 
 PLAN = """part: {name: blade 7, serial_number: B-0041}
 operator: Ada
-nominal: {file: ellipse.yaml}
+nominal: {file: section.yaml}
 tolerance: {lower_mm: -0.05, upper_mm: 0.05}
 device: {type: serial, address: played}
 """
-ELLIPSE = """degree: 2
+# A closed periodic curve of degree 4 without any symmetry: the project's test curve P3.
+SECTION = """degree: 4
 closed: true
-control_points_mm: [[40, 0], [40, 12], [0, 12], [-40, 12], [-40, 0], [-40, -12], [0, -12], [40, -12], [40, 0]]
-weights: [1, 0.7071067811865476, 1, 0.7071067811865476, 1, 0.7071067811865476, 1, 0.7071067811865476, 1]
-knots: [0, 0, 0, 0.25, 0.25, 0.5, 0.5, 0.75, 0.75, 1, 1, 1]
+control_points_mm: [[60, 0], [52, 26], [24, 34], [-4, 30], [-34, 38], [-58, 18], [-50, -8], [-28, -26], [6, -20], [38, -30],
+  [60, 0], [52, 26], [24, 34], [-4, 30]]
+knots: [-0.4, -0.3, -0.2, -0.1, 0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1, 1.1, 1.2, 1.3, 1.4]
 """
 
 
 def write_plan(folder: Path, name: str = "blade.yaml", text: str = PLAN) -> Path:
-    """Write a plan of an ellipse, 80 mm by 24 mm."""
-    (folder / "ellipse.yaml").write_text(ELLIPSE, encoding="utf-8")
+    """Write a plan and its nominal."""
+    (folder / "section.yaml").write_text(SECTION, encoding="utf-8")
     (folder / name).write_text(text, encoding="utf-8")
     return folder / name
 

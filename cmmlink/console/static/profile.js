@@ -188,7 +188,7 @@ export class Profile {
     for (const kind of CLASSES) {
       if (!paths[kind]) continue;
       pen.strokeStyle = INK[kind];
-      pen.lineWidth = kind === "in" ? 1.2 : 1.6;
+      pen.lineWidth = 2; // no gaps between neighbours: the deviations read as one shape
       pen.stroke(paths[kind]);
     }
     for (const [kind, x, y, size, dx, dy] of flags.values()) this.flag(pen, kind, x, y, size, dx, dy);
