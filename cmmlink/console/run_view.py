@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmmlink.console.extremes import DEVIATION, FOOT_X, NORMAL_X, STATION, VERDICT, ChangedBins, Extremes
-from cmmlink.events import Arrived, Counts, Event, Judged, RunFinished, RunStarted
+from cmmlink.events import Arrived, Counts, Event, Judged, RunStarted
 from cmmlink.report.summary import number, summary
 from drivers.source import Heartbeat, LinkDown, PointBatch, ScanClosed, ScanOpened
 from inspection import LiveUpdate, NominalProfile, ToleranceZone, Verdict

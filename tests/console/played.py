@@ -89,18 +89,16 @@ class PlayedSource:
 
 
 class Device:
-    """Every connection takes the next source; the test puts points into `source`."""
+    """What is connected to is played from `source`; `renew` before another run."""
 
     def __init__(self) -> None:
         self.source = PlayedSource()
 
-    def connect(self, plan: Plan) -> AbstractContextManager[Connected]:
-        self.source = source = self._next()
-        return nullcontext(Connected(source, "played scanner", True))
+    def renew(self) -> None:
+        self.source = PlayedSource()
 
-    def _next(self) -> PlayedSource:
-        given, self.source = self.source, PlayedSource()
-        return given
+    def connect(self, plan: Plan) -> AbstractContextManager[Connected]:
+        return nullcontext(Connected(self.source, "played scanner", True))
 
 
 def means(

@@ -62,7 +62,10 @@ export class Work {
     this.showCheck(station.choice);
     for (const [id, value] of [["serial", station.serial_number], ["operator", station.operator], ["address", station.address]]) {
       const input = byId(id);
-      if (input.dataset.told !== value) input.value = input.dataset.told = value;
+      if (input.dataset.told !== value) {
+        input.value = input.dataset.told = value;
+        if (input === document.activeElement) input.select(); // so that typing replaces what was suggested
+      }
       input.disabled = station.running;
     }
     byId("address-label").hidden = !station.choice?.has_address;
