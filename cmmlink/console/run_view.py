@@ -117,7 +117,7 @@ class RunView:
     def fail(self, message: str) -> None:
         """The run broke off without a word of its own."""
         with self._lock:
-            self._failure, self._phase = message, "finished"
+            self._failure, self._phase, self._link = message, "finished", "closed"
 
     def remark(self, words: str) -> None:
         """Something the operator should read beside the verdict."""
@@ -274,12 +274,12 @@ class RunView:
             return _final_verdict(self._ended, self.facts.coverage_min)
         provisional = self._update is None or self._update.state != "settled"
         if self._out:
-            why = f"{_points(self._out)} out of tolerance so far"
+            why = f"{_points(self._out)} out so far"
             return {"word": WORDS[Verdict.NONCONFORM], "final": False, "why": why + (", provisional" if provisional else "")}
         if not self._counts.judged:
             waiting = self._update is not None and self._update.state == "seeking"
             return {"word": WORDS[Verdict.UNCERTAIN], "final": False, "why": "seeking the part" if waiting else "waiting for points"}
-        return {"word": WORDS[Verdict.UNCERTAIN], "final": False, "why": f"{self._coverage:.0%} measured, nothing out of tolerance so far"}
+        return {"word": WORDS[Verdict.UNCERTAIN], "final": False, "why": f"{self._coverage:.0%} measured, none out so far"}
 
 
 def _final_verdict(ended: Ended, coverage_min: float) -> dict[str, Any]:
