@@ -11,24 +11,29 @@ import json
 import secrets
 import socket
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Awaitable, Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from importlib import resources
+from pathlib import Path
 from typing import Any
 
 import anyio.to_thread
 import uvicorn
 from starlette.applications import Starlette
+from starlette.background import BackgroundTask
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import Request
-from starlette.responses import PlainTextResponse, Response
+from starlette.responses import FileResponse, PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from cmmlink.console.alarms import Alarm
 from cmmlink.console.messages import nominal_message, points_message
+from cmmlink.console.past_runs import PastRun
 from cmmlink.console.run_view import RunView
 from cmmlink.console.station import Refused, Station
 
@@ -159,11 +164,13 @@ class ConsoleServer:
         given = request.headers.get("authorization", "").removeprefix("Bearer ")
         if not self._knows(given):
             return PlainTextResponse("the token is wrong or missing", 401)
+        folder = tempfile.TemporaryDirectory()
         try:
-            archive = await anyio.to_thread.run_sync(self.station.exported, request.path_params["run"])
+            archive = await anyio.to_thread.run_sync(self.station.exported, request.path_params["run"], Path(folder.name))
         except Refused as refusal:
+            folder.cleanup()
             return PlainTextResponse(str(refusal), 404)
-        return Response(archive, media_type="application/zip")
+        return FileResponse(archive, media_type="application/zip", background=BackgroundTask(folder.cleanup))
 
     def _knows(self, token: object) -> bool:
         return isinstance(token, str) and hmac.compare_digest(token.encode(), self.token.encode())
@@ -397,7 +404,7 @@ def _maybe_number(command: Mapping[str, Any], key: str) -> int | None:
     return value
 
 
-def _alarm_words(alarm: Any) -> dict[str, Any]:
+def _alarm_words(alarm: Alarm) -> dict[str, Any]:
     return {
         "number": alarm.number,
         "severity": alarm.severity,
@@ -410,5 +417,5 @@ def _alarm_words(alarm: Any) -> dict[str, Any]:
     }
 
 
-def _row(past: Any) -> dict[str, Any]:
-    return {name: getattr(past, name) for name in past.__slots__}
+def _row(past: PastRun) -> dict[str, Any]:
+    return asdict(past)

@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from cmmlink.console.alarms import Alarms
-from cmmlink.console.run_view import Ended, RunFacts, RunView
-from cmmlink.errors import PlanError, StoreError
+from cmmlink.console.past_runs import PastRun, Recorded
+from cmmlink.console.run_view import RunFacts, RunView
+from cmmlink.errors import PlanError, RunError, StoreError
 from cmmlink.events import Event, RunStarted, Sink
 from cmmlink.parts import planned_inspection, planned_profile
 from cmmlink.pipeline import RunOutcome, run_inspection
@@ -45,56 +46,23 @@ class Connected:
     simulated: bool
 
 
-@dataclass(frozen=True, slots=True)
-class PastRun:
-    """One line of the station's history. `worst_mm` is the deviation farthest from the middle of the zone."""
-
-    run: str
-    began: str
-    part: str
-    serial_number: str
-    operator: str
-    state: str
-    received: int
-    verdict: str | None
-    worst_mm: float | None
-    worst_station_mm: float | None
-    lower_mm: float
-    upper_mm: float
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Recorded:
-    """One run as the records hold it."""
-
-    run: str
-    plan: Plan
-    profile: NominalProfile
-    began: datetime
-    started: RunStarted
-    ended: Ended
-
-
 class Records(Protocol):
-    """What the station asks of the records."""
+    """What the station asks of its records."""
 
-    def recorder(self, plan: Plan, profile: NominalProfile, started: RunStarted) -> AbstractContextManager[tuple[str, Sink]]:
-        """Begin the record of a run: its id, and the sink that writes it."""
+    def recorder(self, plan: Plan, started: RunStarted) -> AbstractContextManager[Sink]:
+        """Give the sink that writes the record of a run."""
 
     def runs(self) -> Sequence[PastRun]:
         """All runs, newest first."""
 
     def opened(self, run: str) -> Recorded:
-        """Give one run with its result. Raises StoreError."""
+        """Give one run as it was recorded."""
 
-    def source(self, run: str) -> tuple[Plan, ScanSource, RunStarted]:
-        """Give one run's recorded bytes as a source, to be measured again. Raises StoreError."""
+    def replayed(self, run: str, sinks: Sequence[Sink], stop: threading.Event) -> str:
+        """Measure a run again from its record; say whether the result is identical."""
 
-    def same_as_recorded(self, run: str, outcome: RunOutcome) -> str:
-        """Compare a replay with the record: one sentence that says whether it is identical, or what differs."""
-
-    def exported(self, run: str) -> bytes:
-        """Give one run as a zip archive. Raises StoreError."""
+    def exported(self, run: str, folder: Path) -> Path:
+        """Write one run as a zip archive into a folder."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,7 +203,8 @@ class Station:
             self.choose(self._work.choice.name)
             plan, profile = self._planned()
             started = RunStarted(plan.part.name, self._work.serial_number, self._work.operator, _device_words(plan), False)
-            self._begin(lambda: self._measure(plan, profile, started, self._work_name()), self._new_view(plan, profile, started))
+            view = self._new_view(plan, profile, started)
+            self._begin(lambda: self._measure(plan, profile, started, view), view)
         return "started"
 
     def replay(self, run: str) -> str:
@@ -243,11 +212,14 @@ class Station:
         with self._lock:
             self._refuse_while_running("a record can be replayed")
             records = self._records()
-            plan, source, started = _told(lambda: records.source(run))
-            profile = _told(lambda: planned_profile(plan))
-            view = self._new_view(plan, profile, started, f"replay of {run}")
-            self._begin(lambda: self._replay(run, plan, profile, source, started, view), view)
-        return f"replaying {run}"
+            recorded = _told(lambda: records.opened(run))
+            view = RunView(_facts_of(recorded, f"replay of {recorded.run}"), self._means.clock, self._means.now)
+
+            def work() -> None:
+                view.remark(records.replayed(recorded.run, [self._shown_in(view)], self._stop))
+
+            self._begin(work, view)
+        return f"replaying {recorded.run}"
 
     def test_device(self) -> str:
         """Listen to the device for a moment; the answer appears in the state."""
@@ -290,23 +262,14 @@ class Station:
         """Give a recorded run to look at."""
         records = self._records()
         recorded = _told(lambda: records.opened(run))
-        facts = RunFacts(
-            recorded.run,
-            recorded.plan.part.name,
-            recorded.profile,
-            recorded.plan.tolerance.zone,
-            recorded.plan.registration.coverage_min,
-            recorded.plan.buffer_points,
-            recorded.began,
-        )
-        view = RunView(facts, self._means.clock, lambda: recorded.began)
+        view = RunView(_facts_of(recorded, recorded.run), self._means.clock, lambda: recorded.began)
         view.recall(recorded.started, recorded.ended)
         return view
 
-    def exported(self, run: str) -> bytes:
-        """Give a recorded run as a zip archive."""
+    def exported(self, run: str, folder: Path) -> Path:
+        """Write a recorded run as a zip archive into a folder."""
         records = self._records()
-        return _told(lambda: records.exported(run))
+        return _told(lambda: records.exported(run, folder))
 
     def wait(self, timeout_s: float | None = None) -> bool:
         """Wait for the run to end; False when it is still on."""
@@ -340,11 +303,11 @@ class Station:
         part = plan.part.model_copy(update={"serial_number": self._work.serial_number or None})
         return plan.model_copy(update={"part": part, "operator": self._work.operator or None}), choice.profile
 
-    def _new_view(self, plan: Plan, profile: NominalProfile, started: RunStarted, number: str = "") -> RunView:
+    def _new_view(self, plan: Plan, profile: NominalProfile, started: RunStarted) -> RunView:
         self._number += 1
         facts = RunFacts(
-            number or str(self._number),
-            self._work_name() or plan.part.name,
+            str(self._number),
+            self._work_name(),
             profile,
             plan.tolerance.zone,
             plan.registration.coverage_min,
@@ -369,7 +332,7 @@ class Station:
             self._break_off(view, "Record not kept", str(error))
         except DeviceError as error:
             self._break_off(view, "Device failed", str(error))
-        except (PlanError, InspectionError, PointFileError, ValueError) as error:
+        except ValueError as error:  # plan, nominal or points cannot be used
             self._break_off(view, "Cannot be inspected", str(error))
         except Exception as error:
             self._break_off(view, "Defect in the program", repr(error))
@@ -382,31 +345,19 @@ class Station:
         view.fail(f"{what}: {message}")
         self.alarms.raise_alarm("fault", what, message)
 
-    def _measure(self, plan: Plan, profile: NominalProfile, started: RunStarted, name: str) -> None:
-        view = self.view
-        assert view is not None
+    def _measure(self, plan: Plan, profile: NominalProfile, started: RunStarted, view: RunView) -> None:
         with ExitStack() as stack:
             live = planned_inspection(plan, profile)
             connected = stack.enter_context(self._means.connect(plan))
             started = replace(started, device=connected.device, simulated=connected.simulated)
             sinks: list[Sink] = [self.alarms, self._shown_in(view)]
             if self._means.records is not None:
-                _, recorder = stack.enter_context(self._means.records.recorder(plan, profile, started))
-                sinks.insert(0, recorder)
+                sinks.insert(0, stack.enter_context(self._means.records.recorder(plan, started)))
             self._source = connected.source
             self.outcome = run_inspection(
                 connected.source, live, sinks, started, buffer_points=plan.buffer_points, clock=self._means.clock, stop=self._stop
             )
         self._next_part(self.outcome)
-
-    def _replay(self, run: str, plan: Plan, profile: NominalProfile, source: ScanSource, started: RunStarted, view: RunView) -> None:
-        records = self._records()
-        self._source = source
-        sinks: list[Sink] = [self._shown_in(view)]
-        live = planned_inspection(plan, profile)
-        outcome = run_inspection(source, live, sinks, started, buffer_points=plan.buffer_points, clock=self._means.clock, stop=self._stop)
-        if outcome.ending == "complete" or not self._stop.is_set():
-            view.remark(records.same_as_recorded(run, outcome))
 
     def _shown_in(self, view: RunView) -> Sink:
         """The view as a sink that cannot end a run: a fault in drawing is an alarm, not a lost measurement."""
@@ -527,6 +478,12 @@ def _device_words(plan: Plan) -> str:
     return f"file {device.file.name}" if isinstance(device, FileDevice) else f"{device.type} {device.address}"
 
 
+def _facts_of(recorded: Recorded, number: str) -> RunFacts:
+    plan = recorded.plan
+    coverage_min, buffer_points = plan.registration.coverage_min, plan.buffer_points
+    return RunFacts(number, plan.part.name, recorded.profile, plan.tolerance.zone, coverage_min, buffer_points, recorded.began)
+
+
 def _short(text: str, what: str) -> str:
     text = text.strip()
     if len(text) > _LONGEST_NAME or not text.isprintable():
@@ -538,5 +495,5 @@ def _told(ask: Callable[[], Found]) -> Found:
     """What was asked for, or the reason as an answer to the operator."""
     try:
         return ask()
-    except (StoreError, PlanError, InspectionError, PointFileError) as error:
+    except (StoreError, RunError, PlanError, InspectionError, PointFileError) as error:
         raise Refused(str(error)) from None

@@ -1,20 +1,23 @@
 """What an operator sees and does, in a real browser."""
 
 import re
-from collections.abc import Callable, Iterator
+import threading
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
+from cmmlink.console.past_runs import PastRun, Recorded
 from cmmlink.console.server import ConsoleServer
 from cmmlink.errors import StoreError
 from cmmlink.events import Arrived, Event, RunStarted, Sink
 from cmmlink.plan import Plan
 from drivers.errors import LinkError
 from drivers.source import Damaged, LinkDown, LinkUp, Lost, PointBatch
-from inspection import InspectionResult, NominalProfile
+from inspection import InspectionResult
 
 from .conftest import TOKEN, Bench, MakeBench
 from .played import CLOSED, PLAN, batches, measured, opened
@@ -165,17 +168,26 @@ class FullDisk:
         self.left = points
 
     @contextmanager
-    def recorder(self, plan: Plan, profile: NominalProfile, started: RunStarted) -> Iterator[tuple[str, Sink]]:
+    def recorder(self, plan: Plan, started: RunStarted) -> Iterator[Sink]:
         def record(event: Event) -> None:
             if isinstance(event, Arrived) and isinstance(event.arrival, PointBatch):
                 self.left -= len(event.arrival)
                 if self.left < 0:
                     raise StoreError("station.sqlite: no space left on the device")
 
-        yield "run", record
+        yield record
 
-    def runs(self) -> list[None]:
+    def runs(self) -> list[PastRun]:
         return []
+
+    def opened(self, run: str) -> Recorded:
+        raise NotImplementedError
+
+    def replayed(self, run: str, sinks: Sequence[Sink], stop: threading.Event) -> str:
+        raise NotImplementedError
+
+    def exported(self, run: str, folder: Path) -> Path:
+        raise NotImplementedError
 
 
 def test_full_disk_stops_the_run_and_says_so(make_bench: MakeBench, keep: Keep) -> None:
