@@ -16,7 +16,7 @@ from cmmlink.errors import StoreError
 from cmmlink.events import Counts, RunStarted, Sink
 from cmmlink.export import export_run
 from cmmlink.plan import Device, Plan
-from cmmlink.recorder import Basis, Recorder, software
+from cmmlink.recorder import Basis, Evidence, Recorder, software
 from cmmlink.records import find_run, list_runs, reading, recorded_run, recording
 from cmmlink.replay import Replay, recorded_plan, recorded_profile, replay
 from cmmlink.report.summary import summary
@@ -62,12 +62,14 @@ class PastRuns:
     """The records in a folder.
 
     decoder_of : the decoder of a plan's device, None for one without wire bytes
+    evidence   : what ties the result of the last run to its record
     """
 
     folder: Path
     decoder_of: Callable[[Device], Decoder | None]
     clock: Callable[[], float]
     today: Callable[[], datetime]
+    evidence: Evidence | None = None
     _known: dict[str, PastRun] = field(default_factory=dict)
 
     @contextmanager
@@ -76,6 +78,7 @@ class PastRuns:
         basis = Basis(plan.effective_yaml(), plan.nominal.file.name, plan.nominal.file.read_bytes(), software())
         with recording(self.folder, self.today) as store, Recorder(store, basis, clock=self.clock, today=self.today) as recorder:
             yield recorder
+        self.evidence = recorder.evidence
 
     def runs(self) -> Sequence[PastRun]:
         """All runs, newest first. Raises StoreError."""

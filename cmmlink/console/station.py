@@ -115,6 +115,7 @@ class Station:
         self.view: RunView | None = None
         self.history_version = 0
         self.outcome: RunOutcome | None = None
+        self.failure: Exception | None = None
         self._work = _Work()
         self._lock = threading.RLock()
         self._stop = threading.Event()
@@ -320,7 +321,7 @@ class Station:
 
     def _begin(self, work: Callable[[], None], view: RunView) -> None:
         self._stop = threading.Event()
-        self._source, self.outcome, self.view = None, None, view
+        self._source, self.outcome, self.failure, self.view = None, None, None, view
         self._thread = threading.Thread(target=self._carried_out, args=(work, view), name="run", daemon=True)
         self._thread.start()
 
@@ -329,21 +330,21 @@ class Station:
         try:
             work()
         except StoreError as error:
-            self._break_off(view, "Record not kept", str(error))
+            self._break_off(view, "Record not kept", error)
         except DeviceError as error:
-            self._break_off(view, "Device failed", str(error))
+            self._break_off(view, "Device failed", error)
         except ValueError as error:  # plan, nominal or points cannot be used
-            self._break_off(view, "Cannot be inspected", str(error))
+            self._break_off(view, "Cannot be inspected", error)
         except Exception as error:
-            self._break_off(view, "Defect in the program", repr(error))
-            raise
+            self._break_off(view, f"Defect in the program ({type(error).__name__})", error)
         finally:
             self._source = None
             self._read_history()
 
-    def _break_off(self, view: RunView, what: str, message: str) -> None:
-        view.fail(f"{what}: {message}")
-        self.alarms.raise_alarm("fault", what, message)
+    def _break_off(self, view: RunView, what: str, error: Exception) -> None:
+        self.failure = error
+        view.fail(f"{what}: {error}")
+        self.alarms.raise_alarm("fault", what, str(error))
 
     def _measure(self, plan: Plan, profile: NominalProfile, started: RunStarted, view: RunView) -> None:
         with ExitStack() as stack:
@@ -481,7 +482,7 @@ def _device_words(plan: Plan) -> str:
 def _facts_of(recorded: Recorded, number: str) -> RunFacts:
     plan = recorded.plan
     coverage_min, buffer_points = plan.registration.coverage_min, plan.buffer_points
-    return RunFacts(number, plan.part.name, recorded.profile, plan.tolerance.zone, coverage_min, buffer_points, recorded.began)
+    return RunFacts(number, "", recorded.profile, plan.tolerance.zone, coverage_min, buffer_points, recorded.began)
 
 
 def _short(text: str, what: str) -> str:

@@ -44,7 +44,10 @@ export class Chart {
   limits(pen, px, py, left) {
     const half = px(1) - px(0);
     pen.fillStyle = INK.band;
-    this.runs.forEach((run, k) => pen.fillRect(px(k) - half / 2, py(run.upper_mm), half, py(run.lower_mm) - py(run.upper_mm)));
+    this.runs.forEach((run, k) => {
+      const [from, to] = [Math.round(px(k) - half / 2), Math.round(px(k) + half / 2)];
+      pen.fillRect(from, py(run.upper_mm), to - from, py(run.lower_mm) - py(run.upper_mm));
+    });
     pen.fillStyle = INK.soft;
     pen.textAlign = "right";
     pen.textBaseline = "middle";
