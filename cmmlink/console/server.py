@@ -354,6 +354,7 @@ def _listening(host: str, port: int) -> socket.socket:
         if sys.platform != "win32":  # there it would let another program take over the port
             listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listening.bind((host, port))
+        listening.listen()  # from here on nobody is turned away, though it may take a moment until somebody answers
     except OSError:
         listening.close()
         raise

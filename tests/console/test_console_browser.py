@@ -1,16 +1,21 @@
 """What an operator sees and does, in a real browser."""
 
+import json
 import re
+import subprocess
+import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from datetime import datetime
 from pathlib import Path
+from time import monotonic
 
 import numpy as np
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Browser, Page, expect
 
-from cmmlink.console.past_runs import PastRun, Recorded
+from cmmlink.console.past_runs import PastRun, PastRuns, Recorded
 from cmmlink.console.server import ConsoleServer
 from cmmlink.errors import StoreError
 from cmmlink.events import Arrived, Event, RunStarted, Sink
@@ -350,6 +355,76 @@ COLOURED = """(colour) => {
         }
     return [(sum / count - left) / (right - left), count];
 }"""
+
+
+def test_history_is_listed_opened_replayed_and_exported(make_bench: MakeBench, tmp_path: Path, keep: Keep) -> None:
+    past = PastRuns(tmp_path / "records", lambda _: None, monotonic, lambda: datetime.now().astimezone())
+    bench = make_bench(records=past)
+    page = bench.started()
+    defects = (0.0, 0.12, 0.0, -0.08, 0.0, 0.0)
+    for k, defect_mm in enumerate(defects):
+        points = batches(measured(bench.profile, 1500, seed=k, defect_mm=defect_mm, at_mm=60.0), 64)
+        bench.device.source.put(opened(1500), *points, CLOSED)
+        expect(page.locator("#runs tbody tr")).to_have_count(k + 1)
+        expect(page.locator("#start")).to_be_enabled()
+        if k < len(defects) - 1:
+            bench.device.renew()
+            page.keyboard.press("s")
+            expect(page.locator("#verdict-why")).to_contain_text("waiting for points")
+    page.keyboard.press("3")
+    verdicts = ["NOT CONFORM" if defect_mm else "CONFORM" for defect_mm in reversed(defects)]
+    expect(page.locator("#runs tbody td:first-child")).to_have_text(verdicts)
+    expect(page.locator("#runs tbody td:nth-child(3)")).to_have_text([f"B-00{47 - k - 1}" for k in range(6)])
+    expect(page.locator("#chart-words")).to_have_text("6 parts, 2 not conform; newest at the right")
+    keep(page, "history")
+    page.locator("#runs").focus()
+    for _ in range(4):
+        page.keyboard.press("ArrowDown")
+    page.keyboard.press("Enter")
+    expect(page.locator("#banner-text")).to_contain_text("Recorded run")
+    expect(page.locator("#verdict-word")).to_have_text("NOT CONFORM")
+    expect(page.locator("#serial-number")).to_have_text("B-0042")
+    keep(page, "recorded")
+    page.keyboard.press("Escape")
+    expect(page.locator("#banner")).to_be_hidden()
+    expect(page.locator("#verdict-word")).to_have_text("CONFORM")
+    page.keyboard.press("3")
+    with page.expect_download() as download:
+        page.keyboard.press("x")
+    assert download.value.suggested_filename.endswith("-0002.zip")
+    page.keyboard.press("r")
+    expect(page.locator("#banner-text")).to_contain_text("identical to the recorded result, to the last bit")
+    expect(page.locator("#verdict-word")).to_have_text("NOT CONFORM")
+
+
+def test_demonstration_goes_from_its_address_to_a_verdict(browser: Browser, tmp_path: Path, keep: Keep) -> None:
+    """The command as a user starts it: a process of its own, a simulated device, a serial line."""
+    command = [sys.executable, "-m", "cmmlink", "demo", "--no-browser", "--defect", "0.12@40"]
+    folders = ["--records", str(tmp_path / "records"), "--out", str(tmp_path / "out")]
+    with subprocess.Popen([*command, *folders], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stderr is not None
+            address = process.stderr.readline().split()[1]
+            context = browser.new_context(viewport={"width": 1280, "height": 800})
+            page = context.new_page()
+            page.goto(address)
+            expect(page.locator("#simulated")).to_be_visible(timeout=60_000)
+            expect(page.locator("#received")).to_have_text("4,000", timeout=60_000)
+            expect(page.locator("#provisional")).to_be_hidden()
+            expect(page.locator("#verdict-word")).to_have_text("NOT CONFORM")
+            expect(page.locator("#runs tbody tr")).to_have_count(1)
+            shown, where = page.locator("#worst-value").text_content(), page.locator("#worst-where").text_content()
+            keep(page, "demo")
+            context.close()
+            words, said = process.communicate(timeout=60)
+        finally:
+            process.kill()
+    assert process.returncode == 1, said
+    assert words.startswith("NOT CONFORM")
+    worst = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))["worst"]
+    assert millimetres(shown) == pytest.approx(worst["deviation_mm"], abs=5.1e-5)
+    assert where == f"at station {worst['station_mm']:.2f} mm"
+    assert worst["station_mm"] == pytest.approx(40.0, abs=1.0)
 
 
 def test_station_open_to_the_network_says_so(make_bench: MakeBench) -> None:
