@@ -40,12 +40,12 @@ def write_plan(folder: Path, name: str = "blade.yaml", text: str = PLAN) -> Path
     return folder / name
 
 
-def measured(nominal: NominalProfile, count: int, seed: int, defect_mm: float = 0.0, at_mm: float = 20.0, rounds: float = 1.0) -> Array:
-    """Machine points (count, 3): form error of 0.015 mm, noise of 1 um, a defect 3 mm wide, in a pose on the table."""
+def measured(nominal: NominalProfile, count: int, seed: int, defect_mm: float = 0.0, at_mm: float = 20.0, excess_mm: float = 0.0) -> Array:
+    """Machine points (count, 3): form error of 0.015 mm, noise of 1 um, a defect 3 mm wide, excess everywhere; posed on the table."""
     rng = np.random.default_rng(seed)
-    station = np.mod(np.linspace(0, rounds, count, endpoint=False), 1.0) * nominal.length_mm
+    station = np.linspace(0, nominal.length_mm, count, endpoint=False)
     deviation = synthetic.form_error_mm(station, nominal.length_mm, rng, 0.015) + rng.normal(0, 0.001, count)
-    deviation += defect_mm * np.exp(-(((station - at_mm) / 1.5) ** 2))
+    deviation += excess_mm + defect_mm * np.exp(-(((station - at_mm) / 1.5) ** 2))
     pose = RigidTransform(-0.4, np.array([210.0, 145.0]))
     section = synthetic.scan(nominal, station, deviation, pose).points_mm
     return np.column_stack([section, np.zeros(count)])
