@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Literal
 
-from cmmlink.events import Arrived, Event, RunFinished, RunStarted
+from cmmlink.events import Arrived, Event, Judged, RunFinished, RunStarted
 from drivers.source import Damaged, LinkDown, LinkUp, Lost, Rejected
 
 Severity = Literal["fault", "warning"]
@@ -34,17 +34,22 @@ class Alarms:
         self._now = now
         self._alarms: dict[int, Alarm] = {}
         self._of_this_run: dict[tuple[str, str], int] = {}
-        self._number = 0
+        self._number = self._stalls = 0
         self._lock = threading.RLock()
 
     def __call__(self, event: Event) -> None:
         """Take one event of a run."""
         if isinstance(event, RunStarted):
             self._of_this_run.clear()
+            self._stalls = 0
             self.clear_active()
         elif isinstance(event, Arrived):
             self._arrived(event)
-        elif isinstance(event, RunFinished):
+        elif isinstance(event, Judged):
+            if event.counts.stalls > self._stalls:
+                self.raise_alarm("warning", "Buffer full", "the device was made to wait", event.counts.stalls - self._stalls)
+                self._stalls = event.counts.stalls
+        else:
             self._finished(event)
 
     def raise_alarm(self, severity: Severity, what: str, detail: str, count: int = 1, active: bool = False) -> None:

@@ -58,7 +58,8 @@ function showQuality(run) {
   const registration = run?.registration, state = registration?.state;
   for (const step of byId("registration").children) step.toggleAttribute("aria-current", Boolean(run) && step.dataset.step === state);
   const move = registration?.can_move_mm;
-  put("can-move", move === 0 ? "nothing: final" : move ? `\u00b1${move < 0.1 ? (move * 1000).toFixed(1) + " \u00b5m" : move.toFixed(2) + " mm"}` : "\u2013");
+  const others = registration?.other_poses ?? 0;
+  put("can-move", others ? `final, but ${others} other pose${others > 1 ? "s fit" : " fits"} as well` : move === 0 ? "nothing: final" : move ? `\u00b1${move < 0.1 ? (move * 1000).toFixed(1) + " \u00b5m" : move.toFixed(2) + " mm"}` : "\u2013");
   const share = run?.coverage ?? 0, needed = run?.coverage_min ?? 0;
   put("coverage", `${(100 * share).toFixed(share < 0.9995 ? 1 : 0)} %`);
   const bar = byId("coverage-bar");

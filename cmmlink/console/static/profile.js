@@ -237,7 +237,8 @@ export class Profile {
   }
 
   drawWorst(pen) {
-    const { worst, zone } = this, [x, y] = this.tip(worst);
+    const { worst, zone, sheet } = this, [x, y] = this.tip(worst);
+    if (x < 0 || y < 0 || x > sheet.width || y > sheet.height) return;
     pen.strokeStyle = INK.text;
     pen.lineWidth = 2;
     pen.beginPath();

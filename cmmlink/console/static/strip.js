@@ -150,14 +150,14 @@ export class Strip {
   }
 
   drawColumns(pen, low, high, lowVerdict, highVerdict) {
-    const { zone } = this, paths = {};
+    const { zone } = this, paths = {}, half = this.to - this.from < this.nominal.length / 4 ? 1.5 : 1; // few points: larger dots
     for (let column = 0; column < low.length; column++) {
       if (high[column] < low[column]) continue;
       const above = Math.abs(high[column] - this.middle) > Math.abs(low[column] - this.middle);
       const kind = above ? classOf(high[column], highVerdict[column], zone) : classOf(low[column], lowVerdict[column], zone);
       const path = (paths[kind] ??= new Path2D());
-      const top = this.py(high[column]) - 1, bottom = this.py(low[column]) + 1;
-      path.rect(this.left + column - 0.75, top, 1.5, bottom - top);
+      const top = this.py(high[column]) - half, bottom = this.py(low[column]) + half;
+      path.rect(this.left + column - 0.75 * half, top, 1.5 * half, bottom - top);
     }
     for (const [kind, path] of Object.entries(paths)) {
       pen.fillStyle = INK[kind];
