@@ -233,6 +233,10 @@ class ConsoleServer:
         if do == "open":
             page.opened = await anyio.to_thread.run_sync(self.station.opened, _text(command, "run"))
             return "opened"
+        if do == "section":
+            index = _maybe_number(command, "section")
+            page.opened = await anyio.to_thread.run_sync(self.station.section, -1 if index is None else index)
+            return "opened"
         if do == "devices":
             return json.dumps(await anyio.to_thread.run_sync(self.station.devices))
         work = self._work(command)
@@ -257,6 +261,7 @@ class ConsoleServer:
             "test": station.test_device,
             "acknowledge": lambda: station.acknowledge(_maybe_number(command, "alarm")),
             "replay": lambda: station.replay(_text(command, "run")),
+            "import": lambda: station.import_ct(_text(command, "plan")),
         }
         return works.get(str(command.get("do")))
 
@@ -287,6 +292,7 @@ class ConsoleServer:
         told = {
             "control": control,
             "station": station.state(),
+            "ct": station.ct.described(),
             "alarms": {"fault": station.alarms.fault, "alarms": [_alarm_words(alarm) for alarm in station.alarms.newest_first()[:50]]},
             "run": {"run": view.state() if view else None, "recorded": page.opened is not None},
         }

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from cmmlink.console.alarms import Alarms
+from cmmlink.console.ct_import import CtImport, InspectSurface
 from cmmlink.console.past_runs import PastRun, Recorded
 from cmmlink.console.run_view import RunFacts, RunView
 from cmmlink.errors import PlanError, RunError, StoreError
@@ -73,6 +74,7 @@ class Means:
     connect : opens the device of a plan for one scan
     devices : addresses of devices that can be seen now, with a description each
     records : None where nothing is recorded
+    ct_plans, inspect_surface : plans of CT surfaces, and what inspects one; None where that is not possible
     """
 
     plans: Callable[[], Mapping[str, Path]]
@@ -81,6 +83,8 @@ class Means:
     records: Records | None
     clock: Callable[[], float]
     now: Callable[[], datetime]
+    ct_plans: Callable[[], Mapping[str, Path]] = dict
+    inspect_surface: InspectSurface | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,6 +116,7 @@ class Station:
     def __init__(self, means: Means) -> None:
         self._means = means
         self.alarms = Alarms(means.now)
+        self.ct = CtImport(means.clock)
         self.view: RunView | None = None
         self.history_version = 0
         self.outcome: RunOutcome | None = None
@@ -143,6 +148,7 @@ class Station:
             work, choice = self._work, self._work.choice
             return {
                 "plans": sorted(self._means.plans()),
+                "ct_plans": sorted(self._means.ct_plans()) if self._means.inspect_surface else [],
                 "choice": None if choice is None else _described(choice),
                 "serial_number": work.serial_number,
                 "operator": work.operator,
@@ -233,6 +239,28 @@ class Station:
             self._thread = threading.Thread(target=self._listen, args=(plan,), name="device test", daemon=True)
             self._thread.start()
         return "testing the device"
+
+    def import_ct(self, name: str) -> str:
+        """Inspect the sections of a CT surface as its plan says."""
+        with self._lock:
+            self._refuse_while_running("a surface can be inspected")
+            file, inspect = self._means.ct_plans().get(name), self._means.inspect_surface
+            if file is None or inspect is None:
+                raise Refused(f"there is no CT plan {name!r} at this station")
+            self.ct.begin(name)
+            self._stop, self._source = threading.Event(), None
+            self._thread = threading.Thread(target=self._inspect, args=(inspect, file), name="ct", daemon=True)
+            self._thread.start()
+        return f"inspecting {name}"
+
+    def section(self, index: int) -> RunView:
+        """Give one section of the CT surface to look at."""
+        if not 0 <= index < len(self.ct.sections):
+            raise Refused("there is no such section")
+        section = self.ct.sections[index]
+        view = RunView(section.facts, self._means.clock, lambda: section.facts.began)
+        view.recall(section.started, section.ended)
+        return view
 
     def end_scan(self) -> str:
         """End the scan here: what was received is judged, and the coverage says whether it suffices."""
@@ -370,6 +398,15 @@ class Station:
                 self.alarms.raise_alarm("fault", "The page cannot show this run", repr(error))
 
         return show
+
+    def _inspect(self, inspect: InspectSurface, file: Path) -> None:
+        try:
+            self.ct.end(inspect(file, self._stop, self.ct.expect, self.ct.add))
+        except (DeviceError, ValueError, OSError) as error:  # plan, surface or nominal cannot be used
+            self.ct.end(str(error).replace(str(file), file.name), failed=True)
+        except Exception as error:
+            self.ct.end(f"defect in the program ({type(error).__name__}): {error}", failed=True)
+            self.alarms.raise_alarm("fault", "Defect in the program", repr(error))
 
     def _next_part(self, outcome: RunOutcome) -> None:
         """After a part was judged, suggest the serial number of the next."""

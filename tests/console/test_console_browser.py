@@ -262,14 +262,17 @@ def test_keyboard_alone_is_enough(bench: Bench) -> None:
     expect(page.locator("#verdict-word")).to_have_text("NOT CONFORM")
     expect(page.locator("#serial-number")).to_have_text("K-0099")
     expect(page.locator("#plan-operator")).to_contain_text("Grace")
-    focus(page, "strip")
-    page.keyboard.press("w")
-    worst = page.locator("#worst-value").text_content()
-    for _ in range(6):
-        page.keyboard.press("+")
-    page.keyboard.press("ArrowLeft")
-    page.keyboard.press("0")
-    expect(page.locator("#worst-value")).to_have_text(worst or "")
+    expect(page.locator("#provisional")).to_be_hidden()
+    for name in ("strip", "profile"):
+        focus(page, name)
+        whole = drawn(page, name)
+        page.keyboard.press("w")
+        assert drawn(page, name) == whole, "a read-out leaves the drawing as it is"
+        assert drawn(page, name, layer=2) != drawn(page, name, layer=2, after="ArrowLeft"), "the read-out moves"
+        zoomed = drawn(page, name, after="+")
+        assert zoomed != whole
+        assert drawn(page, name, after="Shift+ArrowLeft") != zoomed
+        assert drawn(page, name, after="0") == whole
     bench.device.renew()
     page.keyboard.press("n")
     expect(page.locator("#serial")).to_be_focused()
@@ -278,6 +281,15 @@ def test_keyboard_alone_is_enough(bench: Bench) -> None:
     expect(page.locator("#verdict-why")).to_contain_text("waiting for points")
     page.keyboard.press("Escape")
     expect(page.locator("#verdict-why")).to_have_text("no point was received")
+
+
+def drawn(page: Page, name: str, layer: int = 0, after: str = "") -> str:
+    """What one layer of a drawing looks like once the page has painted, after a key was pressed."""
+    if after:
+        page.keyboard.press(after)
+    script = """([name, layer]) => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() =>
+        done(document.querySelectorAll(`#${name} canvas`)[layer].toDataURL()))))"""
+    return str(page.evaluate(script, [name, layer]))
 
 
 def focus(page: Page, name: str) -> None:

@@ -1,8 +1,8 @@
-// Run chart: the worst deviation of the last parts, with their own limits; the verdict by shape.
+// Run chart: the worst deviation of the last parts (or of a surface's sections), with their own limits; the verdict by shape.
 
 import { INK, Sheet, mark, niceStep, signed } from "./sheet.js";
 
-const MOST = 20;
+const FEWEST = 20;
 
 export class Chart {
   constructor(element, large) {
@@ -11,8 +11,9 @@ export class Chart {
     this.runs = [];
   }
 
+  // In the order of drawing: the newest part, or the highest section, last.
   show(runs) {
-    this.runs = runs.filter((run) => run.worst_mm !== null).slice(0, MOST).reverse();
+    this.runs = runs.filter((run) => run.worst_mm !== null);
     this.draw();
   }
 
@@ -29,7 +30,8 @@ export class Chart {
     }
     const values = runs.flatMap((run) => [run.worst_mm, run.lower_mm, run.upper_mm]);
     const low = Math.min(...values), high = Math.max(...values), room = (high - low) * 0.12 || 0.01;
-    const px = (k) => left + ((k + 0.5) / MOST) * (right - left);
+    this.places = Math.max(FEWEST, runs.length);
+    const px = (k) => left + ((k + 0.5) / this.places) * (right - left);
     const py = (value) => bottom - ((value - low + room) / (high - low + 2 * room)) * (bottom - top);
     this.limits(pen, px, py, left);
     pen.strokeStyle = INK.faint;
@@ -56,7 +58,7 @@ export class Chart {
     pen.strokeStyle = INK.faint;
     pen.beginPath();
     pen.moveTo(left, py(0));
-    pen.lineTo(px(MOST - 0.5), py(0));
+    pen.lineTo(px(this.places - 0.5), py(0));
     pen.stroke();
   }
 
@@ -79,12 +81,12 @@ export class Chart {
 
   serials(pen, px, bottom) {
     const { sheet, runs } = this;
-    const every = niceStep(20, (px(19) - px(0)) / (sheet.text * 6));
+    const every = niceStep(this.places, (px(this.places - 1) - px(0)) / (sheet.text * 6));
     pen.fillStyle = INK.soft;
     pen.textAlign = "center";
     pen.textBaseline = "top";
     runs.forEach((run, k) => {
-      if ((runs.length - 1 - k) % every === 0) pen.fillText((run.serial_number || run.run).slice(-10), px(k), bottom + 6);
+      if ((runs.length - 1 - k) % every === 0) pen.fillText((run.label ?? (run.serial_number || run.run)).slice(-10), px(k), bottom + 6);
     });
   }
 }

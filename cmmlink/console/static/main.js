@@ -1,5 +1,6 @@
 // The page: what the station says, put on the screen; what the operator does, sent to the station.
 
+import { Ct } from "./ct.js";
 import { Figures } from "./figures.js";
 import { listen } from "./gestures.js";
 import { History } from "./history.js";
@@ -28,6 +29,11 @@ const history = new History({
   export: download,
 });
 
+const ct = new Ct({
+  inspect: (plan) => ask("import", { plan }),
+  open: async (section) => (await ask("section", { section })).ok && go("live"),
+});
+
 // What the station says.
 
 function onState(kind, content) {
@@ -37,6 +43,7 @@ function onState(kind, content) {
   else if (kind === "control") told.control = content;
   else if (kind === "alarms") [told.alarms, told.fault] = [content.alarms, content.fault];
   else if (kind === "history") history.show(content.runs);
+  else if (kind === "ct") ct.show(content);
   else if (kind === "alive") [told.nowMs, told.nowAt] = [content.now_ms, performance.now()];
   soon("words");
 }
@@ -102,6 +109,7 @@ function paintWords() {
   showLamps(run, told.fault, linkState === "live");
   showAlarms(told.alarms);
   if (station) work.show(station);
+  if (station) ct.showPlans(station.ct_plans, station.running);
   showBanner();
   showButtons();
   age();
@@ -222,9 +230,10 @@ const press = (id) => () => byId(id).disabled || byId(id).hidden || byId(id).cli
 const KEYS = {
   1: () => go("live"), 2: () => go("part"), 3: () => go("history"), 4: () => byId("tab-ct").hidden || go("ct"),
   s: press("start"), e: press("end"), n: press("next"), a: press("acknowledge"), l: press("alarm-list-button"), t: press("test"),
-  o: () => inHistory(press("open-run")), r: () => inHistory(press("replay-run")), x: () => inHistory(press("export-run")),
+  o: () => (within("history", press("open-run")), within("ct", press("open-section"))),
+  r: () => within("history", press("replay-run")), x: () => within("history", press("export-run")), i: () => within("ct", press("import-ct")),
 };
-const inHistory = (act) => document.body.dataset.view === "history" && act();
+const within = (view, act) => document.body.dataset.view === view && act();
 
 document.addEventListener("keydown", (event) => {
   if (event.key === "Escape") {

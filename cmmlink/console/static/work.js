@@ -1,14 +1,13 @@
 // The part view: choose a plan, see that it can be run, enter the part, test the device.
 
+import { List } from "./list.js";
 import { byId, put } from "./panels.js";
 
 export class Work {
   // ask(what, more) sends a command and gives a promise of its answer.
   constructor(ask, onStart) {
     this.ask = ask;
-    this.plans = [];
-    this.at = 0;
-    byId("plans").addEventListener("keydown", (event) => this.key(event));
+    this.list = new List(byId("plans"), (name) => this.choose(name));
     byId("entry").addEventListener("submit", (event) => {
       event.preventDefault();
       onStart();
@@ -33,32 +32,15 @@ export class Work {
     byId("devices").replaceChildren(...JSON.parse(answer.message).map(({ address, description }) => new Option(description, address)));
   }
 
-  key(event) {
-    const to = { ArrowDown: this.at + 1, ArrowUp: this.at - 1, Home: 0, End: this.plans.length - 1 }[event.key];
-    if (to !== undefined) {
-      event.preventDefault();
-      this.point(Math.min(Math.max(to, 0), this.plans.length - 1));
-    } else if (event.key === "Enter" || event.key === " ") {
-      event.preventDefault();
-      this.choose(this.plans[this.at]);
-    }
-  }
-
-  point(at) {
-    this.at = at;
-    [...byId("plans").children].forEach((item, k) => item.classList.toggle("pointed", k === at));
-    byId("plans").children[at]?.scrollIntoView({ block: "nearest" });
-  }
-
   async choose(name) {
-    if (!name) return;
     const answer = await this.ask("choose", { plan: name });
     if (answer.ok) byId("serial").focus();
     byId("serial").select();
   }
 
   show(station) {
-    this.showPlans(station);
+    byId("no-plans").hidden = station.plans.length > 0;
+    this.list.show(station.plans, station.choice?.name, station.choice?.problem);
     this.showCheck(station.choice);
     for (const [id, value] of [["serial", station.serial_number], ["operator", station.operator], ["address", station.address]]) {
       const input = byId(id);
@@ -74,24 +56,6 @@ export class Work {
     put("test-result", state === "none" ? "" : { testing: "\u2026 ", passed: "\u2713 ", failed: "\u2715 " }[state] + message);
     byId("test").disabled = station.running;
     byId("start-part").disabled = !station.can_start;
-  }
-
-  showPlans(station) {
-    const { plans, choice } = station, told = JSON.stringify([plans, choice?.name, choice?.problem]);
-    if (told === this.told) return;
-    this.told = told;
-    this.plans = plans;
-    byId("no-plans").hidden = plans.length > 0;
-    byId("plans").replaceChildren(...plans.map((name) => {
-      const item = document.createElement("div");
-      item.setAttribute("role", "option");
-      item.setAttribute("aria-selected", String(name === choice?.name));
-      item.dataset.bad = String(name === choice?.name && Boolean(choice.problem));
-      item.textContent = name;
-      item.addEventListener("click", () => this.choose(name));
-      return item;
-    }));
-    this.point(Math.max(0, plans.indexOf(choice?.name)));
   }
 
   showCheck(choice) {
