@@ -35,7 +35,6 @@ export class Work {
   async choose(name) {
     const answer = await this.ask("choose", { plan: name });
     if (answer.ok) byId("serial").focus();
-    byId("serial").select();
   }
 
   show(station) {
