@@ -21,7 +21,7 @@ from drivers.source import Heartbeat, LinkDown, PointBatch, ScanClosed, ScanOpen
 from inspection import LiveUpdate, NominalProfile, ToleranceZone, Verdict
 from inspection.result import coverage
 
-Phase = Literal["starting", "measuring", "ending", "finished"]
+Phase = Literal["preparing", "starting", "measuring", "ending", "finished"]
 
 WORDS = {Verdict.CONFORM: "CONFORM", Verdict.UNCERTAIN: "NOT PROVEN", Verdict.NONCONFORM: "NOT CONFORM"}
 _COUNTED = ("received", "judged", "rejected", "lost", "damaged_bytes", "rejected_by_reason")
@@ -80,7 +80,7 @@ class RunView:
         self._lock = threading.Lock()
         self._extremes = Extremes(facts.profile.length_mm, facts.zone.middle_mm)
         self._started = RunStarted("", "", "", "", False)
-        self._phase: Phase = "starting"
+        self._phase: Phase = "preparing"
         self._counts = Counts()
         self._link: Literal["connecting", "up", "down", "closed"] = "connecting"
         self._expected: int | None = None
@@ -113,6 +113,12 @@ class RunView:
         with self._lock:
             self._started = started
             self._end(ended, Counts(**{name: facts[name] for name in _COUNTED if name in facts}))
+
+    def prepared(self) -> None:
+        """Everything is ready; now the device is asked for points."""
+        with self._lock:
+            if self._phase == "preparing":
+                self._phase = "starting"
 
     def fail(self, message: str) -> None:
         """The run broke off without a word of its own."""
@@ -192,7 +198,7 @@ class RunView:
             self._link = "down"
             return
         self._link = "up"
-        if self._phase == "starting":
+        if self._phase in ("preparing", "starting"):
             self._phase = "measuring"
         if isinstance(arrival, (PointBatch, Heartbeat)):
             self._alive_s = event.time_s
@@ -272,6 +278,8 @@ class RunView:
             return {"word": WORDS[Verdict.UNCERTAIN], "final": True, "why": "the run broke off"}
         if self._ended is not None:
             return _final_verdict(self._ended, self.facts.coverage_min)
+        if self._phase == "preparing":
+            return {"word": WORDS[Verdict.UNCERTAIN], "final": False, "why": "preparing the inspection"}
         provisional = self._update is None or self._update.state != "settled"
         if self._out:
             why = f"{_points(self._out)} out so far"

@@ -24,7 +24,7 @@ from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan import FileDevice, Plan, load_plan
 from drivers.errors import DeviceError, PointFileError
 from drivers.source import PointBatch, ScanOpened, ScanSource
-from inspection import InspectionError, NominalProfile
+from inspection import InspectionError, NominalProfile, rehearse
 
 Found = TypeVar("Found")
 
@@ -120,6 +120,7 @@ class Station:
         self.view: RunView | None = None
         self.history_version = 0
         self.outcome: RunOutcome | None = None
+        self.started: RunStarted | None = None
         self.failure: Exception | None = None
         self._work = _Work()
         self._lock = threading.RLock()
@@ -291,7 +292,8 @@ class Station:
         """Give a recorded run to look at."""
         records = self._records()
         recorded = _told(lambda: records.opened(run))
-        view = RunView(_facts_of(recorded, recorded.run), self._means.clock, lambda: recorded.began)
+        title = f"Recorded run {recorded.run} of {recorded.began:%Y-%m-%d %H:%M}"
+        view = RunView(_facts_of(recorded, title), self._means.clock, lambda: recorded.began)
         view.recall(recorded.started, recorded.ended)
         return view
 
@@ -376,9 +378,11 @@ class Station:
 
     def _measure(self, plan: Plan, profile: NominalProfile, started: RunStarted, view: RunView) -> None:
         with ExitStack() as stack:
+            rehearse(profile)  # compiled before the device is asked for points: ten seconds, once after installation
+            view.prepared()
             live = planned_inspection(plan, profile)
             connected = stack.enter_context(self._means.connect(plan))
-            started = replace(started, device=connected.device, simulated=connected.simulated)
+            started = self.started = replace(started, device=connected.device, simulated=connected.simulated)
             sinks: list[Sink] = [self.alarms, self._shown_in(view)]
             if self._means.records is not None:
                 sinks.insert(0, stack.enter_context(self._means.records.recorder(plan, started)))

@@ -1,18 +1,19 @@
 """A browser, a station with a played device, and a page of it."""
 
 import shutil
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
+from cmmlink.console.ct_import import InspectSurface
 from cmmlink.console.server import ConsoleServer
 from cmmlink.console.station import Records, Station
 from cmmlink.parts import planned_profile
 from cmmlink.plan import load_plan
-from inspection import NominalProfile
+from inspection import NominalProfile, rehearse
 
 from .played import Device, means, write_plan
 
@@ -42,6 +43,12 @@ def browser(request: pytest.FixtureRequest) -> Iterator[Browser]:
         launched = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
         yield launched
         launched.close()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def compiled(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Compile the inspection before any page waits for it: it takes long once after installation."""
+    rehearse(planned_profile(load_plan(write_plan(tmp_path_factory.mktemp("compiled")))))
 
 
 @dataclass
@@ -82,10 +89,17 @@ def make_bench(browser: Browser, tmp_path: Path) -> Iterator[MakeBench]:
     """Makes stations; at the end no page may have complained (errors of script, policy or loading)."""
     made: list[Bench] = []
 
-    def make(records: Records | None = None, plans: Sequence[str] = ("blade.yaml",), host: str = "127.0.0.1") -> Bench:
+    def make(
+        records: Records | None = None,
+        plans: Sequence[str] = ("blade.yaml",),
+        host: str = "127.0.0.1",
+        surfaces: Mapping[str, Path] | None = None,
+        inspect: InspectSurface | None = None,
+    ) -> Bench:
         files = {name: write_plan(tmp_path, name) for name in plans}
         device = Device()
-        station = Station(means(files, device.connect, records))
+        known = surfaces or {}
+        station = Station(replace(means(files, device.connect, records), ct_plans=lambda: known, inspect_surface=inspect))
         server = ConsoleServer(station, "test", host, token=TOKEN)
         server.start()
         made.append(Bench(station, server, device, planned_profile(load_plan(files[plans[0]])), browser))

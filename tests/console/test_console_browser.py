@@ -13,8 +13,11 @@ from time import monotonic
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from playwright.sync_api import Browser, Page, expect
 
+from cmmlink.cli import _inspect_surface
+from cmmlink.console.ct_import import Section
 from cmmlink.console.past_runs import PastRun, PastRuns, Recorded
 from cmmlink.console.server import ConsoleServer
 from cmmlink.errors import StoreError
@@ -23,6 +26,7 @@ from cmmlink.plan import Plan
 from drivers.errors import LinkError
 from drivers.source import Damaged, LinkDown, LinkUp, Lost, PointBatch
 from inspection import InspectionResult
+from tests.drivers.meshes import binary_stl, tube, write
 
 from .conftest import TOKEN, Bench, MakeBench
 from .played import CLOSED, PLAN, batches, measured, opened
@@ -437,6 +441,62 @@ def test_demonstration_goes_from_its_address_to_a_verdict(browser: Browser, tmp_
     assert millimetres(shown) == pytest.approx(worst["deviation_mm"], abs=5.1e-5)
     assert where == f"at station {worst['station_mm']:.2f} mm"
     assert worst["station_mm"] == pytest.approx(40.0, abs=1.0)
+
+
+CT_PLAN = """part: {name: blade 7}
+mesh: {file: blade.stl}
+nominal: {file: section.yaml}
+tolerance: {lower_mm: -0.05, upper_mm: 0.05}
+sections: {heights_mm: [4, 8, 12, 16]}
+cut: {cutter: numpy}
+"""
+
+
+def test_surface_is_imported_with_progress_and_its_sections_opened(make_bench: MakeBench, tmp_path: Path, keep: Keep) -> None:
+    """A tube of the nominal section, 0.1 mm too thick over 20 mm of its outline above height 10 mm."""
+    plan = tmp_path / "ct.yaml"
+    released = threading.Event()
+
+    def inspect(file: Path, stop: threading.Event, expect_: Callable[[int], None], add: Callable[[Section], None]) -> str:
+        def one_by_one(section: Section) -> None:
+            add(section)
+            assert released.wait(60) or section.height_mm < 10
+
+        return _inspect_surface(file, stop, expect_, lambda section: one_by_one(section) if section.height_mm > 7 else add(section))
+
+    bench = make_bench(surfaces={"ct.yaml": plan}, inspect=inspect)
+    page = bench.page()
+    page.keyboard.press("4")
+    page.locator("#ct-plans div").click()
+    expect(page.locator("#ct-message")).to_contain_text("✕ ct.yaml")
+    plan.write_text(CT_PLAN, encoding="utf-8")
+    station = np.linspace(0, bench.profile.length_mm, 3000, endpoint=False)
+    rings = [surface_ring(bench.profile, station, 0.1 if height_mm > 10 else 0.0) for height_mm in (0, 6, 10.5, 20)]
+    mesh = np.concatenate([tube(ring, np.array(ends)) for ring, ends in zip(rings, ((0, 6), (6, 10), (10, 14), (14, 20)), strict=True)])
+    write(tmp_path / "blade.stl", binary_stl(mesh))
+    focus(page, "ct-plans")
+    page.keyboard.press("Enter")
+    expect(page.locator("#ct-words")).to_have_text(re.compile("2 of 4, about [0-9]+ s left"))
+    expect(page.locator("#ct-bar")).to_be_visible()
+    expect(page.locator("#abort")).to_be_enabled()
+    released.set()
+    expect(page.locator("#ct-message")).to_contain_text("NOT CONFORM: 4 sections of")
+    expect(page.locator("#sections tbody td:first-child")).to_have_text(["CONFORM", "CONFORM", "NOT CONFORM", "NOT CONFORM"])
+    keep(page, "ct")
+    focus(page, "sections")
+    page.keyboard.press("End")
+    page.keyboard.press("Enter")
+    expect(page.locator("#banner-text")).to_have_text("Section at height 16.000 mm of blade.stl")
+    expect(page.locator("#verdict-word")).to_have_text("NOT CONFORM")
+    assert millimetres(page.locator("#worst-value").text_content()) == pytest.approx(0.1, abs=0.015)
+    page.keyboard.press("Escape")
+    expect(page.locator("#banner")).to_be_hidden()
+
+
+def surface_ring(profile: NominalProfile, station_mm: NDArray[np.float64], excess_mm: float) -> NDArray[np.float64]:
+    """The outline (m, 2) with an excess around station 60 mm."""
+    deviation = excess_mm * np.exp(-(((station_mm - 60) / 8) ** 4))
+    return synthetic.scan(profile, station_mm, deviation, RigidTransform.identity()).points_mm
 
 
 def test_station_open_to_the_network_says_so(make_bench: MakeBench) -> None:

@@ -133,7 +133,7 @@ function showBanner() {
   if (linkState === "connecting") return banner("Connecting to the station \u2026", "note");
   if (linkState !== "live") return banner("STALE: the station does not answer. What you see is old. Trying again \u2026", "fault");
   if (run?.link === "down" && run.phase !== "finished") return banner("LINK LOST. The device cannot be reached; trying again \u2026", "fault");
-  if (told.recorded) return banner(`Recorded run ${run?.number ?? ""} of ${(run?.began ?? "").replace("T", " ").slice(0, 16)}`, "note", "Back to now");
+  if (told.recorded) return banner(run?.number ?? "", "note", "Back to now");
   if (control && !control.controls) return banner(control.taken ? "Watching: another page is in control." : "Watching: no page is in control.", "note", "Take control");
   if (run?.remark) return banner(run.remark, "note");
   if (told.remote) return banner("This station is open to the network: whoever knows the address can control it.", "warning");

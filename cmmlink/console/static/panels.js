@@ -41,7 +41,7 @@ function showVerdict(run, ready) {
   put("verdict-why", verdict?.why ?? (ready.can_start ? "start when the part is in place" : ready.plan ? `${ready.plan} cannot be run` : "choose a plan"));
   const going = run && !verdict.final;
   byId("provisional").hidden = !going;
-  if (going) put("provisional", { starting: "connecting", measuring: "so far", ending: "ending" }[run.phase] ?? "");
+  if (going) put("provisional", { preparing: "preparing", starting: "connecting", measuring: "so far", ending: "ending" }[run.phase] ?? "");
 }
 
 function showWorst(run) {
