@@ -10,7 +10,7 @@ test: .venv/test-installed
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/pytest -n 2
+	$(BIN)/pytest -n 2 $(PYTEST_OPTIONS)
 
 # A hundred recording processes killed at random moments; every acknowledged point must be there.
 soak: .venv/test-installed

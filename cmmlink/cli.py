@@ -3,8 +3,10 @@
 0 conform, 1 nonconform, 3 uncertain; 2 unusable input or plan, 4 device or link failure, 5 the record could not be kept.
 """
 
+import itertools
 import json
 import math
+import re
 import signal
 import subprocess
 import sys
@@ -13,7 +15,7 @@ import textwrap
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from enum import StrEnum
@@ -21,10 +23,17 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from platformdirs import user_data_path
 from rich.console import Console
 
 from cmmlink import __version__
-from cmmlink.ct import inspect_stack
+from cmmlink.console.ct_import import Section
+from cmmlink.console.launch import CONSOLE_PORT, graphical_browser, kept_token, served, stay_while_seen
+from cmmlink.console.past_runs import PastRuns
+from cmmlink.console.run_view import Ended, RunFacts
+from cmmlink.console.server import ConsoleServer
+from cmmlink.console.station import Connected, Means, Refused
+from cmmlink.ct import SectionOutcome, inspect_stack
 from cmmlink.ct_command import ManyHeights, SectionBar, own_nominals, plan_from, print_stack
 from cmmlink.ct_plan import CtPlan, load_ct_plan
 from cmmlink.demo import plan_file as demo_plan_file
@@ -43,7 +52,7 @@ from cmmlink.replay import replay as replayed
 from cmmlink.report.folder import prepare, write_results
 from cmmlink.report.stack_folder import write_stack
 from cmmlink.report.summary import identity, summary
-from cmmlink.terminal import LiveTable, print_summary
+from cmmlink.terminal import WORDS, LiveTable, print_summary
 from drivers.axis import Beam, ConstantFeed, FollowedAxis
 from drivers.errors import DeviceError, LinkError, MeshError, PointFileError
 from drivers.formats import decoder
@@ -65,13 +74,18 @@ _STOPPED = 130  # Ctrl-C outside a run, as shells and typer have it
 _BUFFER_POINTS = 500_000
 _SIMULATOR_STARTS_S = 20.0
 _DEMO_RATE_HZ, _DEMO_POINTS = 2000, 4000
+_PAGE_OPENS_S = 20.0  # a run waits so long for the page that is to show it
+_LOOK_S = 0.2
+_LONGEST_PLAN = 200_000
 
+Connect = Callable[[Plan], AbstractContextManager[Connected]]
 PlanFile = Annotated[Path, typer.Argument(metavar="PLAN.yaml", help="The inspection plan.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of words.")]
 Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for deviations.csv, result.json and profile.png.")]
 Records = Annotated[Path | None, typer.Option("--records", metavar="DIR", help="Folder of the run records.")]
 RunName = Annotated[str, typer.Argument(metavar="RUN", help="The id of a run, the beginning of one, or last.")]
 Headless = Annotated[bool, typer.Option("--headless", help="No page, no live table.")]
+NoBrowser = Annotated[bool, typer.Option("--no-browser", help="Serve the page and print its address, but open no browser.")]
 
 
 class Side(StrEnum):
@@ -116,6 +130,13 @@ class Telling:
     as_json: bool
     out: Path | None
     records: Path | None = None
+    no_browser: bool = False
+
+    @property
+    def on_page(self) -> bool:
+        """Whether the run is shown on the console's page: where somebody can see it."""
+        quiet = self.headless or self.as_json
+        return not quiet and (self.no_browser or (sys.stderr.isatty() and graphical_browser() is not None))
 
 
 def main() -> None:
@@ -173,18 +194,30 @@ def demo(
     out: Out = Path("demo-result"),
     records: Records = None,
     as_json: Json = False,
+    no_browser: NoBrowser = False,
 ) -> int:
     """Run the whole chain on a simulated device, no set-up."""
     plan = load_plan(demo_plan_file())
     profile = _checked_profile(plan, demo_plan_file())
     bump = None if defect is None else _defect(defect, profile.length_mm)
     prepare(out)
+    telling = Telling(headless, as_json, out, records, no_browser)
+    if telling.on_page:
+        seeds = itertools.count(seed)
+        return _run_on_page(demo_plan_file(), profile, lambda plan: _demo_device(plan, profile, next(seeds), bump), telling)
+    with _demo_device(plan, profile, seed, bump) as device:
+        return _run(plan, profile, device, telling)
+
+
+@contextmanager
+def _demo_device(plan: Plan, profile: NominalProfile, seed: int, defect: tuple[float, float] | None) -> Iterator[Connected]:
+    """The demonstration's simulated device, for one part."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "path.csv"
         write_part_path(profile.curve, path)
-        arguments = ["--path", str(path), *_demo_motion(plan, profile, seed, bump)]
-        with _simulator("serial", arguments) as address:
-            return _run(plan.with_address(address), profile, Telling(headless, as_json, out, records), simulated=True)
+        with _simulator("serial", ["--path", str(path), *_demo_motion(plan, profile, seed, defect)]) as address:
+            source, device = _source_of(plan.with_address(address))
+            yield Connected(source, device, simulated=True)
 
 
 def _demo_motion(plan: Plan, profile: NominalProfile, seed: int, defect: tuple[float, float] | None) -> list[str]:
@@ -248,12 +281,23 @@ def run(
     out: Out = None,
     records: Records = None,
     as_json: Json = False,
+    no_browser: NoBrowser = False,
 ) -> int:
     """Acquire and inspect with the device of a plan."""
     plan = load_plan(plan_file)
     profile = _checked_profile(plan, plan_file)
     prepare(out or plan.out)
-    return _run(plan, profile, Telling(headless, as_json, out or plan.out, records or plan.records))
+    telling = Telling(headless, as_json, out or plan.out, records or plan.records, no_browser)
+    if telling.on_page:
+        return _run_on_page(plan_file, profile, _connected, telling)
+    with _connected(plan) as device:
+        return _run(plan, profile, device, telling)
+
+
+@contextmanager
+def _connected(plan: Plan) -> Iterator[Connected]:
+    source, device = _source_of(plan)
+    yield Connected(source, device, simulated=False)
 
 
 def _checked_profile(plan: Plan, plan_file: Path) -> NominalProfile:
@@ -274,12 +318,11 @@ def _naming(plan_file: Path, key: str) -> Iterator[None]:
         raise PlanError(f"{place_of(plan_file, key)}: {error}") from None
 
 
-def _run(plan: Plan, profile: NominalProfile, telling: Telling, simulated: bool = False) -> int:
+def _run(plan: Plan, profile: NominalProfile, device: Connected, telling: Telling) -> int:
     """Carry out a plan and tell what came of it."""
     _rehearsed(profile)
     live = planned_inspection(plan, profile)
-    source, device = _source_of(plan)
-    started = RunStarted(plan.part.name, plan.part.serial_number or "", plan.operator or "", device, simulated)
+    started = RunStarted(plan.part.name, plan.part.serial_number or "", plan.operator or "", device.device, device.simulated)
     table = LiveTable(Console(stderr=True), plan.tolerance.zone)
     quiet = telling.headless or telling.as_json or not sys.stderr.isatty()
     with (
@@ -287,8 +330,50 @@ def _run(plan: Plan, profile: NominalProfile, telling: Telling, simulated: bool 
         Recorder(store, _basis(plan), clock=time.monotonic, today=_today) as recorder,
         nullcontext() if quiet else table,
     ):
-        outcome = _carry_out(source, live, started, [recorder, *([] if quiet else [table])], plan.buffer_points)
+        outcome = _carry_out(device.source, live, started, [recorder, *([] if quiet else [table])], plan.buffer_points)
     return _tell(outcome, profile, telling, started, recorder.evidence)
+
+
+def _run_on_page(plan_file: Path, profile: NominalProfile, connect: Connect, telling: Telling) -> int:
+    """Carry out a plan on the console's page, and stay for the next part while the page is open."""
+    past = _past_runs(telling.records)
+    means = Means(lambda: {plan_file.name: plan_file}, connect, ports, past, time.monotonic, _today)
+    with _stopped_by_ctrl_c() as stop, served(means, __version__) as server:
+        station = server.station
+        _show(server, telling.no_browser)
+        server.wait_for_page(_PAGE_OPENS_S)
+        try:
+            station.choose(plan_file.name)
+            station.start()
+        except Refused as refusal:
+            raise PlanError(str(refusal)) from None
+        while not station.wait(_LOOK_S):
+            if stop.is_set():
+                station.abort()
+        if station.failure is not None:
+            raise station.failure
+        assert station.outcome is not None
+        assert station.started is not None
+        code = _tell(station.outcome, profile, telling, station.started, past.evidence)
+        if server.pages and not stop.is_set():
+            sys.stderr.write("the page stays for the next part until it is closed, or Ctrl-C\n")
+            stay_while_seen(server, stop)
+    return code
+
+
+def _past_runs(folder: Path | None) -> PastRuns:
+    return PastRuns(folder or default_folder(), decoder_of, time.monotonic, _today)
+
+
+def _show(server: ConsoleServer, no_browser: bool) -> None:
+    """Say where the page is, and open it."""
+    sys.stderr.write(f"console: {server.address}\n")
+    if server.remote:
+        sys.stderr.write("WARNING: the console is open to the network, unencrypted; whoever knows this address can control it\n")
+    sys.stderr.flush()
+    browser = None if no_browser else graphical_browser()
+    if browser is not None:
+        browser.open(server.address)
 
 
 def _today() -> datetime:
@@ -599,6 +684,64 @@ def check(plan_file: PlanFile) -> int:
     typer.echo(f"{plan_file} can be run: {plan.part.name}, zone {zone.lower_mm:+g} .. {zone.upper_mm:+g} mm, {device}")
     typer.echo(f"nominal {profile.length_mm:.3f} mm long, {len(profile)} samples, material on the {profile.material}")
     return 0
+
+
+@app.command("console")
+def serve_console(
+    folder: Annotated[Path, typer.Argument(metavar="[FOLDER]", help="Folder of the station's plans.")] = Path(),
+    host: Annotated[str, typer.Option(help="Address to serve; another than 127.0.0.1 opens the console to the network.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535, help="0 takes a free one.")] = CONSOLE_PORT,
+    no_browser: NoBrowser = False,
+    records: Records = None,
+) -> int:
+    """Serve the operator console: plans, runs, history and CT import of this station on one page."""
+    if not folder.is_dir():
+        raise PlanError(f"{folder}: there is no such folder; give the folder that holds the plans")
+    past = _past_runs(records)
+    scans, surfaces = (lambda: _plans_in(folder, surfaces=False)), (lambda: _plans_in(folder, surfaces=True))
+    means = Means(scans, _connected, ports, past, time.monotonic, _today, surfaces, _inspect_surface)
+    token = kept_token(user_data_path("cmmlink", appauthor=False))
+    with _stopped_by_ctrl_c() as stop, served(means, __version__, host, port, token) as server:
+        _show(server, no_browser)
+        while not stop.wait(_LOOK_S):
+            pass
+    return 0
+
+
+def _plans_in(folder: Path, surfaces: bool) -> dict[str, Path]:
+    """The plans of scans in a folder, or those of CT surfaces."""
+    files = (path for path in sorted(folder.iterdir()) if path.suffix in (".yaml", ".yml") and path.is_file())
+    return {path.name: path for path in files if _is_of_surface(path) == surfaces}
+
+
+def _is_of_surface(plan_file: Path) -> bool:
+    try:
+        with plan_file.open("rb") as opened:
+            return re.search(rb"^mesh\s*:", opened.read(_LONGEST_PLAN), re.MULTILINE) is not None
+    except OSError:
+        return False
+
+
+def _inspect_surface(file: Path, stop: threading.Event, on_start: Callable[[int], None], on_section: Callable[[Section], None]) -> str:
+    """Inspect the surface of a CT plan for the console; what came of it in one sentence."""
+    plan = load_ct_plan(file)
+    prepare(plan.out)
+    stack = inspect_stack(
+        plan, clock=time.monotonic, stop=stop, on_start=on_start, on_section=lambda section: on_section(_section(plan, section, file.name))
+    )
+    if plan.out is not None:
+        write_stack(plan.out, stack, plan.tolerance.zone, plan.part.name, pictures=False)
+    told = [f"{WORDS[stack.verdict]}: {len(stack.sections)} sections of {stack.mesh.source}", *stack.notes]
+    return ". ".join([*told, *([f"Results in {plan.out}"] if plan.out is not None else [])])
+
+
+def _section(plan: CtPlan, outcome: SectionOutcome, plan_name: str) -> Section:
+    height_mm, run = outcome.slice.height_mm, outcome.run
+    title = f"Section at height {height_mm:.3f} mm of {plan.mesh.file.name}"
+    facts = RunFacts(title, plan_name, outcome.profile, plan.tolerance.zone, plan.registration.coverage_min, _BUFFER_POINTS, _today())
+    started = RunStarted(plan.part.name, plan.part.serial_number or "", "", plan.mesh.file.name, simulated=False)
+    ended = Ended(run.ending, str(run.refusal or ""), outcome.facts(), run.result)
+    return Section(height_mm, facts, started, ended, outcome.warnings)
 
 
 @app.command("ports")

@@ -14,7 +14,7 @@ from typing import Any
 
 from cmmlink.chunks import Moment
 from cmmlink.errors import PlanError, StoreError, YamlError
-from cmmlink.events import RunStarted
+from cmmlink.events import RunStarted, Sink
 from cmmlink.parts import planned_inspection, planned_profile
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan import Device, Plan
@@ -62,22 +62,26 @@ def replay(
     tolerance: tuple[float, float] | None = None,
     method: str | None = None,
     clock: Callable[[], float] = time.monotonic,
+    sinks: Sequence[Sink] = (),
+    stop: threading.Event | None = None,
 ) -> Replay:
     """Evaluate a recorded run again. `decoder_of` gives the decoder of a plan's device, None for one without wire bytes.
+
+    `sinks` hear what goes on; setting `stop` breaks off.
 
     Raises StoreError where the record is altered or cannot be read, PlanError where the changed plan cannot be used.
     """
     altered, _, _ = store.first_alteration(recorded.run)
     if altered is not None:
         raise StoreError(f"{store.path}: {altered}; what was altered is not evaluated again")
-    plan = _recorded_plan(recorded)
+    plan = recorded_plan(recorded)
     changed = _with_changes(plan, tolerance, method)
-    profile = _recorded_profile(changed, recorded)
-    stop = threading.Event()
+    profile = recorded_profile(changed, recorded)
+    stop = stop or threading.Event()
     source = Capture(_arrivals(store, recorded, decoder := decoder_of(plan.device), stop), decoder, _failure(recorded))
     started = RunStarted(*(recorded.header[key] for key in ("part", "serial_number", "operator", "device", "simulated")))
     live = planned_inspection(changed, profile)
-    outcome = run_inspection(source, live, [], started, buffer_points=plan.buffer_points, clock=clock, stop=stop)
+    outcome = run_inspection(source, live, sinks, started, buffer_points=plan.buffer_points, clock=clock, stop=stop)
     facts = summary(outcome.result, outcome.counts)
     identical = None
     if recorded.end is not None and recorded.end["result_sha256"]:
@@ -86,7 +90,8 @@ def replay(
     return Replay(outcome, profile, facts, changes, _differences(recorded.facts, facts) if not identical else (), identical)
 
 
-def _recorded_plan(recorded: RecordedRun) -> Plan:
+def recorded_plan(recorded: RecordedRun) -> Plan:
+    """Give the effective plan of a recorded run. Raises StoreError."""
     try:
         return read_model(recorded.plan, Plan)
     except YamlError as error:
@@ -105,7 +110,7 @@ def _with_changes(plan: Plan, tolerance: tuple[float, float] | None, method: str
         raise PlanError(f"the recorded plan cannot be changed so: {error}") from None
 
 
-def _recorded_profile(plan: Plan, recorded: RecordedRun) -> NominalProfile:
+def recorded_profile(plan: Plan, recorded: RecordedRun) -> NominalProfile:
     """Discretise the nominal from its recorded file; the one that the plan names may have changed since, or be gone."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / Path(str(recorded.header["nominal"])).name

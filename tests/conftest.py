@@ -1,4 +1,4 @@
-"""Options that point the tests of devices at hardware."""
+"""Options that point the tests of devices at hardware, and those of the console at a browser."""
 
 import pytest
 
@@ -12,3 +12,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--points", type=int, default=100, help="points to read (default 100)")
     group.addoption("--baud-rate", type=int, default=115_200)
     group.addoption("--parity", default="N", choices=["N", "E", "O"])
+    group = parser.getgroup("browser", "tests/console in Chromium")
+    group.addoption("--require-browser", action="store_true", help="fail where the tests in a browser would be skipped")
+    group.addoption("--screenshots", metavar="DIR", help="keep pictures of the console's pages in this folder")

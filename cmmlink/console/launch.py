@@ -1,0 +1,74 @@
+"""The page brought to the operator: its address and token, the browser, and how long to stay."""
+
+import os
+import secrets
+import threading
+import webbrowser
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from cmmlink.console.server import ConsoleServer
+from cmmlink.console.station import Means, Station
+from cmmlink.errors import PlanError
+
+CONSOLE_PORT = 8207
+_TEXT_BROWSERS = ("www-browser", "links", "elinks", "lynx", "w3m")
+_LOOK_S = 0.25
+_GONE_S = 5.0  # a page that is loaded anew is away for a moment only
+
+
+@contextmanager
+def served(means: Means, version: str, host: str = "127.0.0.1", port: int = 0, token: str | None = None) -> Iterator[ConsoleServer]:
+    """Serve a station's page. Raises PlanError where the address cannot be had."""
+    station = Station(means)
+    try:
+        server = ConsoleServer(station, version, host, port, token)
+    except OSError as error:
+        raise PlanError(
+            f"the console cannot be served at {host}:{port} ({error.strerror}); choose another with --host and --port"
+        ) from None
+    server.start()
+    try:
+        yield server
+    finally:
+        if station.running:
+            station.abort()
+            station.wait(_GONE_S)
+        server.stop()
+
+
+def kept_token(folder: Path) -> str:
+    """Token of this user's console, made once and readable by its owner alone: a page outlives a restart of the program."""
+    file = folder / "console-token"
+    try:
+        token = file.read_text(encoding="ascii").strip()
+        if len(token) >= 32:
+            return token
+        file.unlink()
+    except (OSError, UnicodeDecodeError):
+        pass
+    token = secrets.token_urlsafe(24)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with os.fdopen(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="ascii") as opened:
+            opened.write(token)
+    except OSError:
+        return token  # it serves until the program ends
+    return token
+
+
+def graphical_browser() -> webbrowser.BaseBrowser | None:
+    """The browser of this computer, None where there is none with a window."""
+    try:
+        browser = webbrowser.get()
+    except webbrowser.Error:
+        return None
+    return None if getattr(browser, "name", "") in _TEXT_BROWSERS else browser
+
+
+def stay_while_seen(server: ConsoleServer, ended: threading.Event) -> None:
+    """Return when the last page has been closed and nothing is measured any more, or when told."""
+    unseen_s = 0.0
+    while unseen_s < _GONE_S and not ended.wait(_LOOK_S):
+        unseen_s = 0.0 if server.pages or server.station.running else unseen_s + _LOOK_S

@@ -1,0 +1,153 @@
+"""What the console asks of the station's records: the runs, one run to look at, to measure again, or to take away."""
+
+import shutil
+import tempfile
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from cmmlink.chunks import unpack_document, unpack_judged
+from cmmlink.console.run_view import Ended
+from cmmlink.errors import StoreError
+from cmmlink.events import Counts, RunStarted, Sink
+from cmmlink.export import export_run
+from cmmlink.plan import Device, Plan
+from cmmlink.recorder import Basis, Evidence, Recorder, software
+from cmmlink.records import find_run, list_runs, reading, recorded_run, recording
+from cmmlink.replay import Replay, recorded_plan, recorded_profile, replay
+from cmmlink.report.summary import summary
+from cmmlink.store import Store
+from drivers.source import Decoder
+from inspection import NominalProfile
+
+_MOST_LISTED = 500
+_STARTED = ("part", "serial_number", "operator", "device", "simulated")
+
+
+@dataclass(frozen=True, slots=True)
+class PastRun:
+    """One line of the station's history. `worst_mm` is the deviation farthest from the middle of the zone."""
+
+    run: str
+    began: str
+    part: str
+    serial_number: str
+    state: str
+    received: int
+    verdict: str | None
+    worst_mm: float | None
+    worst_station_mm: float | None
+    lower_mm: float | None
+    upper_mm: float | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Recorded:
+    """One run as the records hold it."""
+
+    run: str
+    plan: Plan
+    profile: NominalProfile
+    began: datetime
+    started: RunStarted
+    ended: Ended
+
+
+@dataclass(slots=True)
+class PastRuns:
+    """The records in a folder.
+
+    decoder_of : the decoder of a plan's device, None for one without wire bytes
+    evidence   : what ties the result of the last run to its record
+    """
+
+    folder: Path
+    decoder_of: Callable[[Device], Decoder | None]
+    clock: Callable[[], float]
+    today: Callable[[], datetime]
+    evidence: Evidence | None = None
+    _known: dict[str, PastRun] = field(default_factory=dict)
+
+    @contextmanager
+    def recorder(self, plan: Plan, started: RunStarted) -> Iterator[Sink]:
+        """Give the sink that writes the record of a run. Raises StoreError."""
+        basis = Basis(plan.effective_yaml(), plan.nominal.file.name, plan.nominal.file.read_bytes(), software())
+        with recording(self.folder, self.today) as store, Recorder(store, basis, clock=self.clock, today=self.today) as recorder:
+            yield recorder
+        self.evidence = recorder.evidence
+
+    def runs(self) -> Sequence[PastRun]:
+        """All runs, newest first. Raises StoreError."""
+        entries = list_runs(self.folder, self.today)[::-1][:_MOST_LISTED]
+        unknown = [entry for entry in entries if entry["run"] not in self._known]
+        if unknown:
+            with reading(self.folder, self.today) as store:
+                self._known.update((entry["run"], _line(entry, _facts(store, entry["run"]))) for entry in unknown)
+        return [self._known[entry["run"]] for entry in entries]
+
+    def opened(self, run: str) -> Recorded:
+        """Give one run as it was recorded. Raises StoreError, RunError."""
+        with reading(self.folder, self.today) as store:
+            recorded = recorded_run(store, find_run(store, run))
+            bodies = [record.body for record in store.records(recorded.run, "deviations")]
+        end = recorded.end or {"state": "interrupted", "message": "the run is being recorded", "received": 0}
+        facts = recorded.facts or summary(None, Counts(received=end["received"] or 0))
+        return Recorded(
+            recorded.run,
+            plan := recorded_plan(recorded),
+            recorded_profile(plan, recorded),
+            datetime.fromisoformat(recorded.header["started"]),
+            RunStarted(*(recorded.header[key] for key in _STARTED)),
+            Ended(end["state"], end["message"], facts, unpack_judged(bodies) if bodies else None),
+        )
+
+    def replayed(self, run: str, sinks: Sequence[Sink], stop: threading.Event) -> str:
+        """Measure a run again from its record; say whether the result is identical. Raises StoreError, RunError, PlanError."""
+        with reading(self.folder, self.today) as store:
+            recorded = recorded_run(store, find_run(store, run))
+            return _compared(replay(store, recorded, self.decoder_of, clock=self.clock, sinks=sinks, stop=stop), recorded.run)
+
+    def exported(self, run: str, folder: Path) -> Path:
+        """Write one run as a zip archive into a folder. Raises StoreError, RunError, PlanError."""
+        with tempfile.TemporaryDirectory(dir=folder) as files, reading(self.folder, self.today) as store:
+            run = find_run(store, run)
+            export_run(store, run, Path(files))
+            return Path(shutil.make_archive(str(folder / run), "zip", files))
+
+
+def _facts(store: Store, run: str) -> dict[str, Any]:
+    """Give what the result of a run says, nothing where there is none or it cannot be read."""
+    try:
+        return next((unpack_document(record.body) for record in store.records(run, "result")), {})
+    except StoreError:
+        return {}
+
+
+def _line(entry: dict[str, Any], facts: dict[str, Any]) -> PastRun:
+    worst, zone = facts.get("worst") or {}, facts.get("tolerance") or {}
+    return PastRun(
+        entry["run"],
+        entry["started"] or "",
+        entry["part"] or "",
+        entry["serial_number"] or "",
+        entry["state"],
+        entry["received"] or 0,
+        entry["verdict"],
+        worst.get("deviation_mm"),
+        worst.get("station_mm"),
+        zone.get("lower_mm"),
+        zone.get("upper_mm"),
+    )
+
+
+def _compared(again: Replay, run: str) -> str:
+    changed = f"; changed since: {', '.join(change.key for change in again.changed)}" if again.changed else ""
+    if again.identical is None:
+        return f"Replay of run {run}, which has no recorded result to compare with{changed}"
+    if again.identical:
+        return f"Replay of run {run}: identical to the recorded result, to the last bit{changed}"
+    return f"Replay of run {run}: NOT the recorded result; {', '.join(change.key for change in again.differs[:4])} differ{changed}"

@@ -1,0 +1,66 @@
+from datetime import datetime
+
+import pytest
+
+from cmmlink.console.alarms import Alarms
+from cmmlink.events import Arrived, Counts, RunFinished, RunStarted
+from drivers.source import Arrival, Damaged, LinkDown, LinkUp, Lost, Rejected
+
+STARTED = RunStarted("part", "", "", "device", True)
+
+
+@pytest.fixture
+def alarms() -> Alarms:
+    alarms = Alarms(lambda: datetime(2026, 11, 22, 12, 0))
+    alarms(STARTED)
+    return alarms
+
+
+def arrive(alarms: Alarms, *arrivals: Arrival) -> None:
+    for arrival in arrivals:
+        alarms(Arrived(0.0, arrival))
+
+
+def test_thousands_of_damaged_frames_are_one_alarm_with_a_count(alarms: Alarms) -> None:
+    arrive(alarms, *[Damaged(10, "checksum")] * 1000, Lost(3, "gap"), Lost(4, "gap"), Rejected(2, "repeated"))
+    told = [(alarm.what, alarm.count, alarm.severity) for alarm in alarms.newest_first()]
+    assert told == [("Points rejected", 2, "warning"), ("Data lost", 7, "warning"), ("Damaged bytes", 10_000, "warning")]
+    assert not alarms.fault
+
+
+def test_lost_link_is_a_fault_until_it_is_back_and_seen(alarms: Alarms) -> None:
+    arrive(alarms, LinkDown("unplugged"))
+    assert alarms.fault
+    alarms.acknowledge()
+    assert alarms.fault, "seen, but still so"
+    arrive(alarms, LinkUp(1.0))
+    assert not alarms.fault
+    arrive(alarms, LinkDown("unplugged"))
+    assert alarms.fault
+    assert [(alarm.count, alarm.acknowledged) for alarm in alarms.newest_first()] == [(2, False)]
+
+
+def test_acknowledged_warning_stays_acknowledged_while_it_counts_on(alarms: Alarms) -> None:
+    arrive(alarms, Damaged(10, "checksum"))
+    assert alarms.acknowledge(1) == 1
+    arrive(alarms, Damaged(10, "checksum"))
+    assert alarms.newest_first()[0].acknowledged
+    alarms(STARTED)
+    arrive(alarms, Damaged(10, "checksum"))
+    assert [alarm.acknowledged for alarm in alarms.newest_first()] == [False, True]
+
+
+def test_run_that_ends_badly_raises_an_alarm(alarms: Alarms) -> None:
+    alarms(RunFinished("interrupted", None, Counts(), "COM3 is gone"))
+    alarms(RunFinished("complete", None, Counts(), "the points do not fit"))
+    assert [(alarm.what, alarm.detail) for alarm in alarms.newest_first()] == [
+        ("No part found", "the points do not fit"),
+        ("Device failed", "COM3 is gone"),
+    ]
+
+
+def test_list_of_alarms_does_not_grow_without_end(alarms: Alarms) -> None:
+    for k in range(1000):
+        alarms.raise_alarm("warning", "Data lost", f"gap {k}")
+    assert len(alarms.newest_first()) == 200
+    assert alarms.newest_first()[0].detail == "gap 999"
