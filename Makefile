@@ -1,7 +1,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test
+.PHONY: demo test bench
 demo: .venv/installed
 	$(BIN)/cmmlink demo --out demo-result
 
@@ -11,6 +11,10 @@ test: .venv/test-installed
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/pytest -n 2
+
+# Ours against the rivals of the package index, in one run; takes some minutes and wants a quiet machine.
+bench: .venv/bench-installed
+	$(BIN)/python -m tests.benchmarks.projection_benchmark --rivals --millions
 
 # One clear line for the two things newcomers meet: an old Python, and Debian's Python without its venv package.
 .venv/bin/python:
@@ -22,6 +26,10 @@ test: .venv/test-installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
 	@$(BIN)/python -m cmmlink.open3d_doctor
 	touch $@
+
+.venv/bench-installed: pyproject.toml | .venv/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test,bench]'
+	touch $@ .venv/installed .venv/test-installed
 
 .venv/test-installed: pyproject.toml | .venv/bin/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
