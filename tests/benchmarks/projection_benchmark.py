@@ -190,15 +190,22 @@ def engeom_way(curve: NurbsCurve, samples: Array) -> Distances:
 
 
 def opencascade_way(curve: NurbsCurve, samples: Array) -> Distances:
-    geom, api, gp, colgp, colstd = (importlib.import_module(f"OCP.{part}") for part in ("Geom", "GeomAPI", "gp", "TColgp", "TColStd"))
+    geom, api, gp, arrays = (importlib.import_module(f"OCP.{part}") for part in ("Geom", "GeomAPI", "gp", "collections"))
     values, counts = np.unique(curve.knots, return_counts=True)
     assert curve.weights is not None
-    poles = colgp.TColgp_Array1OfPnt(1, len(curve.control_points_mm))
-    weights = colstd.TColStd_Array1OfReal(1, len(curve.control_points_mm))
+    k = len(curve.control_points_mm)
+    poles, weights, knots, multiplicities = (
+        maker(1, n)
+        for maker, n in (
+            (arrays.Array1_gp_Pnt, k),
+            (arrays.Array1_double, k),
+            (arrays.Array1_double, len(values)),
+            (arrays.Array1_int, len(values)),
+        )
+    )
     for i, ((x, y), weight) in enumerate(zip(curve.control_points_mm.tolist(), curve.weights.tolist(), strict=True), 1):
         poles.SetValue(i, gp.gp_Pnt(x, y, 0.0))
         weights.SetValue(i, weight)
-    knots, multiplicities = colstd.TColStd_Array1OfReal(1, len(values)), colstd.TColStd_Array1OfInteger(1, len(values))
     for i, (value, count) in enumerate(zip(values.tolist(), counts.tolist(), strict=True), 1):
         knots.SetValue(i, value)
         multiplicities.SetValue(i, count)
