@@ -1,7 +1,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test soak
+.PHONY: demo test bench soak
 demo: .venv/installed
 	$(BIN)/cmmlink demo --out demo-result
 
@@ -16,6 +16,10 @@ test: .venv/test-installed
 soak: .venv/test-installed
 	$(BIN)/python -m tests.integration.killed soak 100
 
+# Ours against the rivals of the package index, in one run; takes some minutes and wants a quiet machine.
+bench: .venv/bench-installed
+	$(BIN)/python -m tests.benchmarks.projection_benchmark --rivals --millions
+
 # One clear line for the two things newcomers meet: an old Python, and Debian's Python without its venv package.
 .venv/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "cmmlink needs Python 3.11 or newer; this is $$($(PYTHON) -V). Try: make PYTHON=python3.12" >&2; exit 1; }
@@ -26,6 +30,10 @@ soak: .venv/test-installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
 	@$(BIN)/python -m cmmlink.open3d_doctor
 	touch $@
+
+.venv/bench-installed: pyproject.toml | .venv/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test,bench]'
+	touch $@ .venv/installed .venv/test-installed
 
 .venv/test-installed: pyproject.toml | .venv/bin/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'

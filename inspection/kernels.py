@@ -7,8 +7,8 @@ vectorised and scalar code. Nothing is compiled when this file is imported; `com
 
 import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from threading import Thread
 from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
@@ -25,8 +25,8 @@ Array = NDArray[np.float64]
 
 _BLOCK = 128  # points worked on together: their intermediate values stay in the first-level cache
 _QUEUE = _BLOCK * (MOST_BRANCHES + 1)  # a block is taken while fewer than a block's items wait
-_REALS = 35 * _BLOCK + _QUEUE
-_INTEGERS = 6 * _BLOCK + 3 * _QUEUE
+_REALS = 35 * _BLOCK + _QUEUE + 9
+_INTEGERS = 6 * _BLOCK + 3 * _QUEUE + 64
 _FINEST = 26  # halvings of a piece, after which an interval is a point
 _ACROSS = float(1 << BLOCK_LEVEL)
 _TRIES, _WALKED = 2, 4  # further steps on one piece; added to the tries once the neighbouring piece is tried
@@ -172,8 +172,18 @@ def _share(work: Callable[[int, int], None], m: int, threads: int | None) -> Non
         work(0, m)
         return
     chunk = _BLOCK * -(-m // (4 * threads * _BLOCK))  # four a thread, so that a thread that is held up delays the others little
-    with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(work, range(0, m, chunk), range(chunk, m + chunk, chunk)))
+    starts = iter(range(0, m, chunk))
+
+    def drain() -> None:
+        for start in starts:
+            work(start, start + chunk)
+
+    helpers = [Thread(target=drain) for _ in range(threads - 1)]  # this thread works too: a pool would cost as much as the work saves
+    for helper in helpers:
+        helper.start()
+    drain()
+    for helper in helpers:
+        helper.join()
 
 
 def compile_kernels() -> None:
@@ -205,7 +215,7 @@ def _project(points: Any, reals: Any, integers: Any, feet: Any, start: int, stop
     pieces, blocks, cells = reals[integers[3] :], integers[integers[9] :], integers[integers[10] :]
     w = carray(_stack_reals(), _REALS)
     q = carray(_stack_integers(), _INTEGERS)
-    best, stack = np.empty(9), np.empty(64, dtype=np.int64)
+    best, stack = w[_REALS - 9 :], q[_INTEGERS - 64 :]  # results of one point; nodes of the search tree
     waiting = 0
     block = start
     while block < stop or waiting > 0:

@@ -9,22 +9,24 @@ Rivals that are not installed are left out: pip install 'cmmlink[bench]'.
 """
 
 import argparse
+import importlib
 import importlib.util
 import os
 import platform
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from inspection import NurbsCurve, profile_error
+from inspection import NurbsCurve
 from inspection.foot_grid import FootGrid, build_foot_grid
 from inspection.kernels import compile_kernels, project, project_on_samples
 from inspection.nominal import NominalProfile, discretize
-from inspection.sample_table import build_sample_table
 from tests.inspection import profiles
+from tests.inspection import projections_reference as reference
 from tests.inspection.oracle import closest_point
 from tests.inspection.profiles import Array
 
@@ -84,18 +86,19 @@ def exact_way(grid: FootGrid, threads: int | None) -> Distances:
 
 
 def main_table(sizes: list[int], rounds: int) -> Iterator[str]:
-    yield "| profile | points | order | exact ns | two threads ns | gain | KD-tree ns | ratio | inversion ns | ratio | exact max / mean error mm |"
+    yield "| profile | points | order | exact ns | two threads | gain | KD-tree ns | ratio | inversion ns | ratio | max / mean error mm |"
     yield "|---|---|---|---|---|---|---|---|---|---|---|"
     for name, make in PROFILES.items():
         curve = make()
-        grid, nominal = build_foot_grid(curve), discretize(curve, samples=SAMPLES, step_min=1 / SAMPLES)
+        nominal = discretize(curve, samples=SAMPLES, step_min=1 / SAMPLES)
+        grid = nominal.grid
         inversion = point_inversion(nominal.tree, nominal)
         for count in sizes:
             for shuffled in (False, True):
                 points = measured_points(curve, count, np.random.default_rng(count), shuffled)
                 ways: dict[str, Callable[[Array], object]] = {
-                    "exact": lambda p, g=grid: project(p, g, 1),
-                    "two": lambda p, g=grid: project(p, g, 2),
+                    "exact": partial(project, grid=grid, threads=1),
+                    "two": partial(project, grid=grid, threads=2),
                     "tree": nominal.tree.query,
                     "inversion": inversion,
                 }
@@ -117,7 +120,9 @@ def growth_in_points(millions: bool) -> Iterator[str]:
     yield "|---|---|---|"
     for count in counts:
         points = measured_points(curve, count, np.random.default_rng(1), False)
-        ns = rounds_ns({"one": lambda p: project(p, grid, 1), "all": lambda p: project(p, grid)}, points, 5 if count > 2e6 else 15)
+        ns = rounds_ns(
+            {"one": partial(project, grid=grid, threads=1), "all": partial(project, grid=grid)}, points, 5 if count > 2e6 else 15
+        )
         yield f"| {count:,} | {ns['one']:.1f} | {ns['all']:.1f} |"
 
 
@@ -136,7 +141,7 @@ def growth_in_samples(rounds: int) -> Iterator[str]:
     yield "| samples | exact ns | KD-tree ns |"
     yield "|---|---|---|"
     for n in counts:
-        ns = rounds_ns({"exact": lambda p: project(p, grid, 1), "tree": trees[n].query}, points, rounds)
+        ns = rounds_ns({"exact": partial(project, grid=grid, threads=1), "tree": trees[n].query}, points, rounds)
         yield f"| {n:,} | {ns['exact']:.1f} | {ns['tree']:.0f} |"
 
 
@@ -147,7 +152,7 @@ def small_batches() -> Iterator[str]:
     yield "|---|---|"
     for count in (1, 8, 64, 512):
         points = measured_points(curve, count, np.random.default_rng(3), False)
-        ns = rounds_ns({"exact": lambda p: project(p, grid)}, points, 3000)["exact"]
+        ns = rounds_ns({"exact": partial(project, grid=grid)}, points, 3000)["exact"]
         yield f"| {count} | {ns * count / 1e3:.1f} |"
 
 
@@ -155,16 +160,16 @@ def methods_table(rounds: int) -> Iterator[str]:
     """The paper's methods, compiled, against their plain numpy versions."""
     curve = profiles.p3()
     nominal = discretize(curve, samples=SAMPLES, step_min=1 / SAMPLES)
-    grid, table = build_foot_grid(curve), build_sample_table(nominal)
+    grid = nominal.grid
     points = measured_points(curve, 20_000, np.random.default_rng(4), False)
-    plain = {"circle": profile_error.circle, "chord": profile_error.chord, "pcp": profile_error.pcp, "veaw": profile_error.veaw}
+    plain = {"circle": reference.circle, "chord": reference.chord, "pcp": reference.pcp, "veaw": reference.veaw}
     yield "| method | compiled ns | numpy ns | exact ns |"
     yield "|---|---|---|---|"
     for method, numpy_way in plain.items():
         ways: dict[str, Callable[[Array], object]] = {
-            "compiled": lambda p, way=method: project_on_samples(p, grid, table, way, 1),
-            "numpy": lambda p, way=numpy_way: way(p, nominal),
-            "exact": lambda p: project(p, grid, 1),
+            "compiled": partial(project_on_samples, grid=grid, table=nominal.samples, method=method, threads=1),
+            "numpy": partial(numpy_way, nominal=nominal),
+            "exact": partial(project, grid=grid, threads=1),
         }
         ns = rounds_ns(ways, points, rounds)
         yield f"| {method} | {ns['compiled']:.0f} | {ns['numpy']:.0f} | {ns['exact']:.1f} |"
@@ -174,45 +179,46 @@ def methods_table(rounds: int) -> Iterator[str]:
 
 
 def engeom_way(curve: NurbsCurve, samples: Array) -> Distances:
-    from engeom.geom2 import Curve2, Point2
-
-    polyline = Curve2(samples, tol=1e-9)
+    engeom = importlib.import_module("engeom.geom2")
+    polyline = engeom.Curve2(samples, tol=1e-9)
 
     def distances(points: Array) -> Array:
-        feet = [polyline.at_closest_to_point(Point2(x, y)).point for x, y in points.tolist()]
+        feet = [polyline.at_closest_to_point(engeom.Point2(x, y)).point for x, y in points.tolist()]
         return np.asarray(np.hypot(*(np.array([(foot.x, foot.y) for foot in feet]) - points).T))
 
     return distances
 
 
 def opencascade_way(curve: NurbsCurve, samples: Array) -> Distances:
-    from OCP.Geom import Geom_BSplineCurve
-    from OCP.GeomAPI import GeomAPI_ProjectPointOnCurve
-    from OCP.gp import gp_Pnt
-    from OCP.TColgp import TColgp_Array1OfPnt
-    from OCP.TColStd import TColStd_Array1OfInteger, TColStd_Array1OfReal
-
+    geom, api, gp, arrays = (importlib.import_module(f"OCP.{part}") for part in ("Geom", "GeomAPI", "gp", "collections"))
     values, counts = np.unique(curve.knots, return_counts=True)
     assert curve.weights is not None
-    poles = TColgp_Array1OfPnt(1, len(curve.control_points_mm))
-    weights = TColStd_Array1OfReal(1, len(curve.control_points_mm))
+    k = len(curve.control_points_mm)
+    poles, weights, knots, multiplicities = (
+        maker(1, n)
+        for maker, n in (
+            (arrays.Array1_gp_Pnt, k),
+            (arrays.Array1_double, k),
+            (arrays.Array1_double, len(values)),
+            (arrays.Array1_int, len(values)),
+        )
+    )
     for i, ((x, y), weight) in enumerate(zip(curve.control_points_mm.tolist(), curve.weights.tolist(), strict=True), 1):
-        poles.SetValue(i, gp_Pnt(x, y, 0.0))
+        poles.SetValue(i, gp.gp_Pnt(x, y, 0.0))
         weights.SetValue(i, weight)
-    knots, multiplicities = TColStd_Array1OfReal(1, len(values)), TColStd_Array1OfInteger(1, len(values))
     for i, (value, count) in enumerate(zip(values.tolist(), counts.tolist(), strict=True), 1):
         knots.SetValue(i, value)
         multiplicities.SetValue(i, count)
-    spline = Geom_BSplineCurve(poles, weights, knots, multiplicities, curve.degree)
+    spline = geom.Geom_BSplineCurve(poles, weights, knots, multiplicities, curve.degree)
     first, last = curve.domain
-    projector = GeomAPI_ProjectPointOnCurve()
+    projector = api.GeomAPI_ProjectPointOnCurve()
     projector.Init(spline, first, last)
     ends = curve.point(np.array([first, last]))
 
     def distances(points: Array) -> Array:
         found = np.min(np.hypot(*(points[:, None] - ends[None]).transpose(2, 0, 1)), axis=1)
         for i, (x, y) in enumerate(points.tolist()):
-            projector.Perform(gp_Pnt(x, y, 0.0))
+            projector.Perform(gp.gp_Pnt(x, y, 0.0))
             if projector.NbPoints():
                 found[i] = min(found[i], projector.LowerDistance())
         return np.asarray(found)
@@ -222,11 +228,10 @@ def opencascade_way(curve: NurbsCurve, samples: Array) -> Distances:
 
 def geomdl_way(curve: NurbsCurve, samples: Array) -> Distances:
     """geomdl has no projection of its own: its derivatives in the published Newton iteration, started at the nearest sample."""
-    from geomdl import NURBS
-
+    nurbs = importlib.import_module("geomdl.NURBS")
     assert curve.weights is not None
     first, last = curve.domain
-    spline = NURBS.Curve(normalize_kv=False)
+    spline = nurbs.Curve(normalize_kv=False)
     spline.degree = curve.degree
     spline.set_ctrlpts(np.column_stack([curve.control_points_mm * curve.weights[:, None], curve.weights]).tolist())
     spline.knotvector = curve.knots.tolist()
@@ -242,7 +247,7 @@ def geomdl_way(curve: NurbsCurve, samples: Array) -> Distances:
         return float(np.hypot(c[0] - x, c[1] - y))
 
     def distances(points: Array) -> Array:
-        start = first + (last - first) * tree.query(points)[1] / (len(samples) - 1)
+        start = first + (last - first) * np.asarray(tree.query(points)[1]) / (len(samples) - 1)
         return np.array([distance(x, y, u) for (x, y), u in zip(points.tolist(), start.tolist(), strict=True)])
 
     return distances
@@ -250,16 +255,15 @@ def geomdl_way(curve: NurbsCurve, samples: Array) -> Distances:
 
 def splipy_way(curve: NurbsCurve, samples: Array) -> Distances:
     """splipy: values and derivatives of all points at once in the published Newton iteration, started at the nearest sample."""
-    from splipy import BSplineBasis, Curve
-
+    splipy = importlib.import_module("splipy")
     assert curve.weights is not None
     first, last = curve.domain
     rational = np.column_stack([curve.control_points_mm * curve.weights[:, None], curve.weights])
-    spline = Curve(BSplineBasis(curve.degree + 1, curve.knots), rational, rational=True, raw=True)
+    spline = splipy.Curve(splipy.BSplineBasis(curve.degree + 1, curve.knots), rational, rational=True, raw=True)
     tree = cKDTree(samples)
 
     def distances(points: Array) -> Array:
-        u = first + (last - first) * tree.query(points)[1] / (len(samples) - 1)
+        u = first + (last - first) * np.asarray(tree.query(points)[1]) / (len(samples) - 1)
         for _ in range(3):
             v, c1, c2 = spline(u) - points, spline.derivative(u, 1), spline.derivative(u, 2)
             u = u - (c1 * v).sum(axis=1) / ((c1 * c1).sum(axis=1) + (c2 * v).sum(axis=1))
@@ -270,8 +274,7 @@ def splipy_way(curve: NurbsCurve, samples: Array) -> Distances:
 
 
 def libigl_way(curve: NurbsCurve, samples: Array) -> Distances:
-    import igl
-
+    igl = importlib.import_module("igl")
     vertices = np.column_stack([samples, np.zeros(len(samples))])
     edges = np.column_stack([np.arange(len(samples) - 1), np.arange(1, len(samples))])
 
@@ -283,8 +286,7 @@ def libigl_way(curve: NurbsCurve, samples: Array) -> Distances:
 
 
 def small_gicp_way(curve: NurbsCurve, samples: Array) -> Distances:
-    import small_gicp
-
+    small_gicp = importlib.import_module("small_gicp")
     tree = small_gicp.KdTree(np.column_stack([samples, np.zeros(len(samples))]))
 
     def distances(points: Array) -> Array:
@@ -294,13 +296,12 @@ def small_gicp_way(curve: NurbsCurve, samples: Array) -> Distances:
 
 
 def open3d_way(curve: NurbsCurve, samples: Array) -> Distances:
-    import open3d as o3d
-
-    reference = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(np.column_stack([samples, np.zeros(len(samples))])))
+    o3d = importlib.import_module("open3d")
+    cloud_of_samples = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(np.column_stack([samples, np.zeros(len(samples))])))
 
     def distances(points: Array) -> Array:
         cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(np.column_stack([points, np.zeros(len(points))])))
-        return np.asarray(cloud.compute_point_cloud_distance(reference))
+        return np.asarray(cloud.compute_point_cloud_distance(cloud_of_samples))
 
     return distances
 
