@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import LinkError
-from .source import Arrival, PointBatch, Rejected, ScanClosed, ScanSource, WireBytes
+from .errors import LinkError, ProtocolError
+from .source import Arrival, Damaged, LinkDown, LinkUp, PointBatch, Rejected, ScanClosed, ScanSource, WireBytes
 
 Vector = tuple[float, float, float]
 WAIT_S = 0.05
@@ -54,9 +54,14 @@ class ConstantFeed:
     def arrivals(self) -> Iterator[Arrival]:
         """Yield the sensor's arrivals with its points in machine coordinates."""
         start_s: float | None = None
+        last_s: float | None = None
         for arrival in self._sensor.arrivals():
             if isinstance(arrival, PointBatch):
                 start_s = float(arrival.time_s[0]) if start_s is None else start_s
+                times_s = arrival.time_s if last_s is None else np.append(last_s, arrival.time_s)
+                if np.any(np.diff(times_s) == 0):
+                    raise ProtocolError("the sensor's clock stands still: a constant feed needs one; follow a second device instead")
+                last_s = float(arrival.time_s[-1])
                 position_mm = (arrival.time_s - start_s) * self._speed_mm_s
                 points_mm = self._beam.points_mm(position_mm, arrival.points_mm[:, 2])
                 yield PointBatch(arrival.sequence, arrival.time_s, points_mm)
@@ -70,7 +75,8 @@ class FollowedAxis:
     Both are put on the clock of this computer: the last point of a batch at the arrival of its bytes, those before it
     by the device's own clock. The delay of the two links must differ by less than the position may be wrong divided
     by the speed. Positions are interpolated, never extrapolated: points before the first position are rejected,
-    points after the newest one wait for the next.
+    points after the newest one wait for the next. Of the axis only damage and link events are passed on: its bytes
+    and counts are not the sensor's.
     """
 
     def __init__(self, sensor: ScanSource, axis: ScanSource, beam: Beam) -> None:
@@ -87,7 +93,7 @@ class FollowedAxis:
         self._axis.stop()
 
     def arrivals(self) -> Iterator[Arrival]:
-        """Yield the sensor's arrivals with its points in machine coordinates, and the axis's bytes and damage."""
+        """Yield the sensor's arrivals with its points in machine coordinates, and what goes wrong with the axis."""
         inbox: queue.Queue[tuple[ScanSource, Arrival | Exception | None]] = queue.Queue(maxsize=10_000)
         threads = [threading.Thread(target=_deliver, args=(source, inbox), daemon=True) for source in (self._sensor, self._axis)]
         for thread in threads:
@@ -124,7 +130,7 @@ class FollowedAxis:
                 yield from self._left_over()
                 yield arrival
                 return
-            elif source is self._sensor or not isinstance(arrival, Rejected):
+            elif source is self._sensor or isinstance(arrival, Damaged | LinkDown | LinkUp):
                 yield arrival
 
     def _placed(self) -> Iterator[Arrival]:

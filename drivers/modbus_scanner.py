@@ -126,7 +126,7 @@ class ModbusScanner:
         client.close()  # type: ignore[no-untyped-call]
         if isinstance(client, ModbusSerialClient):  # over TCP a late answer dies with its connection
             self._stopped.wait(2 * self._timeout_s)
-        if not client.connect():
+        if not self._stopped.is_set() and not client.connect():
             raise LinkError(f"{self._address}: the link was lost and does not open again")
 
     def _opened(self) -> ModbusBaseSyncClient:

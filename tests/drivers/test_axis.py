@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from drivers.axis import Beam, ConstantFeed, FollowedAxis
-from drivers.errors import LinkError
-from drivers.source import Arrival, Lost, PointBatch, ScanClosed, WireBytes
+from drivers.errors import LinkError, ProtocolError
+from drivers.source import Arrival, Damaged, Lost, PointBatch, ScanClosed, WireBytes
 from tests.drivers.streams import account
 
 BEAM = Beam(origin_mm=(1.0, 2.0, 3.0), distance_direction=(0.0, -1.0, 0.0), axis_direction=(0.6, 0.0, 0.8))
@@ -41,6 +41,21 @@ def test_constant_feed() -> None:
     book = account(ConstantFeed(sensor, BEAM, speed_mm_s=10.0).arrivals())
     np.testing.assert_allclose(book.points_mm, [[1, -8, 3], [1 + 3, -9, 3 + 4], [1 + 9, -10, 3 + 12]])
     assert (book.sequence, book.lost, book.others) == ([0, 1, 3], 1, [ScanClosed(None)])
+
+
+def test_a_sensor_without_a_clock_cannot_be_placed_by_a_constant_feed() -> None:
+    sensor = Listed([batch(0, [0.0], [10.0], 2), batch(1, [0.0], [11.0], 2)])
+    with pytest.raises(ProtocolError, match="clock stands still"):
+        list(ConstantFeed(sensor, BEAM, speed_mm_s=10.0).arrivals())
+
+
+def test_what_the_axis_lost_is_not_what_the_sensor_lost() -> None:
+    axis: list[Arrival] = [WireBytes(100.0, b"axis"), Lost(7, "gap"), Damaged(3, "noise"), batch(0, [0.0], [0.0], 0)]
+    sensor: list[Arrival] = [WireBytes(100.0, b"sensor"), batch(0, [1.0], [1.0], 2), ScanClosed(1)]
+    source = FollowedAxis(Listed([]), Listed([]), BEAM)
+    book = account(merged(source, [*axis, *sensor], axis_arrivals=4))
+    assert dict(book.counts) == {("Damaged", "noise"): 3, ("WireBytes", ""): 6}
+    assert len(book.points_mm) == 1
 
 
 def test_a_direction_must_be_a_unit_vector() -> None:
