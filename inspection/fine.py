@@ -37,6 +37,7 @@ _TRUSTED = 1e-6  # least eigenvalue of the full second derivative, as a share of
 _LEAST_REACH_MM = 1e-9
 _NO_WEIGHTS = np.empty(0)
 _SCOUTS = 400  # points that rank coarse poses
+_CLOSE_RMS = 3.0  # poses whose rms is within this factor are told apart by all points only: few points and 80 % of them miss an edge
 _EQUAL_RMS = 1.1  # rivals whose rms is within this factor of the best fit as well
 _SAME_POSE = 0.01  # of the part's size: poses closer than this are one
 
@@ -49,15 +50,18 @@ def register(
     tip_radius_mm: float = 0.0,
     robust: bool = False,
 ) -> Registration:
-    """Coarse then fine registration of section points (m, 2): every coarse pose is refined on a few points, the best on all.
+    """Coarse then fine registration of section points (m, 2): every coarse pose is refined on a few points, those near the best on all.
 
     Poses of symmetric parts that fit equally well are reported as `rivals`. `robust` finds gross outliers first and leaves
     them out, see register_fine. Raises RegistrationError for too few points.
     """
     points = registrable(points_mm)
     ranked = ranked_poses(points, nominal, tip_radius_mm)
-    result = register_fine(points, nominal, ranked[0][1], method, scheme, tip_radius_mm, robust)
-    return replace(result, rivals=tuple(pose for rms, pose in ranked[1:] if rms <= _EQUAL_RMS * ranked[0][0]))
+    close = [pose for rms, pose in ranked if rms <= _CLOSE_RMS * ranked[0][0]]
+    refined = [register_fine(points, nominal, pose, method, scheme, tip_radius_mm, robust) for pose in close]
+    best = min(refined, key=lambda fit: fit.rms_mm)
+    others = _distinct([(fit.rms_mm, fit.nominal_from_section) for fit in refined], points)[1:]
+    return replace(best, rivals=tuple(pose for rms, pose in others if rms <= _EQUAL_RMS * best.rms_mm))
 
 
 def ranked_poses(points_mm: ArrayLike, nominal: NominalProfile, tip_radius_mm: float = 0.0) -> list[tuple[float, RigidTransform]]:
@@ -67,11 +71,15 @@ def ranked_poses(points_mm: ArrayLike, nominal: NominalProfile, tip_radius_mm: f
     """
     points = registrable(points_mm)
     few = points[:: max(1, len(points) // _SCOUTS)]
-    scouts = sorted((_scout(few, nominal, pose, tip_radius_mm) for pose in _promising(few, points, nominal)), key=lambda scout: scout[0])
+    return _distinct([_scout(few, nominal, pose, tip_radius_mm) for pose in _promising(few, points, nominal)], points)
+
+
+def _distinct(scored: list[tuple[float, RigidTransform]], points: Array) -> list[tuple[float, RigidTransform]]:
+    """Poses best first, without those that bring the points to the same place as a better one."""
     corners = np.array([points.min(axis=0), points.max(axis=0)])
     apart = _SAME_POSE * np.hypot(*np.ptp(points, axis=0))
     distinct: list[tuple[float, RigidTransform]] = []
-    for rms, pose in scouts:
+    for rms, pose in sorted(scored, key=lambda one: one[0]):
         if all(np.abs(pose.apply(corners) - other.apply(corners)).max() > apart for _, other in distinct):
             distinct.append((rms, pose))
     return distinct

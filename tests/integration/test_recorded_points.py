@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from cmmlink.parts import planned_inspection, planned_profile
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan import Datum, Plan, Registration, load_plan
 from drivers.source import Arrival, PointBatch, ScanClosed, ScanOpened
-from inspection import InspectionResult, NominalProfile
+from inspection import InspectionResult, NominalProfile, register
 from simulators.motion import Motion, walk
 
 COUNT = 1500
@@ -109,3 +110,13 @@ def test_batches_of_any_size_give_the_same_deviations_bit_for_bit(
         assert outcome.result is not None
         assert (outcome.counts.received, outcome.counts.judged, outcome.counts.rejected) == (COUNT, COUNT, 0)
         same(outcome.result, reference)
+
+
+@pytest.mark.parametrize("seed", [2, 4])
+def test_a_scan_cut_short_anywhere_is_registered_where_the_part_lies(profile: NominalProfile, seed: int) -> None:
+    """A third of the section slides along itself and still fits at all but a few points at the edge: those must count."""
+    scan = walk(part_path(profile.curve), replace(MOTION, defect_mm=0.0, seed=seed)).points_mm[:, :2]
+    for count in range(COUNT // 10, COUNT, COUNT // 40):
+        found = register(scan[:count], profile, tip_radius_mm=MOTION.tip_radius_mm)
+        assert found.rms_mm < MOTION.form_error_mm, count
+        assert np.degrees(found.nominal_from_section.rotation_rad) == pytest.approx(-MOTION.rotation_deg, abs=0.3), count

@@ -1,0 +1,175 @@
+"""What the project promises to itself: exported names, layout, walls, the README's example."""
+
+import ast
+import contextlib
+import io
+import re
+import subprocess
+import sys
+import tomllib
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+import cmmlink
+import inspection
+from cmmlink.plan import load_plan
+from tests.cmmlink.command import cmmlink as cmmlink_command
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGES = ("inspection", "drivers", "simulators", "cmmlink")
+SOURCES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
+TESTS = sorted((ROOT / "tests").rglob("*.py"))
+PROMISED_NAMES = [
+    "NurbsCurve",
+    "NominalProfile",
+    "Deviations",
+    "Registration",
+    "RigidTransform",
+    "ToleranceZone",
+    "Verdict",
+    "LiveInspection",
+    "discretize",
+    "deviations",
+    "register_coarse",
+    "register_fine",
+    "register",
+    "fit_minimum_zone",
+]
+GRAB_BAGS = {"utils", "util", "helpers", "helper", "common", "base", "manager", "types", "misc", "core"}
+LIBRARIES_IN_ONE_FILE = {"serial": {"drivers/serial_scanner.py"}, "numba": {"inspection/kernels.py"}}
+
+
+def tracked() -> list[Path]:
+    """Files that are kept, relative to the top; outside a checkout those that are there."""
+    with contextlib.suppress(OSError, subprocess.CalledProcessError):
+        listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+        return [Path(line) for line in listed.splitlines()]
+    return [path.relative_to(ROOT) for path in ROOT.rglob("*") if path.is_file() and ".venv" not in path.parts]
+
+
+def imported_by(path: Path) -> set[str]:
+    """Top-level names of the modules that a file imports anywhere in it."""
+    nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+    names = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+    names |= {node.module or "" for node in nodes if isinstance(node, ast.ImportFrom) and not node.level}
+    return {name.partition(".")[0] for name in names}
+
+
+def relative(path: Path) -> str:
+    return path.relative_to(ROOT).as_posix()
+
+
+def test_inspection_exports_what_is_promised() -> None:
+    assert set(PROMISED_NAMES) <= set(inspection.__all__)
+    assert all(callable(getattr(inspection, name)) for name in PROMISED_NAMES)
+
+
+def test_the_three_libraries_import_none_of_ours() -> None:
+    for package in ("inspection", "drivers", "simulators"):
+        others = set(PACKAGES) - {package}
+        assert {relative(path): found for path in sorted((ROOT / package).rglob("*.py")) if (found := imported_by(path) & others)} == {}
+
+
+def test_only_the_command_line_knows_simulators() -> None:
+    assert [relative(path) for path in SOURCES if path.parts[-2] != "simulators" and "simulators" in imported_by(path)] == [
+        "cmmlink/cli.py"
+    ]
+
+
+@pytest.mark.parametrize("library", LIBRARIES_IN_ONE_FILE)
+def test_a_hard_library_is_imported_in_its_own_file_only(library: str) -> None:
+    assert {relative(path) for path in SOURCES if library in imported_by(path)} <= LIBRARIES_IN_ONE_FILE[library]
+
+
+def test_libraries_never_print_and_never_exit() -> None:
+    for path in SOURCES:
+        if path.is_relative_to(ROOT / "inspection") or path.is_relative_to(ROOT / "drivers"):
+            names = {node.id for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, ast.Name)}
+            assert not names & {"print", "exit", "quit", "SystemExit"}, relative(path)
+
+
+def test_no_grab_bags() -> None:
+    assert [relative(path) for path in SOURCES + TESTS if path.stem in GRAB_BAGS or path.parent.name in GRAB_BAGS] == []
+
+
+def test_names_of_test_files_are_unique() -> None:
+    names = Counter(path.name for path in TESTS if path.name.startswith("test_"))
+    assert [name for name, count in names.items() if count > 1] == []
+
+
+def test_the_top_level_holds_what_the_layout_says_and_nothing_else() -> None:
+    top = {path.parts[0] for path in tracked() if not path.parts[0].startswith(".")}
+    assert top <= {"pyproject.toml", "README.md", "Makefile", "LICENSE", *PACKAGES, "tests"}
+    assert top >= {"pyproject.toml", "Makefile", "LICENSE", *PACKAGES, "tests"}
+
+
+# The letters that may stand beside ASCII: units and signs in messages, and the Greek of the maths.
+LETTERS = set("µ°±×²³·äöüÄÖÜßéèàπθφκαβγδεσω")
+
+
+def test_sources_are_ascii_but_for_signs_of_units_and_maths() -> None:
+    strange = {
+        relative(path): found
+        for path in SOURCES + TESTS
+        if (found := {c for c in path.read_text(encoding="utf-8") if ord(c) > 127} - LETTERS)
+    }
+    assert strange == {}
+
+
+def test_the_version_is_the_same_everywhere() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert project["version"] == cmmlink.__version__
+    assert project["scripts"] == {"cmmlink": "cmmlink.cli:main"}
+
+
+def test_every_library_that_is_imported_is_declared() -> None:
+    """A fresh installation has what is declared and nothing else."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    imports_of = {"PyYAML": "yaml", "pyserial": "serial", "open3d-cpu": "open3d", "libusb-package": "libusb_package"}
+    declared = {re.split(r"[<>=!~\[; ]", line, maxsplit=1)[0] for line in project["dependencies"]}
+    known = {imports_of.get(name, name) for name in declared} | set(sys.stdlib_module_names) | set(PACKAGES)
+    brought = {"pydantic_core": "pydantic", "llvmlite": "numba"}  # which these cannot do without
+    undeclared = {
+        relative(path): found
+        for path in SOURCES
+        if (found := {name for name in imported_by(path) if name and brought.get(name, name) not in known})
+    }
+    assert undeclared == {}
+
+
+def examples(language: str) -> list[str]:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    return re.findall(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+
+
+def test_the_readme_has_examples_of_every_kind() -> None:
+    assert all(examples(language) for language in ("python", "yaml", "sh"))
+
+
+@pytest.mark.parametrize("example", examples("yaml"))
+def test_the_plans_of_the_readme_can_be_read(example: str, tmp_path: Path) -> None:
+    plan = tmp_path / "plan.yaml"
+    plan.write_text(example, encoding="utf-8")
+    assert load_plan(plan).part.name
+
+
+def test_the_readme_calls_commands_that_exist_with_options_they_have() -> None:
+    calls = re.findall(r"\bcmmlink ([a-z]+) ?([^`#\n]*)", "".join(examples("sh")))
+    assert {"run", "inspect"} <= {command for command, _ in calls}
+    for command, arguments in calls:
+        described = cmmlink_command(command, "--help")
+        assert described.code == 0, command
+        assert [option for option in re.findall(r"--[a-z-]+", arguments) if option not in described.out] == [], command
+
+
+@pytest.mark.parametrize("example", examples("python"))
+def test_the_examples_of_the_readme_print_what_they_say(example: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a block prints stands in it as comments: behind `print(...)`, or in lines of their own after it."""
+    monkeypatch.chdir(ROOT)
+    out = io.StringIO()
+    with contextlib.redirect_stdout(out):
+        exec(compile(example, "README.md", "exec"), {"__name__": "readme"})
+    said = [line.partition("# ")[2].strip() for line in example.splitlines() if "print(" in line or line.startswith("# ")]
+    assert [line.strip() for line in out.getvalue().splitlines()] == [line for line in said if line]
