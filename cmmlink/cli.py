@@ -731,7 +731,7 @@ def _inspect_surface(file: Path, stop: threading.Event, on_start: Callable[[int]
     )
     if plan.out is not None:
         write_stack(plan.out, stack, plan.tolerance.zone, plan.part.name, pictures=False)
-    told = [f"{WORDS[stack.verdict]}: {len(stack.sections)} sections of {stack.mesh.source}", *stack.notes]
+    told = [f"{WORDS[stack.verdict]}: {len(stack.sections)} sections of {plan.mesh.file.name}", *stack.notes]
     return ". ".join([*told, *([f"Results in {plan.out}"] if plan.out is not None else [])])
 
 

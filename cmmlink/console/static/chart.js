@@ -1,6 +1,6 @@
 // Run chart: the worst deviation of the last parts (or of a surface's sections), with their own limits; the verdict by shape.
 
-import { INK, Sheet, mark, niceStep, signed } from "./sheet.js";
+import { INK, Sheet, mark, signed } from "./sheet.js";
 
 const FEWEST = 20;
 
@@ -81,7 +81,7 @@ export class Chart {
 
   serials(pen, px, bottom) {
     const { sheet, runs } = this;
-    const every = niceStep(this.places, (px(this.places - 1) - px(0)) / (sheet.text * 6));
+    const every = Math.ceil((sheet.text * 6) / (px(1) - px(0)));
     pen.fillStyle = INK.soft;
     pen.textAlign = "center";
     pen.textBaseline = "top";

@@ -100,7 +100,10 @@ export function niceStep(span, count) {
   return power * (share > 5 ? 10 : share > 2 ? 5 : share > 1 ? 2 : 1);
 }
 
-export const signed = (value, digits = 4) => (value >= 0 ? "+" : "\u2212") + Math.abs(value).toFixed(digits);
+export function signed(value, digits = 4) {
+  const words = Math.abs(value).toFixed(digits);
+  return (Number(words) === 0 ? "" : value > 0 ? "+" : "\u2212") + words;
+}
 
 // Enough digits to tell limits and deviations of this size apart.
 export const digitsFor = (zone) => (zone.upper_mm - zone.lower_mm < 0.02 ? 5 : 4);
