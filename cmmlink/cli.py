@@ -528,7 +528,7 @@ def inspect(
     material: Annotated[Side | None, typer.Option(help="Side of the material, seen along the nominal.")] = None,
     coverage_min: Annotated[
         float, typer.Option(min=0, max=1, metavar="SHARE", help="Share of the nominal to be measured before conform is proven.")
-    ] = 0.0,
+    ] = 0.95,
     out: Out = None,
     as_json: Json = False,
 ) -> int:

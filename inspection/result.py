@@ -15,7 +15,8 @@ Array = NDArray[np.float64]
 
 NOT_JUDGED = -1  # in place of a verdict where a point was rejected, or is not judged yet
 _GAP = 3.0  # a gap of more than this many median spacings is not measured
-_FINEST_GAP = 0.005  # share of the length; gaps below it always count as measured
+_FINEST_GAP = 0.02  # share of the length; gaps below it always count as measured
+_WIDEST_GAP = 0.1  # share of the length; gaps above it never do, however few the points
 
 
 class Rejection(IntEnum):
@@ -142,14 +143,14 @@ def rejections_by_reason(rejection: NDArray[np.int8]) -> dict[str, int]:
 def coverage(station_mm: Array, nominal: NominalProfile) -> float:
     """Share of the nominal's length that judged points at these stations (j,) cover.
 
-    The stretch between neighbours is measured as far as it is no longer than three median spacings (or 0.5 % of the length).
+    The stretch between neighbours is measured as far as it is no longer than three median spacings: at least 2 % of the length counts, at most 10 %.
     """
     if not len(station_mm):
         return 0.0
     length = nominal.length_mm
     s = np.sort(station_mm)
     gaps = np.diff(np.append(s, s[0] + length)) if nominal.curve.closed else np.diff(np.concatenate([[0.0], s, [length]]))
-    limit = max(_GAP * float(np.median(gaps)), _FINEST_GAP * length)
+    limit = float(np.clip(_GAP * np.median(gaps), _FINEST_GAP * length, _WIDEST_GAP * length))
     return float(np.where(gaps <= limit, gaps, 0.0).sum() / length)
 
 
