@@ -6,6 +6,8 @@
 import itertools
 import json
 import math
+import os
+import platform
 import re
 import signal
 import subprocess
@@ -42,6 +44,7 @@ from cmmlink.errors import PlanError, RunError, StoreError
 from cmmlink.events import RunStarted, Sink
 from cmmlink.export import export_run
 from cmmlink.nominal_files import NominalFile, load_nominal, material_side
+from cmmlink.open3d_doctor import look_after_open3d
 from cmmlink.parts import planned_inspection, planned_profile, profile_of
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan import Device, FileDevice, ModbusDevice, Plan, SerialDevice, load_plan, place_of
@@ -742,6 +745,21 @@ def _section(plan: CtPlan, outcome: SectionOutcome, plan_name: str) -> Section:
     started = RunStarted(plan.part.name, plan.part.serial_number or "", "", plan.mesh.file.name, simulated=False)
     ended = Ended(run.ending, str(run.refusal or ""), outcome.facts(), run.result)
     return Section(height_mm, facts, started, ended, outcome.warnings)
+
+
+@app.command()
+def doctor() -> int:
+    """Look at what cmmlink needs of this computer, and mend or name what is missing."""
+    typer.echo(f"cmmlink {__version__} on Python {platform.python_version()}, {platform.system()} {platform.machine()}")
+    _rehearsed(planned_profile(load_plan(demo_plan_file())))
+    typer.echo("inspection: compiled and working")
+    folder = default_folder()
+    nearest = next(path for path in (folder, *folder.parents) if path.exists())
+    writable = os.access(nearest, os.W_OK)
+    typer.echo(f"records: {folder}" + ("" if writable else f" cannot be written: choose another folder with --records ({nearest})"))
+    typer.echo(f"serial ports: {', '.join(name for name, _ in ports()) or 'none found'}")
+    whole = look_after_open3d(typer.echo)
+    return 0 if whole and writable else _UNUSABLE
 
 
 @app.command("ports")

@@ -2,6 +2,9 @@
 
 from collections.abc import Sequence
 
+import pytest
+
+from cmmlink import cli
 from cmmlink.open3d_doctor import look_after_open3d
 from drivers.open3d_process import Open3DStatus
 
@@ -38,3 +41,15 @@ def test_without_root_the_exact_command_is_said() -> None:
 
 def _never(command: Sequence[str]) -> int:
     raise AssertionError(f"nothing is to be run, yet {command} was")
+
+
+def test_the_command_says_what_was_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    said: list[str] = []
+    monkeypatch.setattr(cli.typer, "echo", said.append)
+    monkeypatch.setattr(cli, "look_after_open3d", lambda say: say("Open3D: looked at") is None)
+    assert cli.doctor() == 0
+    assert said[0].startswith("cmmlink ")
+    assert said[1:2] == ["inspection: compiled and working"]
+    assert said[-1] == "Open3D: looked at"
+    monkeypatch.setattr(cli, "look_after_open3d", lambda _: False)
+    assert cli.doctor() == 2
