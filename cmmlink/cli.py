@@ -22,7 +22,7 @@ from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from platformdirs import user_data_path
@@ -33,7 +33,6 @@ from cmmlink.console.ct_import import Section
 from cmmlink.console.launch import CONSOLE_PORT, graphical_browser, kept_token, served, stay_while_seen
 from cmmlink.console.past_runs import PastRuns
 from cmmlink.console.run_view import Ended, RunFacts
-from cmmlink.console.server import ConsoleServer
 from cmmlink.console.station import Connected, Means, Refused
 from cmmlink.ct import SectionOutcome, inspect_stack
 from cmmlink.ct_command import ManyHeights, SectionBar, own_nominals, plan_from, print_stack
@@ -63,6 +62,9 @@ from drivers.point_file import PointFileSource
 from drivers.serial_scanner import SerialScanner, ports
 from drivers.source import Decoder, ScanSource
 from inspection import InspectionError, LiveInspection, NominalProfile, ToleranceZone, Verdict, rehearse
+
+if TYPE_CHECKING:
+    from cmmlink.console.server import ConsoleServer
 
 app = typer.Typer(
     add_completion=False,
@@ -368,7 +370,7 @@ def _past_runs(folder: Path | None) -> PastRuns:
     return PastRuns(folder or default_folder(), decoder_of, time.monotonic, _today)
 
 
-def _show(server: ConsoleServer, no_browser: bool) -> None:
+def _show(server: "ConsoleServer", no_browser: bool) -> None:
     """Say where the page is, and open it."""
     sys.stderr.write(f"console: {server.address}\n")
     if server.remote:

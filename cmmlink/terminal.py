@@ -111,7 +111,8 @@ class LiveTable:
         if math.isnan(self._worst):
             return "not yet"
         verdict = self._zone.verdict(self._worst)
-        return f"[{STYLES[verdict]}]{WORDS[verdict]}[/] so far"
+        provisional = "" if self._update is not None and self._update.state == "settled" else ", provisional"
+        return f"[{STYLES[verdict]}]{WORDS[verdict]}[/] so far{provisional}"
 
 
 def print_summary(console: Console, result: InspectionResult | None, counts: Counts, heading: str) -> None:

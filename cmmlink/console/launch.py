@@ -7,10 +7,13 @@ import webbrowser
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from cmmlink.console.server import ConsoleServer
 from cmmlink.console.station import Means, Station
 from cmmlink.errors import PlanError
+
+if TYPE_CHECKING:
+    from cmmlink.console.server import ConsoleServer
 
 CONSOLE_PORT = 8207
 _TEXT_BROWSERS = ("www-browser", "links", "elinks", "lynx", "w3m")
@@ -19,8 +22,10 @@ _GONE_S = 5.0  # a page that is loaded anew is away for a moment only
 
 
 @contextmanager
-def served(means: Means, version: str, host: str = "127.0.0.1", port: int = 0, token: str | None = None) -> Iterator[ConsoleServer]:
+def served(means: Means, version: str, host: str = "127.0.0.1", port: int = 0, token: str | None = None) -> Iterator["ConsoleServer"]:
     """Serve a station's page. Raises PlanError where the address cannot be had."""
+    from cmmlink.console.server import ConsoleServer  # noqa: PLC0415 - the web server takes a while that only a page need pay
+
     station = Station(means)
     try:
         server = ConsoleServer(station, version, host, port, token)
@@ -67,7 +72,7 @@ def graphical_browser() -> webbrowser.BaseBrowser | None:
     return None if getattr(browser, "name", "") in _TEXT_BROWSERS else browser
 
 
-def stay_while_seen(server: ConsoleServer, ended: threading.Event) -> None:
+def stay_while_seen(server: "ConsoleServer", ended: threading.Event) -> None:
     """Return when the last page has been closed and nothing is measured any more, or when told."""
     unseen_s = 0.0
     while unseen_s < _GONE_S and not ended.wait(_LOOK_S):

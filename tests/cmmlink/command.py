@@ -3,8 +3,10 @@
 import io
 import json
 import sys
+import tempfile
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
@@ -40,9 +42,15 @@ class Ended:
 
 
 def cmmlink(*arguments: object) -> Ended:
-    """Run one command to its end."""
+    """Run one command to its end, with a folder of its own in place of the user's records."""
     words = ["cmmlink", *map(str, arguments)]
-    with patch.object(sys, "argv", words), redirect_stdout(io.StringIO()) as out, redirect_stderr(io.StringIO()) as err:
+    with (
+        tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as records,
+        patch("cmmlink.cli.default_folder", lambda: Path(records)),
+        patch.object(sys, "argv", words),
+        redirect_stdout(io.StringIO()) as out,
+        redirect_stderr(io.StringIO()) as err,
+    ):
         try:
             main()
         except SystemExit as ended:

@@ -22,11 +22,15 @@ POINTS = 4000
 POSIX = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals and signals to a group exist on POSIX systems only")
 
 
+def kept_in(folder: Path) -> list[str]:
+    return ["--out", str(folder), "--records", str(folder / "records")]
+
+
 class Demonstration:
     """The demonstration running without a terminal."""
 
     def __init__(self, folder: Path, *options: str) -> None:
-        command = [sys.executable, "-m", "cmmlink", "demo", "--headless", "--json", "--out", str(folder), *options]
+        command = [sys.executable, "-m", "cmmlink", "demo", "--headless", "--json", *kept_in(folder), *options]
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT)
 
     def ended(self) -> tuple[int, dict[str, Any]]:
@@ -176,7 +180,7 @@ def partial(folder: Path, at_least: int) -> dict[str, Any]:
 
 @POSIX
 def test_a_killed_device_ends_the_run_with_a_message_and_what_was_received(tmp_path: Path) -> None:
-    with terminal("demo", "--out", str(tmp_path)) as screen:
+    with terminal("demo", *kept_in(tmp_path)) as screen:
         screen.until_received(1000)
         os.kill(child_of(screen.process.pid), signal.SIGKILL)
         assert screen.to_the_end() == 4
@@ -189,7 +193,7 @@ def test_a_killed_device_ends_the_run_with_a_message_and_what_was_received(tmp_p
 
 @POSIX
 def test_ctrl_c_ends_the_run_with_a_message_and_what_was_received(tmp_path: Path) -> None:
-    with terminal("demo", "--out", str(tmp_path)) as screen:
+    with terminal("demo", *kept_in(tmp_path)) as screen:
         screen.until_received(1000)
         os.killpg(screen.process.pid, signal.SIGINT)  # as a terminal does: to the run and all in its group
         assert screen.to_the_end() == 3
@@ -200,10 +204,10 @@ def test_ctrl_c_ends_the_run_with_a_message_and_what_was_received(tmp_path: Path
 
 @POSIX
 def test_the_live_table_shows_the_run_and_leaves_the_summary(tmp_path: Path) -> None:
-    with terminal("demo", "--defect", "0.12@40", "--out", str(tmp_path)) as screen:
+    with terminal("demo", "--defect", "0.12@40", *kept_in(tmp_path)) as screen:
         assert screen.to_the_end() == 1
     table, _, summary = screen.screen.rpartition("CONFORM")
-    for words in ("registration", "provisional, can move", "points/s", "SIMULATED", "so far", "/4000", "worst"):
+    for words in ("registration", "provisional, can move", "points/s", "SIMULATED", "so far, provisional", "/4000", "worst"):
         assert words in table, words
     assert "received 4000 = judged 4000 + rejected 0; lost 0 points" in summary
     assert "\x1b[?25h" in screen.screen.rpartition("\x1b[?25l")[2]  # the cursor is shown again
