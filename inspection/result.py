@@ -143,7 +143,8 @@ def rejections_by_reason(rejection: NDArray[np.int8]) -> dict[str, int]:
 def coverage(station_mm: Array, nominal: NominalProfile) -> float:
     """Share of the nominal's length that judged points at these stations (j,) cover.
 
-    The stretch between neighbours is measured as far as it is no longer than three median spacings: at least 2 % of the length counts, at most 10 %.
+    The stretch between neighbours is measured as far as it is no longer than three median spacings, 2 % of the length at
+    least and 10 % at most.
     """
     if not len(station_mm):
         return 0.0
