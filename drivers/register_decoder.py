@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import DeviceRefused, ProtocolError
-from .register_map import MOST_REGISTERS, Block, RegisterMap, columns, equals_pattern
+from .register_map import MOST_REGISTERS, Block, Columns, RegisterMap, columns, equals_pattern
 from .sequence import SequenceCounter, WrappingClock
 from .source import Arrival, Damaged, Heartbeat, Lost, PointBatch, Rejected, ScanClosed, ScanOpened
 
@@ -47,7 +47,7 @@ class RegisterDecoder:
         self._read = 0
         self._written = 0
         self._finished = self._closed = self._ran = False
-        self._backward = 0
+        self._backward = self._rereads = 0
         self._sent: int | None = None
         self._step = "status" if self._map.status else ("pop" if self._map.pop else "points")
         self._popped: dict[str, NDArray[np.generic]] = {}
@@ -200,14 +200,25 @@ class RegisterDecoder:
         if pattern == "latest" and "sequence" in values and not self._is_new(int(values["sequence"][0])):
             self._turn_ends()
             return
-        if pattern == "ring":
-            self._read += len(read.sound)
         damaged = int((~read.sound).sum())
+        if pattern == "ring":
+            taken = self._worth_taking(read.sound)
+            self._read += taken
+            read = Columns({name: column[:taken] for name, column in read.values.items()}, read.sound[:taken])
+            values = read.values
         if damaged:
             self._out.append(Damaged(2 * block.size * damaged, "point with a wrong checksum"))
-        self._points({name: column[read.sound] for name, column in values.items()}, len(read.sound) - damaged)
+        self._points({name: column[read.sound] for name, column in values.items()}, int(read.sound.sum()))
         self.idle = pattern == "latest"
         self._step = "points" if pattern == "ring" and self._read < self._written else self._next_turn()
+
+    def _worth_taking(self, sound: NDArray[np.bool_]) -> int:
+        """Return how many points of a ring to take: up to a damaged one, which is read again, but not for ever."""
+        self._rereads = 0 if sound.all() else self._rereads + 1
+        if 0 < self._rereads < PATIENCE:
+            return int(sound.argmin())
+        self._rereads = 0
+        return len(sound)
 
     def _next_turn(self) -> str:
         if self._map.pop:

@@ -125,7 +125,20 @@ def test_the_end_of_the_scan_and_a_lost_tail() -> None:
     book = account(turns(decoder, ring) + turns(decoder, ring))
     assert book.others == [ScanOpened("generic ring", "", 1000), ScanClosed(20)]
     assert (len(book.sequence), book.lost) == (19, 1)
-    assert book.counts["Damaged", "point with a wrong checksum"] == 22
+    assert book.counts["Damaged", "point with a wrong checksum"] == 3 * 22  # read again twice
+
+
+def test_a_point_damaged_on_the_way_is_read_again_and_not_lost() -> None:
+    ring, decoder = Ring(), RegisterDecoder(RING)
+    ring.write(20)
+    decoder.feed(ring.answer(decoder.request()))
+    answer = bytearray(ring.answer(decoder.request()))
+    answer[7 + 22 * 4 + 6] ^= 0x10
+    arrivals = decoder.feed(bytes(answer))
+    assert account(arrivals).sequence == [0, 1, 2, 3]
+    book = account(arrivals + turns(decoder, ring))
+    assert (book.sequence, book.lost) == (list(range(20)), 0)
+    assert book.counts == {("Damaged", "point with a wrong checksum"): 22}
 
 
 def test_an_overrun_ring_loses_and_counts_what_was_overrun() -> None:
