@@ -1,5 +1,7 @@
 """Options that point the tests of devices at hardware."""
 
+from pathlib import Path
+
 import pytest
 
 
@@ -12,3 +14,10 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--points", type=int, default=100, help="points to read (default 100)")
     group.addoption("--baud-rate", type=int, default=115_200)
     group.addoption("--parity", default="N", choices=["N", "E", "O"])
+
+
+@pytest.fixture(autouse=True)
+def _records_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Keep the records of tests that name no folder out of the user's own, and every test's apart."""
+    for name in ("XDG_DATA_HOME", "WIN_PD_OVERRIDE_LOCAL_APPDATA"):
+        monkeypatch.setenv(name, str(tmp_path / "user-data"))
