@@ -1,5 +1,7 @@
 """Options that point the tests of devices at hardware, and those of the console at a browser."""
 
+from pathlib import Path
+
 import pytest
 
 
@@ -15,3 +17,10 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup("browser", "tests/console in Chromium")
     group.addoption("--require-browser", action="store_true", help="fail where the tests in a browser would be skipped")
     group.addoption("--screenshots", metavar="DIR", help="keep pictures of the console's pages in this folder")
+
+
+@pytest.fixture(autouse=True)
+def _records_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Keep the records of tests that name no folder out of the user's own, and every test's apart."""
+    for name in ("XDG_DATA_HOME", "WIN_PD_OVERRIDE_LOCAL_APPDATA"):
+        monkeypatch.setenv(name, str(tmp_path / "user-data"))

@@ -17,6 +17,7 @@ import pytest
 
 from cmmlink.demo import plan_file
 from cmmlink.errors import StoreError
+from cmmlink.records import default_folder
 from drivers.source import WireBytes
 from tests.cmmlink.command import cmmlink
 from tests.cmmlink.recorded import Script, record, scan_arrivals
@@ -179,3 +180,11 @@ def test_records_on_a_write_protected_medium_can_be_read(tmp_path: Path, monkeyp
     assert {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == before
     with pytest.raises(StoreError, match="--records DIR"):
         record(tmp_path, Script(*scan_arrivals(count=120)))
+
+
+def test_runs_are_kept_in_the_users_data_folder_unless_told_otherwise(station: Station, tmp_path: Path) -> None:
+    plan = tmp_path / "plan.yaml"
+    points = (station.plan.parent / "points.npy").as_posix()
+    plan.write_text(station.plan.read_text().replace("records: kept\n", "").replace("points.npy", f"'{points}'"))
+    assert told("run", plan, "--headless")["run"] == told("runs")["runs"][0]["run"]
+    assert default_folder().is_relative_to(tmp_path)
