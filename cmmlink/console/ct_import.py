@@ -28,7 +28,7 @@ InspectSurface = Callable[[Path, threading.Event, Callable[[int], None], Callabl
 
 
 class CtImport:
-    """The import that goes on, or the last one."""
+    """The import that goes on, or the last one; `version` rises with every change."""
 
     def __init__(self, clock: Callable[[], float]) -> None:
         self._clock = clock
@@ -36,24 +36,28 @@ class CtImport:
         self.plan = self._message = ""
         self.state: Literal["none", "reading", "inspecting", "done", "failed"] = "none"
         self.sections: list[Section] = []
-        self._total = 0
+        self._total = self.version = 0
 
     def begin(self, plan: str) -> None:
         """A new import begins: the surface is read."""
         self.plan, self.state, self._message, self._total = plan, "reading", "", 0
         self.sections = []
+        self.version += 1
 
     def expect(self, sections: int) -> None:
         """So many sections will come."""
         self._total, self.state, self._began_s = sections, "inspecting", self._clock()
+        self.version += 1
 
     def add(self, section: Section) -> None:
         """One more section was judged."""
         self.sections.append(section)
+        self.version += 1
 
     def end(self, message: str, failed: bool = False) -> None:
         """The import is over."""
         self._message, self.state = message, "failed" if failed else "done"
+        self.version += 1
 
     def described(self) -> dict[str, Any]:
         """Everything in numbers and words, ready for JSON."""

@@ -292,13 +292,13 @@ class ConsoleServer:
         told = {
             "control": control,
             "station": station.state(),
-            "ct": station.ct.described(),
             "alarms": {"fault": station.alarms.fault, "alarms": [_alarm_words(alarm) for alarm in station.alarms.newest_first()[:50]]},
             "run": {"run": view.state() if view else None, "recorded": page.opened is not None},
         }
-        if page.sent.get("history version") != str(station.history_version):
-            page.sent["history version"] = str(station.history_version)
+        if _anew(page, "history version", station.history_version):
             told["history"] = {"runs": [_row(past) for past in station.history[:_MOST_HISTORY]]}
+        if _anew(page, "ct version", station.ct.version):
+            told["ct"] = station.ct.described()
         return told
 
     async def _show_points(self, page: _Page) -> None:
@@ -382,6 +382,12 @@ async def _send(page: _Page, message: str | bytes) -> None:
     async with page.sending:
         sent: Awaitable[None] = page.socket.send_text(message) if isinstance(message, str) else page.socket.send_bytes(message)
         await sent
+
+
+def _anew(page: _Page, what: str, version: int) -> bool:
+    """Whether the page was not told this version yet; from now on it was."""
+    before, page.sent[what] = page.sent.get(what), str(version)
+    return before != str(version)
 
 
 def _parsed(text: str) -> dict[str, Any]:

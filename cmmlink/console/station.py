@@ -4,6 +4,7 @@ It knows no page and no device. Commands come in from any thread and return at o
 `Refused` is the answer to a command that cannot be carried out; its message is for the operator.
 """
 
+import math
 import re
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -31,7 +32,8 @@ Found = TypeVar("Found")
 _LONGEST_NAME = 120
 _TEST_S = 5.0
 _TEST_POINTS = 200
-_MOST_PLAN_BYTES = 200_000
+_MOST_PLAN_BYTES = 50_000
+_LIST_EVERY_S = 1.0
 
 
 class Refused(Exception):  # noqa: N818 - it is the answer, not a failure
@@ -129,6 +131,8 @@ class Station:
         self._thread: threading.Thread | None = None
         self._number = 0
         self._history: tuple[PastRun, ...] = ()
+        self._listed: dict[str, list[str]] = {}
+        self._listed_s = -math.inf
         self._read_history()
 
     # What is so.
@@ -148,8 +152,7 @@ class Station:
         with self._lock:
             work, choice = self._work, self._work.choice
             return {
-                "plans": sorted(self._means.plans()),
-                "ct_plans": sorted(self._means.ct_plans()) if self._means.inspect_surface else [],
+                **self._listed_plans(),
                 "choice": None if choice is None else _described(choice),
                 "serial_number": work.serial_number,
                 "operator": work.operator,
@@ -309,6 +312,14 @@ class Station:
         return not self.running
 
     # How it is done.
+
+    def _listed_plans(self) -> dict[str, list[str]]:
+        """Names of all plans, looked up now and then: pages ask many times a second."""
+        now_s = self._means.clock()
+        if now_s - self._listed_s > _LIST_EVERY_S:
+            surfaces = self._means.ct_plans() if self._means.inspect_surface else {}
+            self._listed, self._listed_s = {"plans": sorted(self._means.plans()), "ct_plans": sorted(surfaces)}, now_s
+        return self._listed
 
     def _refuse_while_running(self, what: str) -> None:
         if self.running:
