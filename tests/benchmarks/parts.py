@@ -3,9 +3,7 @@
 The true best pose is found with the tests' closest point, which shares no code with the inspection.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -59,9 +57,15 @@ def nominal(curve: NurbsCurve) -> NominalProfile:
     return discretize(curve, samples=SAMPLES, step_min=1 / SAMPLES)
 
 
-def cross_section(profile: NominalProfile, station_mm: Array, pose: RigidTransform, rng: np.random.Generator) -> SyntheticScan:
+def cross_section(
+    profile: NominalProfile,
+    station_mm: Array,
+    pose: RigidTransform,
+    rng: np.random.Generator,
+    form_mm: tuple[tuple[float, tuple[int, ...]], ...] = FORM_MM,
+) -> SyntheticScan:
     """A section of a part with waves of 20 and 10 um around it and correlated noise of 6.5 um, seen in that pose."""
-    form = sum((form_error_mm(station_mm, profile.length_mm, rng, size, waves) for size, waves in FORM_MM), np.zeros(len(station_mm)))
+    form = sum((form_error_mm(station_mm, profile.length_mm, rng, size, waves) for size, waves in form_mm), np.zeros(len(station_mm)))
     return scan(profile, station_mm, form + _noise(len(station_mm), profile, rng), pose)
 
 
@@ -86,7 +90,9 @@ def best_place(curve: NurbsCurve, placed_mm: Array) -> tuple[Array, float]:
         closest = closest_point(curve, place)
         e, used = closest.left_mm, ~closest.beyond_end
         off = np.abs(e) > 1e-6
-        gradient = np.where(off[:, None], (place - closest.foot_mm) / np.where(off, e, 1.0)[:, None], profiles.left_normal(curve, closest.parameter))
+        gradient = np.where(
+            off[:, None], (place - closest.foot_mm) / np.where(off, e, 1.0)[:, None], profiles.left_normal(curve, closest.parameter)
+        )
         centre = place.mean(axis=0)
         arm = place - centre
         J = np.column_stack([gradient, arm[:, 0] * gradient[:, 1] - arm[:, 1] * gradient[:, 0]])[used]
