@@ -125,11 +125,14 @@ def airfoil_points(name: str, chord_mm: float) -> Array:
 
 
 def airfoil(name: str, chord_mm: float = 100.0) -> NurbsCurve:
+    return through_airfoil(airfoil_points(name, chord_mm), chord_mm)
+
+
+def through_airfoil(points: Array, chord_mm: float) -> NurbsCurve:
     """Cubic centripetal interpolation from trailing edge over the nose to trailing edge, open.
 
     MH 42 ends in one point; its first and last point are moved apart by 0.15 % of the chord each, as METHOD has it.
     """
-    points = airfoil_points(name, chord_mm)
     if np.array_equal(points[0], points[-1]):
         points[0, 1] += 0.0015 * chord_mm
         points[-1, 1] -= 0.0015 * chord_mm

@@ -1,0 +1,22 @@
+"""On which machine, with which versions and when a benchmark ran: the line that stands over its figures."""
+
+import datetime
+import importlib.metadata
+import os
+import platform
+from pathlib import Path
+
+
+def machine(*packages: str) -> str:
+    """Date, processor, cores, system, versions of Python and of those of the packages that are installed."""
+    info = Path("/proc/cpuinfo")
+    lines = info.read_text().splitlines() if info.is_file() else []
+    processor = next((line.split(":")[1].strip() for line in lines if line.startswith("model name")), platform.processor())
+    versions = [f"Python {platform.python_version()}"]
+    for package in packages:
+        try:
+            versions.append(f"{package} {importlib.metadata.version(package)}")
+        except importlib.metadata.PackageNotFoundError:
+            versions.append(f"{package} not installed")
+    today = datetime.datetime.now(tz=datetime.UTC).date().isoformat()
+    return f"{today}; {processor or platform.machine()}, {os.cpu_count()} cores, {platform.system()}; {', '.join(versions)}."
