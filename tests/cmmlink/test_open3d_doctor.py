@@ -45,7 +45,7 @@ def _never(command: Sequence[str]) -> int:
 
 def test_the_command_says_what_was_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
     said: list[str] = []
-    monkeypatch.setattr(cli.typer, "echo", said.append)
+    monkeypatch.setattr("typer.echo", said.append)
     monkeypatch.setattr(cli, "look_after_open3d", lambda say: say("Open3D: looked at") is None)
     assert cli.doctor() == 0
     assert said[0].startswith("cmmlink ")
