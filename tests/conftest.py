@@ -1,6 +1,6 @@
 """Options that point the tests of devices at hardware, and those of the console at a browser."""
 
-from pathlib import Path
+from collections.abc import Iterator
 
 import pytest
 
@@ -19,8 +19,10 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--screenshots", metavar="DIR", help="keep pictures of the console's pages in this folder")
 
 
-@pytest.fixture(autouse=True)
-def _records_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Keep the records of tests that name no folder out of the user's own, and every test's apart."""
-    for name in ("XDG_DATA_HOME", "WIN_PD_OVERRIDE_LOCAL_APPDATA"):
-        monkeypatch.setenv(name, str(tmp_path / "user-data"))
+@pytest.fixture(autouse=True, scope="session")
+def _records_of_their_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Keep the records of tests that name no folder out of the user's own; wider fixtures run commands, too."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("XDG_DATA_HOME", "WIN_PD_OVERRIDE_LOCAL_APPDATA"):
+            patch.setenv(name, str(tmp_path_factory.mktemp("user-data")))
+        yield

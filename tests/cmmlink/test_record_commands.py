@@ -5,6 +5,8 @@ import json
 import os
 import re
 import sqlite3
+import subprocess
+import sys
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -186,5 +188,6 @@ def test_runs_are_kept_in_the_users_data_folder_unless_told_otherwise(station: S
     plan = tmp_path / "plan.yaml"
     points = (station.plan.parent / "points.npy").as_posix()
     plan.write_text(station.plan.read_text().replace("records: kept\n", "").replace("points.npy", f"'{points}'"))
-    assert told("run", plan, "--headless")["run"] == told("runs")["runs"][0]["run"]
-    assert default_folder().is_relative_to(tmp_path)
+    command = [sys.executable, "-m", "cmmlink", "run", str(plan), "--headless", "--json"]  # a process of its own: no folder in place
+    ended = subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).resolve().parents[2], check=True)
+    assert json.loads(ended.stdout)["run"] == told("runs", "--records", default_folder())["runs"][-1]["run"]
