@@ -34,7 +34,7 @@ export class Work {
 
   async choose(name) {
     const answer = await this.ask("choose", { plan: name });
-    if (answer.ok) byId("serial").focus();
+    if (answer.ok) this.entering = name;
   }
 
   show(station) {
@@ -55,6 +55,15 @@ export class Work {
     put("test-result", state === "none" ? "" : { testing: "\u2026 ", passed: "\u2713 ", failed: "\u2715 " }[state] + message);
     byId("test").disabled = station.running;
     byId("start-part").disabled = !station.can_start;
+    this.enterNext(station);
+  }
+
+  // The cursor goes to the serial number once what belongs to the plan stands there, so that nothing typed is overwritten.
+  enterNext(station) {
+    if (!this.entering || this.entering !== station.choice?.name || !station.can_start) return;
+    this.entering = null;
+    byId("serial").focus();
+    byId("serial").select();
   }
 
   showCheck(choice) {
