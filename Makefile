@@ -1,7 +1,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test bench soak
+.PHONY: demo test bench paper soak
 demo: .venv/installed
 	$(BIN)/cmmlink demo --out demo-result
 
@@ -19,6 +19,11 @@ soak: .venv/test-installed
 # Ours against the rivals of the package index, in one run; takes some minutes and wants a quiet machine.
 bench: .venv/bench-installed
 	$(BIN)/python -m tests.benchmarks.projection_benchmark --rivals --millions
+
+# The published paper's tables and the registration's figures; MH42=FILE gives the coordinates that may not be shipped.
+paper: .venv/bench-installed
+	$(BIN)/python -m tests.benchmarks.paper_tables $(if $(MH42),--mh42 $(MH42))
+	$(BIN)/python -m tests.benchmarks.registration_benchmark $(if $(MH42),--mh42 $(MH42))
 
 # One clear line for the two things newcomers meet: an old Python, and Debian's Python without its venv package.
 .venv/bin/python:

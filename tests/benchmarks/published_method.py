@@ -1,10 +1,11 @@
-"""The registration of the published paper in plain numpy, as the benchmarks' rival: no more work than it needs.
+"""The published paper's method in plain numpy, as the benchmarks' rival: no more work than it needs.
 
-Boxes from unweighted principal axes with the diagonal rule, tuning on dominant points whether or not it helps, and ICP with
-point inversion: nearest sample by KD-tree, three Newton steps on the curve, best motion onto the feet.
+Boxes from unweighted principal axes with the diagonal rule, tuning on dominant points whether or not it helps, and ICP: feet
+from the nearest sample (scipy's KD-tree) by point inversion in three Newton steps, by PCP or by VEAW; best motion onto them.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from inspection import NominalProfile, RigidTransform
@@ -12,6 +13,8 @@ from inspection.coarse import align_boxes
 from inspection.frame import dominant_points, principal_frame
 from inspection.rigid import best_motion
 from tests.inspection.profiles import Array
+
+Index = NDArray[np.int64]
 
 ICP_TOLERANCE = 1e-6  # relative change of the mean square; the paper states none
 _MOST_ITERATIONS = 2000
@@ -33,7 +36,7 @@ def invert(points_mm: Array, nominal: NominalProfile) -> Array:
     """Feet (m, 2) by point inversion from the nearest sample: three steps reach 1e-11 mm at this sampling."""
     curve = nominal.curve
     start, end = curve.domain
-    u = nominal.parameter[nominal.tree.query(points_mm)[1]]
+    u = nominal.parameter[_nearest(points_mm, nominal)]
     for _ in range(3):
         point, first, second = curve.derivatives(u, 2)
         reach = point - points_mm
@@ -42,6 +45,50 @@ def invert(points_mm: Array, nominal: NominalProfile) -> Array:
         u = u - (first * reach).sum(axis=1) / np.where(slope > 0, slope, speed2)
         u = start + np.mod(u - start, end - start) if curve.closed else np.clip(u, start, end)
     return np.asarray(curve.point(u))
+
+
+def pcp(points_mm: Array, nominal: NominalProfile) -> Array:
+    """Feet (m, 2) on the pole circle, on the point's side, of the nearest sample."""
+    site = _nearest(points_mm, nominal)
+    distance, gradient = _on_pole_circle(points_mm, nominal, site)
+    return np.asarray(points_mm - distance[:, None] * gradient)
+
+
+def veaw(points_mm: Array, nominal: NominalProfile) -> Array:
+    """Feet (m, 2) between those on the pole circles of the nearest sample and its neighbour, by angles at their edge's end."""
+    site = _nearest(points_mm, nominal)
+    reach = points_mm - nominal.points_mm[site]
+    ahead = (reach * nominal.tangent[site]).sum(axis=1) >= 0
+    neighbour = np.where(ahead, nominal.next_site[site], nominal.previous_site[site])
+    other = np.where(neighbour < 0, site, neighbour)
+    first = np.where(ahead, site, other)
+    is_left = (reach * nominal.normal[site]).sum(axis=1) > 0
+    vertex = np.where(is_left[:, None], nominal.poles.edge_left_mm[first], nominal.poles.edge_right_mm[first])
+    at_site, at_other = (_angle(nominal.points_mm[i] - vertex, points_mm - vertex) for i in (site, other))
+    alone = (neighbour < 0) | ~(at_site + at_other > 0)
+    weight = np.where(alone, 1.0, at_other / np.where(alone, 1.0, at_site + at_other))[:, None]
+    (e, g), (e_other, g_other) = (_on_pole_circle(points_mm, nominal, i) for i in (site, other))
+    return np.asarray(points_mm - weight * e[:, None] * g - (1 - weight) * e_other[:, None] * g_other)
+
+
+def _nearest(points_mm: Array, nominal: NominalProfile) -> Index:
+    return np.asarray(nominal.tree.query(points_mm)[1], dtype=np.int64)
+
+
+def _on_pole_circle(points_mm: Array, nominal: NominalProfile, site: Index) -> tuple[Array, Array]:
+    """Distance (m,) from the pole circle, positive toward the pole, and its gradient; stable for poles at infinity."""
+    poles, reach = nominal.poles, points_mm - nominal.points_mm[site]
+    is_left = (reach * nominal.normal[site]).sum(axis=1) >= 0
+    toward = np.where(is_left[:, None], poles.left[site], poles.right[site])
+    k = np.where(is_left, poles.left_curvature[site], poles.right_curvature[site])
+    b = (reach * toward).sum(axis=1)
+    s = k * (reach * reach).sum(axis=1) - 2 * b
+    root = np.sqrt(1 + k * s)
+    return -s / (1 + root), (toward - k[:, None] * reach) / root[:, None]
+
+
+def _angle(a: Array, b: Array) -> Array:
+    return np.asarray(np.abs(np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1))))
 
 
 def icp(points_mm: Array, nominal: NominalProfile, start: RigidTransform) -> tuple[RigidTransform, int]:

@@ -9,11 +9,12 @@ a busy machine slows all of them alike. engeom comes from the package index: pip
 import argparse
 import importlib.util
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from pathlib import Path
 
 import numpy as np
+from rich.console import Console
 from rich.progress import track
 
 from inspection import (
@@ -115,11 +116,16 @@ def _medians_ms(ways: dict[str, Callable[[], object]], rounds: int) -> dict[str,
     return {name: float(np.median(times)) for name, times in taken.items()}
 
 
+def _shown(trials: int, what: str) -> Iterable[int]:
+    """Their numbers, with a progress bar beside the tables that go to standard output."""
+    return track(range(trials), what, console=Console(stderr=True), transient=True)
+
+
 # --- partial scans ---------------------------------------------------------------------------------------------------------
 
 
 def partial_scans(every: Profiles, trials: int, cases: tuple[tuple[float, bool], ...]) -> Iterator[str]:
-    yield "| profile | coverage | form error | with the profile | against it | at its best pose | farthest mm | best pose, farthest mm | ms |"
+    yield "| profile | coverage | form error | with the profile | against it | at its best pose | farthest mm | of best poses mm | ms |"
     yield "|---|---|---|---|---|---|---|---|---|"
     for name, nominal in every.items():
         if isinstance(nominal, Missing):
@@ -128,10 +134,10 @@ def partial_scans(every: Profiles, trials: int, cases: tuple[tuple[float, bool],
         for coverage, formed in cases:
             off, best_off, apart, ms = _partial_trials(name, nominal, trials, coverage, formed)
             found = off < 1.0
+            with_it, against = (f"{way.sum()} of {len(way)}" for way in (found[::2], found[1::2]))
             yield (
-                f"| {name} | {coverage:.0%} | {'30 um' if formed else 'none'} | {found[::2].sum()} of {len(found[::2])} "
-                f"| {found[1::2].sum()} of {len(found[1::2])} | {(apart < 1e-6).sum()} of {trials} | {off.max():.3f} | {best_off.max():.3f} "
-                f"| {np.median(ms):.1f} |"
+                f"| {name} | {coverage:.0%} | {'30 um' if formed else 'none'} | {with_it} | {against} | {(apart < 1e-6).sum()} of {trials} "
+                f"| {off.max():.3f} | {best_off.max():.3f} | {np.median(ms):.1f} |"
             )
 
 
@@ -142,7 +148,7 @@ def _partial_trials(name: str, nominal: NominalProfile, trials: int, coverage: f
     """
     rng = np.random.default_rng(2)
     rows = np.empty((trials, 4))
-    for trial in track(range(trials), f"partial scans of {name}, {coverage:.0%}", transient=True):
+    for trial in _shown(trials, f"partial scans of {name}, {coverage:.0%}"):
         whole = cross_section(nominal, even_stations(nominal, POINTS), random_pose(rng), rng, FORM_MM if formed else ())
         full = register_fine(whole.points_mm, nominal, whole.nominal_from_section).nominal_from_section
         part = _window(whole.points_mm, coverage, nominal.curve.closed, rng)
@@ -279,7 +285,8 @@ SPEED = """Section of 2,000 points, even in arc length, with form error of 20 an
 Start: our coarse pose (arc-length weights), or the published one (unweighted axes, tuned on dominant points).
 Ours: `register_fine`, Gauss-Newton on exact feet, compiled. ICP: KD-tree, three Newton steps of inversion and best motion in numpy,
 until the mean square changes by less than 1e-6 of itself. engeom: least squares to the polygon of the samples, native code.
-All on one thread. Off: farthest point from the optimum, which is found with the tests' own closest point. Demanded: 6 steps, 1e-9 mm, 300 times ICP, 8 times engeom."""
+All on one thread. Off: farthest point from the optimum, which is found with the tests' own closest point. Demanded: 6 steps,
+1e-9 mm, 300 times ICP, 8 times engeom."""
 PARTIAL = """A random run of neighbouring points of a scan of 2,000, at a random pose, every second one against the profile's direction.
 Counted: scans of which no point lies farther than 1 mm from where the full scan's pose puts it; demanded: all at 40 %. Best pose: the
 least-squares pose of those points alone, reached from the truth; where it lies farther than 1 mm off, form error has moved a nearly
