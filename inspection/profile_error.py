@@ -59,8 +59,8 @@ def checked_points(points_mm: ArrayLike) -> Array:
     points = np.asarray(points_mm, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 2:
         raise ValueError(f"points must have shape (m, 2), got {points.shape}")
-    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
-    if bad.size:
+    if not np.isfinite(points).all():
+        bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
         raise ValueError(f"point {bad[0] + 1} is not finite: {points[bad[0]]}")
     return points
 

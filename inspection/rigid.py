@@ -39,7 +39,8 @@ class RigidTransform:
         """Moved points (m, 2). Written out by element, so that a point's result does not depend on its batch."""
         points = np.asarray(points_mm, dtype=np.float64)
         turned = rotated(points, self.rotation_rad)
-        turned += self.translation_mm
+        turned[:, 0] += self.translation_mm[0]  # by column: a row of two is numpy's slow case
+        turned[:, 1] += self.translation_mm[1]
         return turned
 
     def rounded(self) -> "RigidTransform":

@@ -8,6 +8,7 @@ itself. The reference values were measured once with an earlier prototype on oth
 """
 
 import argparse
+import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -410,7 +411,7 @@ def main() -> None:
     compile_kernels()
     sets = dict(measured_sets(options.mh42))
     effort = (3, 1) if options.quick else (25, 20)
-    shown = track(sets.items(), "twelve sets", console=Console(stderr=True), transient=True)
+    shown = track(sets.items(), "twelve sets", console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty())
     found: Found = {name: one if isinstance(one, Missing) else measure(one, *effort) for name, one in shown}
     text = f"# The paper's tables\n\n{machine('numpy', 'scipy', 'numba')}\n\n{CONDITIONS}\n"
     for title, (explained, table) in SECTIONS.items():
