@@ -24,7 +24,7 @@ class RigidTransform:
 
     def __post_init__(self) -> None:
         translation = np.array(self.translation_mm, dtype=np.float64)
-        if translation.shape != (2,) or not (np.isfinite(translation).all() and np.isfinite(self.rotation_rad)):
+        if translation.shape != (2,) or not all(map(math.isfinite, (self.rotation_rad, *translation.tolist()))):
             raise ValueError(f"need a finite angle and a translation (2,), got {self.rotation_rad} and {self.translation_mm}")
         translation.setflags(write=False)
         object.__setattr__(self, "rotation_rad", float(self.rotation_rad))
