@@ -2,7 +2,7 @@
 
 Every point is worked out on its own: no result depends on the batch, the order or the thread that a point comes in.
 Arithmetic is plain IEEE double precision with explicit fused multiply-adds, so results are the same bit for bit in
-vectorised and scalar code. Nothing is compiled when this file is imported; `compile_kernels` does it, or the first call.
+vectorised and scalar code. Nothing is compiled when this file is imported; the first call does it.
 """
 
 import os
@@ -187,7 +187,7 @@ def _share(work: Callable[[int, int], None], m: int, threads: int | None) -> Non
 
 
 def compile_kernels() -> None:
-    """Compile every kernel, or load it from the cache: seconds on the first use after installation, milliseconds later."""
+    """Compile the projections, or load them from the cache, for a benchmark; the application rehearses (`live.rehearse`)."""
     flat, pairs, kinds = types.Array(types.float64, 1, "C"), types.Array(types.float64, 2, "C"), types.Array(types.uint8, 1, "C")
     feet = types.NamedTuple([flat, pairs, flat, pairs, flat, flat, kinds], Feet)
     fixed, index32, index64 = (types.Array(kind, 1, "C", readonly=True) for kind in (types.float64, types.int32, types.int64))
