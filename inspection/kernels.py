@@ -7,7 +7,6 @@ vectorised and scalar code. Nothing is compiled when this file is imported; the 
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
 from threading import Thread
 from typing import Any, NamedTuple, TypeVar, cast
 
@@ -34,7 +33,7 @@ _ANY = 0x7FFFFFFF  # tells the compiler that an index is not negative
 _STEP = 3e-9  # largest last step, in pieces, after which the square of the error is below round-off
 _SHARED = 65_536  # points from which a batch is worth the start of threads (0.1 ms)
 SAMPLE_METHODS = ("circle", "chord", "pcp", "veaw")
-_CIRCLE, _CHORD, _PCP = range(3)
+_EXACT, _CIRCLE, _CHORD, _PCP = range(-1, 3)
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
@@ -690,11 +689,10 @@ def project_on_samples(points_mm: Array, grid: FootGrid, table: SampleTable, met
     """
     points = _flat(points_mm)
     feet = _empty_feet(len(points) // 2)
-    tables = (table.samples.reshape(-1), table.links.reshape(-1), table.boxes.reshape(-1), table.starts, table.domain)
 
     def work(start: int, stop: int) -> None:
         _project(points, grid.reals, grid.integers, feet, start, stop)
-        _project_on_samples(points, *tables, SAMPLE_METHODS.index(method), feet, start, stop)
+        _project_on_samples(points, *table.flat, SAMPLE_METHODS.index(method), feet, start, stop)
 
     _share(work, len(feet.vertex), threads)
     return feet
@@ -922,75 +920,381 @@ def _on_curve(value: float, start: float, end: float, closed: bool) -> float:
     return start + (value - start) % (end - start) if closed else min(max(value, start), end)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class NormalEquations:
-    """Sums over points for one step of the pose p = (shift in mm, rotation in rad about the centre), e the deviations.
+# --- the fine registration ----------------------------------------------------------------------------------------------
 
-    slope        : (3,) sum of J e;  tangential : (3, 3) sum of J J';  bending : (3, 3) sum of e times the second derivative of e
-    sum_square   : sum of e^2;  count : points that took part, open ends left out;  reach_mm : farthest from the centre
+# Sums over the points at a pose, e being the deviations, J their gradients by p = (shift in mm, rotation in rad about the centre):
+# J e (3); J J' and e times the second derivative of e (6 each: xx, xy, xt, yy, yt, tt); e^2; the points that took part; e^2 over
+# the points that took part at the pose before.
+_SLOPE, _TANGENTIAL, _BENDING, _SQUARE, _COUNT, _SQUARE_BEFORE, _SUMS = 0, 3, 9, 15, 16, 17, 18
+_STANDSTILL_MM = 1e-9  # Gauss-Newton ends when no point moves further
+_HALVINGS = 12
+_HOVERING_STEPS = 3  # after them points that come and go at an open end in small steps are left out: no pose suits both
+_HOVERING_MM = 0.01
+_FREE = 1e-9  # a motion whose eigenvalue is below this share of the largest changes no deviation: it is undetermined
+_TRUSTED = 1e-6  # least eigenvalue of the full second derivative, as a share of the largest, for it to be used
+_LEAST_REACH_MM = 1e-9
+_SWEEPS = 12  # of Jacobi rotations; four or five suffice
+
+
+class Fit(NamedTuple):
+    """A pose of points, and how it was reached.
+
+    pose        : rotation about the origin in rad, then shift in mm (x, y)
+    steps       : Gauss-Newton steps made
+    settled     : the last step moved no point by more than 1e-9 mm
+    mean_square : of the deviations, mm^2, over the points that took part; infinite without any
+    centre_mm   : (2,) where the pose puts the mean of the points
+    covariance  : (3, 3) of shift in mm and rotation in rad about the centre, for deviations that are independent
     """
 
-    slope: Array
-    tangential: Array
-    bending: Array
-    sum_square: float
-    count: int
-    reach_mm: float
+    pose: tuple[float, float, float]
+    steps: int
+    settled: bool
+    mean_square: float
+    centre_mm: Array
+    covariance: Array
 
 
-def normal_equations(
-    points_mm: Array, feet: Feet, outward: float, tip_radius_mm: float, centre_mm: Array, weights: Array
-) -> NormalEquations:
-    """Normal equations of points (m, 2) projected on `feet`; `weights` (m,), or empty for all one."""
-    out = np.zeros(3 + 9 + 9 + 3)
-    _normal_equations(
-        points_mm, feet.distance_mm, feet.gradient, feet.curvature, feet.vertex, weights, outward, tip_radius_mm, centre_mm, out
-    )
-    return NormalEquations(
-        out[:3], out[3:12].reshape(3, 3), out[12:21].reshape(3, 3), float(out[21]), int(out[22]), float(np.sqrt(out[23]))
-    )
+class PoseFit:
+    """Gauss-Newton on the pose of points (m, 2), and the memory it works in.
+
+    weights : (m,) share of each point in the sums; a settled fit has set those of points that hover at an open end to 0
+    """
+
+    def __init__(self, points_mm: Array, grid: FootGrid, table: SampleTable, method: str, outward: float, tip_radius_mm: float) -> None:
+        m = len(points_mm)
+        moved = np.empty(2 * m)
+        self.weights = np.ones(m)
+        number = SAMPLE_METHODS.index(method) if method in SAMPLE_METHODS else _EXACT
+        tables = (grid.reals, grid.integers, *table.flat)
+        self._problem = (_flat(points_mm), self.weights, tables, number, float(outward), float(tip_radius_mm))
+        self._memory = (moved, _flat(moved), np.ones(m), np.empty(m), _empty_feet(m))
+
+    def settle(self, pose: tuple[float, float, float], most_steps: int) -> Fit:
+        """From a pose to the least mean square of the deviations, by at most so many steps."""
+        state, covariance = np.empty(6), np.empty((3, 3))
+        state[:3] = pose
+        steps, settled = _settle_pose(*self._problem, self._memory, state, covariance, most_steps)
+        angle, x, y, mean_square, _, _ = state.tolist()
+        return Fit((angle, x, y), steps, settled, mean_square, state[4:], covariance)
+
+    def outliers(self, pose: tuple[float, float, float], mads: float, most_steps: int, settled_mm: float) -> NDArray[np.bool_]:
+        """Points (m,) farther than so many median absolute deviations, once the fit by Tukey's weights moves no point further."""
+        found = np.zeros(len(self.weights), dtype=np.bool_)
+        _find_outliers(*self._problem, self._memory, np.array(pose), mads, most_steps, settled_mm, found)
+        return found
 
 
 @_compiled
-def _normal_equations(
-    points: Any, distance: Any, gradient: Any, curvature: Any, vertex: Any, weights: Any, outward: float, tip: float, centre: Any, out: Any
+def _settle_pose(
+    points: Any,
+    weights: Any,
+    tables: Any,
+    method: int,
+    outward: float,
+    tip: float,
+    memory: Any,
+    state: Any,
+    covariance: Any,
+    most_steps: int,
+) -> tuple[int, bool]:
+    """Full Newton steps where the second derivative allows, each halved until the mean square falls."""
+    moved, seen, takes_part, new_part, feet = memory
+    span, step = _span(points), np.zeros(4)
+    pose, next_pose, here, trial = state[:3].copy(), np.empty(3), np.empty(_SUMS), np.empty(_SUMS)
+    _evaluate(points, weights, tables, method, outward, tip, pose, span, moved, seen, takes_part, takes_part, feet, here)
+    steps, settled, lower = 0, False, True
+    while lower and not settled and steps < most_steps:
+        steps += 1
+        _newton_step(here, span[2], step)
+        lower = False
+        for _ in range(_HALVINGS):
+            _moved_pose(pose, span, step, next_pose)
+            settled = step[3] <= _STANDSTILL_MM  # it changes no deviation by more: nothing to project again
+            if settled:
+                break
+            _evaluate(points, weights, tables, method, outward, tip, next_pose, span, moved, seen, takes_part, new_part, feet, trial)
+            lower = trial[_SQUARE_BEFORE] <= here[_SQUARE] * (1.0 + 1e-12)
+            if lower:
+                break
+            step *= 0.5
+        if lower and steps >= _HOVERING_STEPS and step[3] < _HOVERING_MM and trial[_COUNT] != here[_COUNT]:
+            for i in range(len(weights)):
+                weights[i] *= takes_part[i] * new_part[i]
+            _add_up(weights, takes_part, new_part, outward, tip, next_pose, span, moved, feet, trial)
+        if lower or settled:
+            pose[:] = next_pose
+        if lower:
+            here[:] = trial
+            takes_part[:] = new_part
+    state[:3] = pose
+    state[3] = here[_SQUARE] / here[_COUNT] if here[_COUNT] > 0.0 else np.inf
+    state[4], state[5] = _centre(pose, span)
+    _covariance(here, span[2], covariance)
+    return steps, settled
+
+
+@_compiled
+def _find_outliers(
+    points: Any,
+    weights: Any,
+    tables: Any,
+    method: int,
+    outward: float,
+    tip: float,
+    memory: Any,
+    pose: Any,
+    mads: float,
+    most_steps: int,
+    settled_mm: float,
+    found: Any,
+) -> None:
+    """Weighted steps; the weights follow from the deviations at every pose."""
+    moved, seen, takes_part, off, feet = memory
+    span, step, sums, next_pose, m = _span(points), np.empty(4), np.empty(_SUMS), np.empty(3), len(weights)
+    for _ in range(most_steps):
+        weights[:] = 1.0
+        _evaluate(points, weights, tables, method, outward, tip, pose, span, moved, seen, takes_part, takes_part, feet, sums)
+        for i in range(m):
+            off[i] = abs(outward * feet.distance_mm[i] - tip)
+        limit = mads * np.median(off[takes_part > 0.0]) if sums[_COUNT] > 0.0 else np.inf
+        for i in range(m):
+            share = off[i] / max(limit, _STANDSTILL_MM)
+            weights[i] = (1.0 - share * share) ** 2 if off[i] < limit else 0.0
+            found[i] = off[i] >= limit and takes_part[i] > 0.0
+        _add_up(weights, takes_part, takes_part, outward, tip, pose, span, moved, feet, sums)
+        _newton_step(sums, span[2], step)
+        _moved_pose(pose, span, step, next_pose)
+        pose[:] = next_pose
+        if step[3] <= settled_mm:
+            break
+
+
+@_compiled
+def _span(points: Any) -> tuple[float, float, float]:
+    """Mean of the flat points (x, y), and the distance of the farthest from it: a motion does not change it."""
+    x = y = square = 0.0
+    m = len(points) // 2
+    for i in range(m):
+        x += points[2 * i]
+        y += points[2 * i + 1]
+    x, y = x / m, y / m
+    for i in range(m):
+        dx, dy = points[2 * i] - x, points[2 * i + 1] - y
+        square = max(square, dx * dx + dy * dy)
+    return x, y, max(np.sqrt(square), _LEAST_REACH_MM)
+
+
+@_compiled
+def _centre(pose: Any, span: Any) -> tuple[float, float]:
+    """Where the pose puts the mean of the points."""
+    c, s = np.cos(pose[0]), np.sin(pose[0])
+    return c * span[0] - s * span[1] + pose[1], s * span[0] + c * span[1] + pose[2]
+
+
+@_compiled
+def _moved_pose(pose: Any, span: Any, step: Any, moved: Any) -> None:
+    """The pose, then a rotation about its centre and a shift: the centre moves by the shift alone."""
+    x, y = _centre(pose, span)
+    angle = pose[0] + step[2]
+    moved[0] = np.arctan2(np.sin(angle), np.cos(angle))
+    c, s = np.cos(moved[0]), np.sin(moved[0])
+    moved[1] = x + step[0] - (c * span[0] - s * span[1])
+    moved[2] = y + step[1] - (s * span[0] + c * span[1])
+
+
+@_compiled
+def _evaluate(
+    points: Any,
+    weights: Any,
+    tables: Any,
+    method: int,
+    outward: float,
+    tip: float,
+    pose: Any,
+    span: Any,
+    moved: Any,
+    seen: Any,
+    before: Any,
+    takes_part: Any,
+    feet: Any,
+    sums: Any,
+) -> None:
+    """Points at a pose: moved there (`seen` is the same memory), their feet, and the sums over them."""
+    c, s, m = np.cos(pose[0]), np.sin(pose[0]), len(weights)
+    for i in range(m):
+        x, y = points[2 * i], points[2 * i + 1]
+        moved[2 * i] = c * x - s * y + pose[1]
+        moved[2 * i + 1] = s * x + c * y + pose[2]
+    reals, integers, samples, links, boxes, starts, domain = tables
+    _project(seen, reals, integers, feet, 0, m)
+    if method != _EXACT:
+        _project_on_samples(seen, samples, links, boxes, starts, domain, method, feet, 0, m)
+    _add_up(weights, before, takes_part, outward, tip, pose, span, moved, feet, sums)
+
+
+@_compiled
+def _add_up(
+    weights: Any, before: Any, takes_part: Any, outward: float, tip: float, pose: Any, span: Any, moved: Any, feet: Any, sums: Any
+) -> None:
+    """The sums, in columns of their own for every place in a block, so that the loop vectorises, and always in the same order."""
+    w = carray(_stack_reals(), _REALS)
+    w[: _SUMS * _BLOCK] = 0.0
+    x0, y0 = _centre(pose, span)
+    for block in range(0, len(weights), _BLOCK):
+        end = min(block + _BLOCK, len(weights))
+        points, gradient = moved[2 * block : 2 * end], feet.gradient.reshape(-1)[2 * block : 2 * end]
+        distance, curvature, kind = feet.distance_mm[block:end], feet.curvature[block:end], feet.vertex[block:end]
+        weight, part_before, part = weights[block:end], before[block:end], takes_part[block:end]
+        for j in range(end - block):
+            _add_point(w, points, gradient, distance, curvature, kind, weight, part_before, part, outward, tip, x0, y0, j)
+    half = _BLOCK // 2
+    while half > 0:
+        for column in range(0, _SUMS * _BLOCK, _BLOCK):
+            for j in range(half):
+                w[column + j] += w[column + half + j]
+        half //= 2
+    for quantity in range(_SUMS):
+        sums[quantity] = w[quantity * _BLOCK]
+
+
+@_inlined
+def _add_point(
+    w: Any,
+    points: Any,
+    gradient: Any,
+    distance: Any,
+    curvature: Any,
+    kind: Any,
+    weight: Any,
+    before: Any,
+    part: Any,
+    outward: float,
+    tip: float,
+    x0: float,
+    y0: float,
+    j: int,
 ) -> None:
     """Tangent distance plus curvature: e(p) = e + J p + p' H p / 2, with the curvature of the distance field across its gradient."""
-    for i in range(len(points)):
-        if vertex[i] == 2:
-            continue
-        w = weights[i] if len(weights) > 0 else 1.0
-        e = outward * distance[i] - tip
-        gx, gy = outward * gradient[i, 0], outward * gradient[i, 1]
-        ax, ay = points[i, 0] - centre[0], points[i, 1] - centre[1]
-        turn = ax * gy - ay * gx
-        radial = ax * gx + ay * gy
-        if vertex[i] == 1:
-            bend = 1.0 / (e + tip) if abs(e + tip) > 1e-9 else 0.0
-        else:
-            bend = -outward * curvature[i] / max(1.0 - curvature[i] * distance[i], 1e-3)
-        we = w * e
-        out[0] += we * gx
-        out[1] += we * gy
-        out[2] += we * turn
-        out[3] += w * gx * gx
-        out[4] += w * gx * gy
-        out[5] += w * gx * turn
-        out[7] += w * gy * gy
-        out[8] += w * gy * turn
-        out[11] += w * turn * turn
-        across = we * bend
-        out[12] += across * gy * gy
-        out[13] -= across * gx * gy
-        out[14] -= across * gy * radial
-        out[16] += across * gx * gx
-        out[17] += across * gx * radial
-        out[20] += across * radial * radial - we * radial
-        out[21] += we * e
-        out[22] += 1.0
-        out[23] = max(out[23], ax * ax + ay * ay)
-    out[6], out[9], out[10] = out[4], out[5], out[8]
-    out[15], out[18], out[19] = out[13], out[14], out[17]
+    field = outward * distance[j]
+    e = field - tip
+    gx, gy = outward * gradient[2 * j], outward * gradient[2 * j + 1]
+    ax, ay = points[2 * j] - x0, points[2 * j + 1] - y0
+    turn, radial = ax * gy - ay * gx, ax * gx + ay * gy
+    at_corner = kind[j] == 1
+    numerator = 1.0 if at_corner else -outward * curvature[j]
+    denominator = field if at_corner else max(1.0 - curvature[j] * distance[j], 1e-3)
+    bend = numerator / denominator if abs(denominator) > 1e-9 else 0.0
+    was_part = before[j]
+    u = 0.0 if kind[j] == 2 else weight[j]
+    takes_part = 1.0 if u > 0.0 else 0.0
+    part[j] = takes_part
+    we = u * e
+    across = we * bend
+    w[0 * _BLOCK + j] += we * gx
+    w[1 * _BLOCK + j] += we * gy
+    w[2 * _BLOCK + j] += we * turn
+    w[3 * _BLOCK + j] += u * gx * gx
+    w[4 * _BLOCK + j] += u * gx * gy
+    w[5 * _BLOCK + j] += u * gx * turn
+    w[6 * _BLOCK + j] += u * gy * gy
+    w[7 * _BLOCK + j] += u * gy * turn
+    w[8 * _BLOCK + j] += u * turn * turn
+    w[9 * _BLOCK + j] += across * gy * gy
+    w[10 * _BLOCK + j] -= across * gx * gy
+    w[11 * _BLOCK + j] -= across * gy * radial
+    w[12 * _BLOCK + j] += across * gx * gx
+    w[13 * _BLOCK + j] += across * gx * radial
+    w[14 * _BLOCK + j] += across * radial * radial - we * radial
+    w[15 * _BLOCK + j] += we * e
+    w[16 * _BLOCK + j] += takes_part
+    w[17 * _BLOCK + j] += was_part * weight[j] * e * e
+
+
+@_compiled
+def _newton_step(sums: Any, reach: float, step: Any) -> None:
+    """Shift and rotation to the least (weighted) mean square of the second-order model, and how far they move the farthest point.
+
+    Full second derivative where it is positive definite, its Gauss-Newton part otherwise; motions that the points do not
+    determine (a circle's rotation) are left alone.
+    """
+    matrix, values, vectors = np.empty((3, 3)), np.empty(3), np.empty((3, 3))
+    _scaled(sums, 1.0, reach, matrix)
+    _eigen(matrix, values, vectors)
+    if values.min() <= _TRUSTED * values.max():
+        _scaled(sums, 0.0, reach, matrix)
+        _eigen(matrix, values, vectors)
+    step[:] = 0.0
+    for i in range(3):
+        if values[i] > _FREE * values.max():
+            along = vectors[0, i] * sums[_SLOPE] + vectors[1, i] * sums[_SLOPE + 1] + vectors[2, i] * (sums[_SLOPE + 2] / reach)
+            for k in range(3):
+                step[k] -= vectors[k, i] * (along / values[i])
+    step[3] = np.hypot(step[0], step[1]) + abs(step[2])
+    step[2] /= reach
+
+
+@_compiled
+def _covariance(sums: Any, reach: float, covariance: Any) -> None:
+    """Inverse of the normal matrix times the scatter; the reach as standard deviation of what is not determined."""
+    matrix, values, vectors = np.empty((3, 3)), np.empty(3), np.empty((3, 3))
+    _scaled(sums, 0.0, reach, matrix)
+    _eigen(matrix, values, vectors)
+    scatter = sums[_SQUARE] / max(sums[_COUNT] - 3.0, 1.0)
+    vectors[2] /= reach
+    covariance[:] = 0.0
+    for i in range(3):
+        variance = scatter / values[i] if values[i] > _FREE * values.max() else reach * reach
+        for k in range(3):
+            for j in range(3):
+                covariance[k, j] += variance * vectors[k, i] * vectors[j, i]
+
+
+@_compiled
+def _scaled(sums: Any, bending: float, reach: float, matrix: Any) -> None:
+    """Normal matrix (3, 3), its rotation counted in mm at the farthest point; with or without the second derivative of e."""
+    place = 0
+    for i in range(3):
+        for j in range(i, 3):
+            value = sums[_TANGENTIAL + place] + bending * sums[_BENDING + place]
+            value /= (reach if i == 2 else 1.0) * (reach if j == 2 else 1.0)
+            matrix[i, j] = matrix[j, i] = value
+            place += 1
+
+
+@_compiled
+def _eigen(matrix: Any, values: Any, vectors: Any) -> None:
+    """Eigenvalues (3,) and eigenvectors, in columns, of a symmetric matrix, which is used up: Jacobi's rotations.
+
+    Written out, because libraries for matrices differ in the last bits from processor to processor.
+    """
+    for i in range(3):
+        for j in range(3):
+            vectors[i, j] = 1.0 if i == j else 0.0
+    for _ in range(_SWEEPS):
+        if matrix[0, 1] == 0.0 and matrix[0, 2] == 0.0 and matrix[1, 2] == 0.0:
+            break
+        for p in range(2):
+            for q in range(p + 1, 3):
+                off = matrix[p, q]
+                if abs(off) <= 1e-17 * (abs(matrix[p, p]) + abs(matrix[q, q])):
+                    matrix[p, q] = matrix[q, p] = 0.0
+                    continue
+                theta = (matrix[q, q] - matrix[p, p]) / (2.0 * off)
+                t = np.copysign(1.0, theta) / (abs(theta) + np.sqrt(theta * theta + 1.0))
+                c = 1.0 / np.sqrt(t * t + 1.0)
+                s = t * c
+                for k in range(3):
+                    a, b = matrix[k, p], matrix[k, q]
+                    matrix[k, p], matrix[k, q] = c * a - s * b, s * a + c * b
+                for k in range(3):
+                    a, b = matrix[p, k], matrix[q, k]
+                    matrix[p, k], matrix[q, k] = c * a - s * b, s * a + c * b
+                for k in range(3):
+                    a, b = vectors[k, p], vectors[k, q]
+                    vectors[k, p], vectors[k, q] = c * a - s * b, s * a + c * b
+    for i in range(3):
+        values[i] = matrix[i, i]
 
 
 def strides(points_mm: Array, step_mm: float) -> NDArray[np.int64]:

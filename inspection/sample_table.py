@@ -39,6 +39,11 @@ class SampleTable:
         for name in self.__slots__:
             getattr(self, name).setflags(write=False)
 
+    @property
+    def flat(self) -> tuple[Array, Index, Array, Index, Array]:
+        """The tables as compiled loops take them: one dimension each."""
+        return self.samples.reshape(-1), self.links.reshape(-1), self.boxes.reshape(-1), self.starts, self.domain
+
 
 def pack_samples(
     *,
