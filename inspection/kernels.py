@@ -7,7 +7,7 @@ vectorised and scalar code. Nothing is compiled when this file is imported; the 
 
 import os
 from collections.abc import Callable
-from threading import Thread
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
@@ -30,10 +30,13 @@ _FINEST = 26  # halvings of a piece, after which an interval is a point
 _ACROSS = float(1 << BLOCK_LEVEL)
 _TRIES, _WALKED = 2, 4  # further steps on one piece; added to the tries once the neighbouring piece is tried
 _ANY = 0x7FFFFFFF  # tells the compiler that an index is not negative
+_WITHIN = 0.999  # of a Voronoi cell: its corners are known to round-off only
 _STEP = 3e-9  # largest last step, in pieces, after which the square of the error is below round-off
-_SHARED = 65_536  # points from which a batch is worth the start of threads (0.1 ms)
+_CHUNK = 8 * _BLOCK  # points that a thread claims at a time
+_SHARED = 65_536  # points from which a batch is worth waking other threads
 SAMPLE_METHODS = ("circle", "chord", "pcp", "veaw")
 _EXACT, _CIRCLE, _CHORD, _PCP = range(-1, 3)
+_HELPERS = ThreadPoolExecutor(max(1, (os.cpu_count() or 1) - 1), "projection")  # started when first needed: a start takes 0.1 ms
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
@@ -120,6 +123,17 @@ def _rows_to_columns(typing_context: Any, table: Any, rows: Any, first: Any, tar
     return types.void(table, rows, types.int64, target, types.int64), generate
 
 
+@_generated
+def _claim(typing_context: Any, claimed: Any) -> Any:
+    """The first of the next chunk of points, which no other thread gets."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        counter = context.make_array(signature.args[0])(context, builder, args[0]).data
+        return builder.atomic_rmw("add", counter, ir.Constant(ir.IntType(64), _CHUNK), "monotonic")
+
+    return types.int64(claimed), generate
+
+
 class Feet(NamedTuple):
     """Closest points on a curve of m points.
 
@@ -148,7 +162,7 @@ def project(points_mm: Array, grid: FootGrid, threads: int | None = None) -> Fee
     """
     points = _flat(points_mm)
     feet = _empty_feet(len(points) // 2)
-    _share(lambda start, stop: _project(points, grid.reals, grid.integers, feet, start, stop), len(feet.vertex), threads)
+    _share(lambda claimed: _project(points, grid.reals, grid.integers, feet, claimed), len(feet.vertex), threads)
     return feet
 
 
@@ -163,38 +177,28 @@ def _empty_feet(m: int) -> Feet:
     return Feet(np.empty(m), np.empty((m, 2)), np.empty(m), np.empty((m, 2)), np.empty(m), np.empty(m), np.empty(m, dtype=np.uint8))
 
 
-def _share(work: Callable[[int, int], None], m: int, threads: int | None) -> None:
-    """Run work(start, stop) over all of range(m): at once, or in chunks on threads when there are many points."""
+def _share(work: Callable[[NDArray[np.int64]], None], m: int, threads: int | None) -> None:
+    """Let one or more threads claim chunks of m points until none are left; None chooses by their number."""
+    claimed = np.zeros(1, dtype=np.int64)
     if threads is None:
         threads = (os.cpu_count() or 1) if m >= _SHARED else 1
-    if threads == 1 or m <= _BLOCK:
-        work(0, m)
-        return
-    chunk = _BLOCK * -(-m // (4 * threads * _BLOCK))  # four a thread, so that a thread that is held up delays the others little
-    starts = iter(range(0, m, chunk))
-
-    def drain() -> None:
-        for start in starts:
-            work(start, start + chunk)
-
-    helpers = [Thread(target=drain) for _ in range(threads - 1)]  # this thread works too: a pool would cost as much as the work saves
-    for helper in helpers:
-        helper.start()
-    drain()
-    for helper in helpers:
-        helper.join()
+    helping = [_HELPERS.submit(work, claimed) for _ in range(min(threads, -(-m // _CHUNK)) - 1)]
+    work(claimed)
+    for help_given in helping:
+        if not help_given.cancel():  # one that has not begun, as in a forked process, has nothing left to do
+            help_given.result()
 
 
 def compile_kernels() -> None:
     """Compile the projections, or load them from the cache, for a benchmark; the application rehearses (`live.rehearse`)."""
     flat, pairs, kinds = types.Array(types.float64, 1, "C"), types.Array(types.float64, 2, "C"), types.Array(types.uint8, 1, "C")
+    claimed = types.Array(types.int64, 1, "C")
     feet = types.NamedTuple([flat, pairs, flat, pairs, flat, flat, kinds], Feet)
     fixed, index32, index64 = (types.Array(kind, 1, "C", readonly=True) for kind in (types.float64, types.int32, types.int64))
-    word = types.int64
     exact: Any = _project
     on_samples: Any = _project_on_samples
-    exact.compile((fixed, fixed, index32, feet, word, word))
-    on_samples.compile((fixed, fixed, index64, fixed, index64, fixed, word, feet, word, word))
+    exact.compile((fixed, fixed, index32, feet, claimed))
+    on_samples.compile((fixed, fixed, index64, fixed, index64, fixed, types.int64, feet, claimed))
 
 
 # Where the memory of a block keeps what, _BLOCK numbers each. Reals: the row of the piece (24 columns), then
@@ -204,20 +208,24 @@ _CONTENT, _ROW, _SOLVED, _POINT, _TRY, _UNSOLVED, _WAITING = (_BLOCK * i for i i
 
 
 @_compiled
-def _project(points: Any, reals: Any, integers: Any, feet: Any, start: int, stop: int) -> None:
-    """Closest points of points[start:stop], of the flat (2 m,) points, into feet; `stop` may lie beyond the last.
+def _project(points: Any, reals: Any, integers: Any, feet: Any, claimed: Any) -> None:
+    """Closest points of the flat points (2 m,), chunk by chunk as claimed, into feet.
 
     All points of a block are solved on the piece that their cell holds; those whose foot is not on that piece, or whose
     cell holds several stretches, queue until they fill a block of their own.
     """
-    stop = min(stop, len(feet.vertex))
+    m = len(feet.vertex)
     pieces, blocks, cells = reals[integers[3] :], integers[integers[9] :], integers[integers[10] :]
     w = carray(_stack_reals(), _REALS)
     q = carray(_stack_integers(), _INTEGERS)
     best, stack = w[_REALS - 9 :], q[_INTEGERS - 64 :]  # results of one point; nodes of the search tree
-    waiting = 0
-    block = start
-    while block < stop or waiting > 0:
+    waiting = block = stop = 0
+    while True:
+        if block >= stop and stop < m:
+            block = _claim(claimed)
+            stop = min(block + _CHUNK, m)
+        if block >= stop and waiting == 0:
+            break
         fresh = block < stop and waiting < _BLOCK
         if fresh:
             lanes = min(_BLOCK, stop - block)
@@ -228,12 +236,7 @@ def _project(points: Any, reals: Any, integers: Any, feet: Any, start: int, stop
             lanes = min(_BLOCK, waiting)
             waiting -= lanes
             _take(w, q, points, lanes, waiting)
-        for j in range(lanes, (lanes + 7) & ~7):
-            q[_ROW + j] = 0
-        for j in range(0, lanes, 8):
-            _rows_to_columns(pieces, q, _ROW + j, w, j)
-            _rows_to_columns(pieces[8:], q, _ROW + j, w, 8 * _BLOCK + j)
-            _rows_to_columns(pieces[16:], q, _ROW + j, w, 16 * _BLOCK + j)
+        _load_pieces(w, q, pieces, lanes)
         for j in range(lanes):
             _start(w, j)
         if not fresh:
@@ -270,6 +273,17 @@ def _locate(w: Any, q: Any, here: Any, blocks: Any, cells: Any, x0: float, y0: f
     q[_ROW + j] = PIECE_WIDTH * max(content, 0)
     w[_X + j] = x
     w[_Y + j] = y
+
+
+@_inlined
+def _load_pieces(w: Any, q: Any, pieces: Any, lanes: int) -> None:
+    """The rows of all lanes' pieces, as columns; lanes that fill up the last eight take the first piece."""
+    for j in range(lanes, (lanes + 7) & ~7):
+        q[_ROW + j] = 0
+    for j in range(0, lanes, 8):
+        _rows_to_columns(pieces, q, _ROW + j, w, j)
+        _rows_to_columns(pieces[8:], q, _ROW + j, w, 8 * _BLOCK + j)
+        _rows_to_columns(pieces[16:], q, _ROW + j, w, 16 * _BLOCK + j)
 
 
 @_inlined
@@ -689,12 +703,9 @@ def project_on_samples(points_mm: Array, grid: FootGrid, table: SampleTable, met
     """
     points = _flat(points_mm)
     feet = _empty_feet(len(points) // 2)
-
-    def work(start: int, stop: int) -> None:
-        _project(points, grid.reals, grid.integers, feet, start, stop)
-        _project_on_samples(points, *table.flat, SAMPLE_METHODS.index(method), feet, start, stop)
-
-    _share(work, len(feet.vertex), threads)
+    number, tables = SAMPLE_METHODS.index(method), table.flat
+    _share(lambda claimed: _project(points, grid.reals, grid.integers, feet, claimed), len(feet.vertex), threads)
+    _share(lambda claimed: _project_on_samples(points, *tables, number, feet, claimed), len(feet.vertex), threads)
     return feet
 
 
@@ -708,72 +719,114 @@ def _project_on_samples(
     domain: Any,
     method: int,
     feet: Any,
-    start: int,
-    stop: int,
+    claimed: Any,
 ) -> None:
-    """Projections of points[start:stop]; feet hold the exact ones and take the new ones in their place."""
-    stop = min(stop, len(feet.vertex))
+    """Projections of the points, chunk by chunk as claimed; feet hold the exact ones and take the new ones in their place."""
     stack, best = np.empty(64, dtype=np.int64), np.empty(9)
-    for point in range(start, stop):
-        x, y, u = points[2 * point], points[2 * point + 1], feet.parameter[point]
-        if np.isnan(u):
-            continue
-        site = int((u - domain[0]) / (domain[1] - domain[0]) * len(starts))
-        site = _nearest_sample(x, y, starts[min(max(site, 0), len(starts) - 1)], samples, boxes, stack)
-        site, facing = _facing_sample(x, y, site, samples, links)
-        if not facing:
-            _on_sample(x, y, site, samples, links, best)
-        else:
-            if method == _CIRCLE:
-                left, gx, gy = _on_osculating_circle(x, y, site, samples)
-            elif method == _CHORD:
-                left, gx, gy = _on_chords(x, y, site, samples, links)
-            elif method == _PCP:
-                left, gx, gy = _on_pole_circle(x, y, site, samples)
+    first = _claim(claimed)
+    while first < len(feet.vertex):
+        for point in range(first, min(first + _CHUNK, len(feet.vertex))):
+            x, y, u = points[2 * point], points[2 * point + 1], feet.parameter[point]
+            if np.isnan(u):
+                continue
+            place = int((u - domain[0]) / (domain[1] - domain[0]) * len(starts))
+            site = _nearest_sample(x, y, starts[min(max(place, 0), len(starts) - 1)], samples, links, boxes, stack)
+            site, facing = _facing_sample(x, y, site, samples, links)
+            if facing:
+                _on_faced_sample(x, y, site, method, samples, links, domain, best)
             else:
-                left, gx, gy = _between_pole_circles(x, y, site, samples, links)
-            _from_sample(x, y, site, left, gx, gy, samples, domain, best)
-        _store(best, feet, point)
+                _on_sample(x, y, site, samples, links, best)
+            _store(best, feet, point)
+        first = _claim(claimed)
+
+
+@_inlined
+def _on_faced_sample(x: float, y: float, site: int, method: int, samples: Any, links: Any, domain: Any, best: Any) -> None:
+    if method == _CIRCLE:
+        left, gx, gy = _on_osculating_circle(x, y, site, samples)
+    elif method == _CHORD:
+        left, gx, gy = _on_chords(x, y, site, samples, links)
+    elif method == _PCP:
+        left, gx, gy = _on_pole_circle(x, y, site, samples)
+    else:
+        left, gx, gy = _between_pole_circles(x, y, site, samples, links)
+    _from_sample(x, y, site, left, gx, gy, samples, domain, best)
 
 
 @_compiled
-def _nearest_sample(x: float, y: float, site: int, samples: Any, boxes: Any, stack: Any) -> int:
-    """Nearest of all samples, the first of several; `site` is where the search begins and does not change its result."""
-    n = len(samples) // SAMPLE_WIDTH
+def _nearest_sample(x: float, y: float, site: int, samples: Any, links: Any, boxes: Any, stack: Any) -> int:
+    """Nearest of all samples; `site` is where the search begins.
+
+    Down along the curve; then the Voronoi cell decides whether that is the nearest of all. Where it does not, the search tree
+    is climbed from that sample's leaf, and of every other subtree only what may hold a nearer one is looked at.
+    """
     least = _sample_distance(samples, site, x, y)
+    side = 0
+    while side < 2:
+        other = links[LINK_WIDTH * site + side]
+        distance = _sample_distance(samples, other, x, y) if other >= 0 else np.inf
+        if distance < least:
+            least, site, side = distance, other, -1
+        side += 1
+    if _in_cell(x, y, site, samples, links):
+        return site
     leaves = len(boxes) // 8
-    stack[0] = 1
-    depth = 1
-    while depth:
-        depth -= 1
-        node = stack[depth]
-        if node >= leaves:
-            first = (node - leaves) * LEAF
-            for i in range(first, min(first + LEAF, n)):
-                distance = _sample_distance(samples, i, x, y)
-                if distance < least or (distance == least and i < site):
-                    least, site = distance, i
-            continue
-        near = 2 * node
-        near_distance, far_distance = _box_distance(boxes, near, x, y), _box_distance(boxes, near + 1, x, y)
-        if far_distance < near_distance:
-            near, near_distance, far_distance = near + 1, far_distance, near_distance
-        if far_distance <= least:
-            stack[depth] = near ^ 1
-            depth += 1
-        if near_distance <= least:
-            stack[depth] = near
-            depth += 1
+    node = leaves + site // LEAF
+    least, site = _nearest_in_leaf(x, y, node - leaves, least, site, samples)
+    while node > 1:
+        stack[0] = node ^ 1
+        node >>= 1
+        depth = 1
+        while depth:
+            depth -= 1
+            other = stack[depth]
+            if _box_distance(boxes, other, x, y) > least:
+                continue
+            if other >= leaves:
+                least, site = _nearest_in_leaf(x, y, other - leaves, least, site, samples)
+            else:
+                stack[depth], stack[depth + 1] = 2 * other, 2 * other + 1
+                depth += 2
     return site
 
 
+@_inlined
+def _in_cell(x: float, y: float, site: int, samples: Any, links: Any) -> bool:
+    """Whether a point between the bisectors with both neighbours is surely in the Voronoi cell of a sample.
+
+    The cell is convex and holds the edges that it shares with the neighbours, so it holds what lies between their ends. False
+    also where there is no neighbour or no such edge (NaN), and within a thousandth of the cell's border.
+    """
+    row, before = SAMPLE_WIDTH * site, links[LINK_WIDTH * site + 1]
+    if before < 0 or links[LINK_WIDTH * site] < 0:
+        return False
+    earlier = SAMPLE_WIDTH * before
+    dx, dy = x - samples[row], y - samples[row + 1]
+    inside = True
+    for end in (16, 18):
+        ax, ay = _WITHIN * (samples[earlier + end] - samples[row]), _WITHIN * (samples[earlier + end + 1] - samples[row + 1])
+        bx, by = _WITHIN * (samples[row + end] - samples[row]), _WITHIN * (samples[row + end + 1] - samples[row + 1])
+        side = (bx - ax) * (dy - ay) - (by - ay) * (dx - ax)
+        inside = inside and (side < 0.0 if end == 16 else side > 0.0)
+    return inside
+
+
 @_compiled
+def _nearest_in_leaf(x: float, y: float, leaf: int, least: float, site: int, samples: Any) -> tuple[float, int]:
+    for i in range(leaf * LEAF, min((leaf + 1) * LEAF, len(samples) // SAMPLE_WIDTH)):
+        distance = _sample_distance(samples, i, x, y)
+        if distance < least or (distance == least and i < site):
+            least, site = distance, i
+    return least, site
+
+
+@_inlined
 def _sample_distance(samples: Any, site: int, x: float, y: float) -> float:
     dx, dy = x - samples[SAMPLE_WIDTH * site], y - samples[SAMPLE_WIDTH * site + 1]
     return float(dx * dx + dy * dy)
 
 
-@_compiled
+@_inlined
 def _reach(x: float, y: float, site: int, samples: Any) -> tuple[float, float]:
     """Coordinates of a point along the tangent and the normal of a sample."""
     row = SAMPLE_WIDTH * site
@@ -781,7 +834,7 @@ def _reach(x: float, y: float, site: int, samples: Any) -> tuple[float, float]:
     return dx * samples[row + 2] + dy * samples[row + 3], dx * samples[row + 4] + dy * samples[row + 5]
 
 
-@_compiled
+@_inlined
 def _facing_sample(x: float, y: float, site: int, samples: Any, links: Any) -> tuple[int, bool]:
     """The sample, or its twin on the other side of a corner, on a piece that the point faces; the nearer tangent wins."""
     ahead, off = _reach(x, y, site, samples)
@@ -795,7 +848,7 @@ def _facing_sample(x: float, y: float, site: int, samples: Any, links: Any) -> t
     return site, faced
 
 
-@_compiled
+@_inlined
 def _faced(ahead: float, site: int, links: Any) -> bool:
     return (links[LINK_WIDTH * site + 1] >= 0 or ahead >= 0.0) and (links[LINK_WIDTH * site] >= 0 or ahead <= 0.0)
 
@@ -818,7 +871,7 @@ def _on_sample(x: float, y: float, site: int, samples: Any, links: Any, best: An
     best[7] = 2.0 if links[LINK_WIDTH * site + 3] else 1.0
 
 
-@_compiled
+@_inlined
 def _on_circle(a: float, b: float, curvature: float) -> tuple[float, float, float]:
     """Signed distance of (a, b) to a circle through the origin with its centre on the second axis, and its gradient."""
     s = curvature * (a * a + b * b) - 2.0 * b
@@ -828,7 +881,7 @@ def _on_circle(a: float, b: float, curvature: float) -> tuple[float, float, floa
     return -s / (1.0 + root), -curvature * a / root, (1.0 - curvature * b) / root
 
 
-@_compiled
+@_inlined
 def _on_osculating_circle(x: float, y: float, site: int, samples: Any) -> tuple[float, float, float]:
     row = SAMPLE_WIDTH * site
     a, b = _reach(x, y, site, samples)
@@ -836,7 +889,7 @@ def _on_osculating_circle(x: float, y: float, site: int, samples: Any) -> tuple[
     return left, along * samples[row + 2] + across * samples[row + 4], along * samples[row + 3] + across * samples[row + 5]
 
 
-@_compiled
+@_inlined
 def _on_pole_circle(x: float, y: float, site: int, samples: Any) -> tuple[float, float, float]:
     """Left-signed distance to the pole circle on the point's side (equations 2 and 3, the reading `side`), and its gradient."""
     row = SAMPLE_WIDTH * site
@@ -899,15 +952,18 @@ def _on_chords(x: float, y: float, site: int, samples: Any, links: Any) -> tuple
     return left, gx, gy
 
 
-@_compiled
+@_inlined
 def _from_sample(x: float, y: float, site: int, left: float, gx: float, gy: float, samples: Any, domain: Any, best: Any) -> None:
     """Complete a projection; the foot's arc length from the sample is that along the osculating circle."""
     row = SAMPLE_WIDTH * site
     foot_x, foot_y = x - left * gx, y - left * gy
     ahead, off = _reach(foot_x, foot_y, site, samples)
     curvature = samples[row + 6]
-    travel = ahead
-    if abs(curvature * ahead) > 1e-9:
+    turn = curvature * ahead / (1.0 - curvature * off)
+    if abs(turn) < 1e-2 and curvature * off < 1.0:  # as a rule: samples lie densely; the next term of the series is below round-off
+        square = turn * turn
+        travel = ahead / (1.0 - curvature * off) * (1.0 - square * (1 / 3 - square * (1 / 5 - square / 7)))
+    else:
         travel = np.arctan2(curvature * ahead, 1.0 - curvature * off) / curvature
     closed = domain[3] != 0.0
     best[0] = _on_curve(samples[row + 7] + travel / samples[row + 9], domain[0], domain[1], closed)
@@ -915,9 +971,13 @@ def _from_sample(x: float, y: float, site: int, left: float, gx: float, gy: floa
     best[8] = _on_curve(samples[row + 8] + travel, 0.0, domain[2], closed)
 
 
-@_compiled
+@_inlined
 def _on_curve(value: float, start: float, end: float, closed: bool) -> float:
-    return start + (value - start) % (end - start) if closed else min(max(value, start), end)
+    if not closed:
+        return min(max(value, start), end)
+    if start <= value < end:
+        return value
+    return start + (value - start) % (end - start)
 
 
 # --- the fine registration ----------------------------------------------------------------------------------------------
@@ -1127,9 +1187,9 @@ def _evaluate(
         moved[2 * i] = c * x - s * y + pose[1]
         moved[2 * i + 1] = s * x + c * y + pose[2]
     reals, integers, samples, links, boxes, starts, domain = tables
-    _project(seen, reals, integers, feet, 0, m)
+    _project(seen, reals, integers, feet, np.zeros(1, dtype=np.int64))
     if method != _EXACT:
-        _project_on_samples(seen, samples, links, boxes, starts, domain, method, feet, 0, m)
+        _project_on_samples(seen, samples, links, boxes, starts, domain, method, feet, np.zeros(1, dtype=np.int64))
     _add_up(weights, before, takes_part, outward, tip, pose, span, moved, feet, sums)
 
 
