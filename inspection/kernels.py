@@ -182,6 +182,9 @@ def _share(work: Callable[[NDArray[np.int64]], None], m: int, threads: int | Non
     claimed = np.zeros(1, dtype=np.int64)
     if threads is None:
         threads = (os.cpu_count() or 1) if m >= _SHARED else 1
+    if threads == 1:
+        work(claimed)
+        return
     helping = [_HELPERS.submit(work, claimed) for _ in range(min(threads, -(-m // _CHUNK)) - 1)]
     work(claimed)
     for help_given in helping:
@@ -1090,7 +1093,7 @@ def _settle_pose(
     state[:3] = pose
     state[3] = here[_SQUARE] / here[_COUNT] if here[_COUNT] > 0.0 else np.inf
     state[4], state[5] = _centre(pose, span)
-    _covariance(here, span[2], covariance)
+    _covariance(here, span[2], here[_SQUARE] / max(here[_COUNT] - 3.0, 1.0), covariance)
     return steps, settled
 
 
@@ -1295,12 +1298,11 @@ def _newton_step(sums: Any, reach: float, step: Any) -> None:
 
 
 @_compiled
-def _covariance(sums: Any, reach: float, covariance: Any) -> None:
+def _covariance(sums: Any, reach: float, scatter: float, covariance: Any) -> None:
     """Inverse of the normal matrix times the scatter; the reach as standard deviation of what is not determined."""
     matrix, values, vectors = np.empty((3, 3)), np.empty(3), np.empty((3, 3))
     _scaled(sums, 0.0, reach, matrix)
     _eigen(matrix, values, vectors)
-    scatter = sums[_SQUARE] / max(sums[_COUNT] - 3.0, 1.0)
     vectors[2] /= reach
     covariance[:] = 0.0
     for i in range(3):
@@ -1355,6 +1357,111 @@ def _eigen(matrix: Any, values: Any, vectors: Any) -> None:
                     vectors[k, p], vectors[k, q] = c * a - s * b, s * a + c * b
     for i in range(3):
         values[i] = matrix[i, i]
+
+
+class GrowingSums:
+    """Normal equations of a pose that grow point by point, about a pose fitted before.
+
+    With p the small motion about `centre_mm` (2,) since that fit, every point adds J J' and J (e - J p): their minimum moves on
+    without touching earlier points again. Besides: what the deviations change from point to point, which is noise, and which
+    64ths of the profile's length hold points.
+    """
+
+    def __init__(self, centre_mm: Array, reach_mm: float, length_mm: float) -> None:
+        self.motion = np.zeros(3)  # shift in mm, rotation in rad
+        self._frame = (np.array([*centre_mm, reach_mm, length_mm]), self.motion)
+        self._sums, self._change, self._marks = np.zeros(_SUMS), np.zeros(1), np.zeros(64)
+
+    def add(self, foot_mm: Array, normal: Array, deviation_mm: Array, station_mm: Array, verdicts: NDArray[np.int8]) -> None:
+        """Take in points (m,) judged at the motion so far; those without a verdict (negative) take no part."""
+        _grow(foot_mm, normal, deviation_mm, station_mm, verdicts, *self._frame, self._sums, self._change, self._marks)
+
+    def move(self) -> None:
+        """Set the motion to the minimum."""
+        _move(self._sums, *self._frame)
+
+    @property
+    def count(self) -> float:
+        """Points taken in."""
+        return float(self._sums[_COUNT])
+
+    @property
+    def mean_square(self) -> float:
+        """Of the deviations, mm^2."""
+        return float(self._sums[_SQUARE] / max(self.count, 1.0))
+
+    @property
+    def noise(self) -> float:
+        """Half the mean squared change of the deviation from point to point, mm^2."""
+        return float(self._change[0] / max(self.count, 1.0) / 2.0)
+
+    @property
+    def covered(self) -> float:
+        """Share of the length that holds points."""
+        return float(self._marks.mean())
+
+    def spread_mm(self, places_mm: Array, normals: Array, scatter: float) -> float:
+        """Largest standard deviation of the pose's effect on a deviation at any place, for independent errors of that variance."""
+        return float(_spread(places_mm, normals, scatter, self._frame[0], self._sums))
+
+
+@_compiled
+def _grow(
+    foot: Any,
+    normal: Any,
+    deviation: Any,
+    station: Any,
+    verdicts: Any,
+    frame: Any,
+    motion: Any,
+    sums: Any,
+    change: Any,
+    marks: Any,
+) -> None:
+    previous = np.nan
+    for i in range(len(verdicts)):
+        if verdicts[i] < 0:
+            continue
+        gx, gy, e = normal[i, 0], normal[i, 1], deviation[i]
+        turn = (foot[i, 0] - frame[0]) * gy - (foot[i, 1] - frame[1]) * gx
+        rest = e - (gx * motion[0] + gy * motion[1] + turn * motion[2])
+        sums[0] += gx * rest
+        sums[1] += gy * rest
+        sums[2] += turn * rest
+        sums[3] += gx * gx
+        sums[4] += gx * gy
+        sums[5] += gx * turn
+        sums[6] += gy * gy
+        sums[7] += gy * turn
+        sums[8] += turn * turn
+        sums[_SQUARE] += e * e
+        sums[_COUNT] += 1.0
+        if not np.isnan(previous):
+            change[0] += (e - previous) * (e - previous)
+        previous = e
+        marks[min(max(int(station[i] / frame[3] * len(marks)), 0), len(marks) - 1)] = 1.0
+
+
+@_compiled
+def _move(sums: Any, frame: Any, motion: Any) -> None:
+    step = np.empty(4)
+    _newton_step(sums, frame[2], step)
+    motion[:] = step[:3]
+
+
+@_compiled
+def _spread(places: Any, normals: Any, scatter: float, frame: Any, sums: Any) -> float:
+    covariance = np.empty((3, 3))
+    _covariance(sums, frame[2], scatter, covariance)
+    most = 0.0
+    for i in range(len(places)):
+        gx, gy = normals[i, 0], normals[i, 1]
+        turn = (places[i, 0] - frame[0]) * gy - (places[i, 1] - frame[1]) * gx
+        x = covariance[0, 0] * gx + covariance[0, 1] * gy + covariance[0, 2] * turn
+        y = covariance[1, 0] * gx + covariance[1, 1] * gy + covariance[1, 2] * turn
+        t = covariance[2, 0] * gx + covariance[2, 1] * gy + covariance[2, 2] * turn
+        most = max(most, gx * x + gy * y + turn * t)
+    return float(np.sqrt(most))
 
 
 def strides(points_mm: Array, step_mm: float) -> NDArray[np.int64]:

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from inspection.deviations import Method
 from inspection.errors import RegistrationError
 from inspection.fine import ranked_poses, register, register_fine
-from inspection.kernels import judge, placed, take_in
+from inspection.kernels import GrowingSums, judge, placed, take_in
 from inspection.minimum_zone import fit_minimum_zone
 from inspection.nominal import NominalProfile
 from inspection.profile_error import check_tip_radius, deviations, feet_on
@@ -42,6 +42,7 @@ _CLEARLY_BETTER = 0.5  # of the next best pose's rms
 _CORRELATION = 0.125  # share of the length over which form error is taken as one independent value: two to four waves around
 _PRIOR_SHARE = 1 / 6  # of the zone's width: standard deviation of the form error expected where nothing is measured yet
 _MISFIT = 0.02  # rms above this share of the nominal's size is no registration of the same part
+_PLACES = 16  # every so many samples of the nominal are asked how far a deviation there may still move
 _MIRROR_HINT = 0.2  # a mirrored fit must be better by this factor to be named as the cause
 
 
@@ -214,7 +215,7 @@ class LiveInspection:
         if not clear or scores[0] > _MISFIT * size:
             return None
         track = self._fresh_track(register_fine(points, self._nominal, poses[0][1], tip_radius_mm=self._tip), points)
-        return track if track.can_move_mm < _MISFIT * size else None
+        return track if track.can_move_mm() < _MISFIT * size else None
 
     def _fresh_track(self, registration: Registration, points: Array) -> "_PoseTrack":
         return _PoseTrack(registration, points, self._nominal, self._tip, _PRIOR_SHARE * (self._zone.upper_mm - self._zone.lower_mm))
@@ -230,7 +231,7 @@ class LiveInspection:
             rows.station[first:stop].copy(),
             rows.deviation[first:stop].copy(),
             rows.verdicts[first:stop].copy(),
-            0.0 if self._datum is not None else float("nan") if self._track is None else self._track.can_move_mm,
+            0.0 if self._datum is not None else float("nan") if self._track is None else self._track.can_move_mm(),
             self._track.registration if self._track is not None else None,
         )
 
@@ -335,76 +336,52 @@ class _Rows:
 
 
 class _PoseTrack:
-    """The provisional pose: accumulated normal equations about a fitted pose, one constant-cost update a block.
-
-    With p the small motion about `centre` since the fit, each block adds J'J and J'(e - J p_then): the minimum moves on
-    without touching earlier points again.
-    """
+    """The provisional pose: normal equations that grow about a fitted pose, one constant-cost update a block."""
 
     def __init__(
         self, registration: Registration, points: Array, nominal: NominalProfile, tip_radius_mm: float, expected_form_mm: float
     ) -> None:
         self.registration = registration
-        self.pose = registration.nominal_from_section
         self.fitted = len(points)
-        self._start, self._centre, self._nominal = self.pose, registration.centre_mm, nominal
-        self._motion: Array = np.zeros(3)
+        self._start, self._centre, self._expected_form_mm = self.pose, registration.centre_mm, expected_form_mm
+        self._places, self._normals = nominal.points_mm[::_PLACES], nominal.outward * nominal.normal[::_PLACES]
+        reach = float(np.hypot(*(self._places - self._centre).T).max())
+        self._sums = GrowingSums(self._centre, reach, nominal.length_mm)
         d = deviations(self.pose.apply(points), nominal, tip_radius_mm=tip_radius_mm)
-        J = self._gradients(self.pose.apply(points), d.normal)[~d.beyond_end]
-        e = d.deviation_mm[~d.beyond_end]
-        self._normal, self._right = J.T @ J, J.T @ e
-        self._expected_form_mm = expected_form_mm
-        self._sum_square, self._sum_change, self._count = float(e @ e), _changes(e), len(e)
-        self._stations = np.zeros(64, dtype=bool)
-        self._reach = float(np.hypot(*(nominal.points_mm - self._centre).T).max())
-        self._mark(d.station_mm)
-        self.can_move_mm = self._can_move_mm()
+        part = np.where(d.beyond_end, np.int8(NOT_JUDGED), np.int8(0))
+        self._sums.add(d.foot_mm, d.normal, d.deviation_mm, d.station_mm, part)
+        self._can_move_mm: float | None = None  # asked for at most once a batch, and only batches that end a block change it
+
+    @property
+    def pose(self) -> RigidTransform:
+        """Where the points lie at this moment."""
+        return self.registration.nominal_from_section
 
     def refine(self, rows: _Rows, first: int, stop: int) -> None:
         """Take in a block of rows judged at this track's pose."""
-        judged = first + np.flatnonzero(rows.verdicts[first:stop] != NOT_JUDGED)
-        e = rows.deviation[judged]
-        J = self._gradients(rows.foot[judged], rows.normal[judged])
-        self._normal += J.T @ J
-        self._right += J.T @ (e - J @ self._motion)
-        self._sum_square += float(e @ e)
-        self._sum_change += _changes(e)
-        self._count += len(e)
-        self._mark(rows.station[judged])
-        self._motion = np.asarray(-np.linalg.lstsq(self._normal, self._right, rcond=1e-12)[0], dtype=np.float64)
-        self.pose = about(self._centre, self._motion[2], self._motion[:2]).after(self._start)
-        self.registration = replace(self.registration, nominal_from_section=self.pose)
-        self.can_move_mm = self._can_move_mm()
+        block = slice(first, stop)
+        self._sums.add(rows.foot[block], rows.normal[block], rows.deviation[block], rows.station[block], rows.verdicts[block])
+        self._sums.move()
+        x, y, angle = self._sums.motion.tolist()
+        pose = about(self._centre, angle, np.array([x, y])).after(self._start)
+        self.registration = replace(self.registration, nominal_from_section=pose)
+        self._can_move_mm = None
 
-    def _can_move_mm(self) -> float:
+    def can_move_mm(self) -> float:
         """Largest 95 % shift of a deviation anywhere on the profile by what the pose is still uncertain.
 
         What changes from point to point is noise, independent at every point. The rest is form error, one value for every
         eighth of the length: a scan of a few such patches is trusted no more than its patches, less those that the pose
         itself used up. Where nothing is measured yet, form error of a sixth of the zone's width is expected.
         """
-        covered = float(self._stations.mean())
-        patches = max(covered / _CORRELATION, 1.0)
-        noise = self._sum_change / max(self._count, 1)
-        form = max(self._sum_square / max(self._count, 1) - noise, 0.0) * patches / max(patches - 3.0, 0.5)
-        form = max(form, self._expected_form_mm**2 * (1 - covered))
-        covariance = np.linalg.pinv(self._normal, hermitian=True) * (noise + form * self._count / patches)
-        J = self._gradients(self._nominal.points_mm[::16], self._nominal.outward * self._nominal.normal[::16])
-        return 2.0 * float(np.sqrt(np.maximum(((J @ covariance) * J).sum(axis=1), 0.0).max()))
-
-    def _gradients(self, points: Array, normal: Array) -> Array:
-        arm = points - self._centre
-        return np.column_stack([normal, arm[:, 0] * normal[:, 1] - arm[:, 1] * normal[:, 0]])
-
-    def _mark(self, station_mm: Array) -> None:
-        share = station_mm / self._nominal.length_mm * len(self._stations)
-        self._stations[np.clip(share.astype(np.int64), 0, len(self._stations) - 1)] = True
-
-
-def _changes(e: Array) -> float:
-    """Half the sum of squared changes from point to point: the sum of squares of what is noise."""
-    steps = np.diff(e)
-    return float(steps @ steps) / 2
+        if self._can_move_mm is not None:
+            return self._can_move_mm
+        sums = self._sums
+        patches = max(sums.covered / _CORRELATION, 1.0)
+        form = max(sums.mean_square - sums.noise, 0.0) * patches / max(patches - 3.0, 0.5)
+        form = max(form, self._expected_form_mm**2 * (1 - sums.covered))
+        self._can_move_mm = 2.0 * sums.spread_mm(self._places, self._normals, sums.noise + form * sums.count / patches)
+        return self._can_move_mm
 
 
 def _size(nominal: NominalProfile) -> float:
