@@ -25,6 +25,7 @@ Index = NDArray[np.int64]
 Material = Literal["left", "right"]
 
 _FARTHEST = 0.1  # of the profile's size: farther points are not asked to meet an accuracy
+_STRAIGHT = 1e-9  # curvature times size: less is round-off of a straight line
 _SCOUT_SAMPLES = 2000  # even samples from which the poles are read before the spacing is chosen
 _MOST_SAMPLES = 400_000  # a refinement beyond this is a step limit set too small, not a profile
 
@@ -150,7 +151,7 @@ def _accurate(curve: NurbsCurve, grid: FootGrid, accuracy_mm: float, method: Met
     sides = ((poles_there.left_curvature, curvature), (poles_there.right_curvature, -curvature))
     farthest = _FARTHEST * float(np.hypot(*np.ptp(scout.points_mm, axis=0)))
     pole_error = np.maximum(*(_pole_error(k, bend, farthest) for k, bend in sides))
-    radius = 1 / np.maximum(poles_there.left_curvature, poles_there.right_curvature)
+    radius = 1 / np.maximum(np.maximum(poles_there.left_curvature, poles_there.right_curvature), 1 / (10 * farthest))
     order = np.argsort(u, kind="stable")
     start, end = curve.domain
 
@@ -167,7 +168,7 @@ def _accurate(curve: NurbsCurve, grid: FootGrid, accuracy_mm: float, method: Met
 def _pole_error(pole_curvature: Array, curvature: Array, farthest_mm: float) -> Array:
     """Error of a pole circle per squared spacing, for points up to half the pole radius off and no farther than told."""
     excess = np.abs(pole_curvature - curvature)
-    return np.asarray(3 / 8 * excess + np.minimum(0.5 / pole_curvature, farthest_mm) * excess**2 / 8)
+    return np.asarray(3 / 8 * excess + 0.5 / np.maximum(pole_curvature, 0.5 / farthest_mm) * excess**2 / 8)
 
 
 def _widest(values: Array) -> Array:
@@ -210,20 +211,22 @@ def _profile(curve: NurbsCurve, material: Material, pieces: list[Array], grid: F
     tangent = first / speed[:, None]
     normal = np.column_stack([-tangent[:, 1], tangent[:, 0]])
     at_end = (following < 0) | (previous < 0)
+    curvature = (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / (speed * speed * speed)
+    is_straight = np.abs(curvature) * np.hypot(*np.ptp(point, axis=0)) < _STRAIGHT
     fields: _Fields = {
         "curve": curve,
         "parameter": u,
         "points_mm": point,
         "tangent": tangent,
         "normal": normal,
-        "curvature": (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / (speed * speed * speed),
+        "curvature": curvature,
         "station_mm": curve.station_mm(u),
         "speed": speed,
         "next_site": following,
         "previous_site": previous,
         "twin": twin,
         "is_open_end": is_open_end,
-        "poles": site_poles(point, normal, following, at_end),
+        "poles": site_poles(point, normal, following, at_end, is_straight),
     }
     return NominalProfile(material=material, unmet=0, tree=cKDTree(point), grid=grid, samples=pack_samples(**fields), **fields)
 

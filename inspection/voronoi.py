@@ -2,7 +2,8 @@
 
 Algorithm 1, steps 4 to 9 of Hari Ganesh & Samuel (2022): the sites are enclosed in a box so that no Voronoi vertex lies
 at infinity; the vertices of a cell farthest from its site on either side of the profile are its poles (Amenta & Bern),
-centres of circles that touch the profile there and approximate the medial axis.
+centres of circles that touch the profile there and approximate the medial axis. Beyond the paper: on straight parts a pole
+that only the box keeps from infinity is one at infinity, whatever the size of the box.
 """
 
 from dataclasses import dataclass
@@ -23,11 +24,12 @@ class SitePoles:
     """Poles of n sites, by side of the profile (left of the direction of travel, right of it).
 
     A pole circle touches its site in the unit direction `left` or `right` with curvature `1 / radius`, so that a pole
-    at infinity is curvature 0.
+    at infinity is curvature 0: the circle is the tangent.
 
     left, right                     : (n, 2) unit directions from the site to its pole
     left_curvature, right_curvature : (n,) 1/mm
-    angle_deg                       : (n,) angle at the site between its two poles, 180 in the limit of dense sampling
+    angle_deg                       : (n,) angle at the site between its two farthest vertices on either side, those of the box
+                                      included, as published; 180 in the limit of dense sampling
     edge_left_mm, edge_right_mm     : (n, 2) ends of the Voronoi edge shared with the next site; NaN where there is none
     """
 
@@ -44,13 +46,16 @@ class SitePoles:
             getattr(self, name).setflags(write=False)
 
 
-def site_poles(sites_mm: Array, normal: Array, next_site: NDArray[np.int64], is_end: NDArray[np.bool_]) -> SitePoles:
+def site_poles(
+    sites_mm: Array, normal: Array, next_site: NDArray[np.int64], is_end: NDArray[np.bool_], is_straight: NDArray[np.bool_]
+) -> SitePoles:
     """Poles of every site.
 
     sites_mm  : (n, 2); coinciding sites (both sides of a corner) share one cell
     normal    : (n, 2) unit normals, to the left
     next_site : (n,) index of the neighbour along the profile, -1 where a piece ends
     is_end    : (n,) ends and corners: their pole directions are plus and minus the normal, whatever the cell says
+    is_straight : (n,) sites of straight parts: what lies out in the box is at infinity there
     """
     site_of, cells = _distinct(sites_mm)  # (n,), (c, 2)
     diagram = Voronoi(np.vstack([cells, _box(cells)]))
@@ -58,7 +63,9 @@ def site_poles(sites_mm: Array, normal: Array, next_site: NDArray[np.int64], is_
     ends = np.asarray(diagram.ridge_vertices, dtype=np.int64)  # (r, 2) vertices, -1 at infinity
     inner = np.all(ends >= 0, axis=1)
     ridges, ends = ridges[inner], ends[inner]
-    left, right, left_radius, right_radius, angle = _poles(sites_mm, normal, site_of, ridges, ends, diagram.vertices)
+    at_box = np.zeros(len(diagram.vertices), dtype=bool)
+    at_box[ends[(ridges >= len(cells)).any(axis=1)]] = True
+    left, right, left_radius, right_radius, angle = _poles(sites_mm, normal, site_of, ridges, ends, diagram.vertices, at_box, is_straight)
     left = np.where(is_end[:, None], normal, left)
     right = np.where(is_end[:, None], -normal, right)
     edge_left, edge_right = _shared_edges(sites_mm, normal, next_site, site_of, ridges, ends, diagram.vertices)
@@ -82,7 +89,14 @@ def _box(sites_mm: Array) -> Array:
 
 
 def _poles(
-    sites_mm: Array, normal: Array, site_of: NDArray[np.int64], ridges: NDArray[np.int64], ends: NDArray[np.int64], vertices: Array
+    sites_mm: Array,
+    normal: Array,
+    site_of: NDArray[np.int64],
+    ridges: NDArray[np.int64],
+    ends: NDArray[np.int64],
+    vertices: Array,
+    at_box: NDArray[np.bool_],
+    is_straight: NDArray[np.bool_],
 ) -> tuple[Array, Array, Array, Array, Array]:
     """Pole directions and radii on both sides, and the angle between the pole and the opposite one."""
     n = len(sites_mm)
@@ -92,7 +106,8 @@ def _poles(
     counts = np.diff(start)[site_of]  # (n,)
     site = np.repeat(np.arange(n), counts)
     within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    reach = vertices[by_cell[np.repeat(start[site_of], counts) + within]] - sites_mm[site]  # (pairs, 2) from site to vertex
+    corner = by_cell[np.repeat(start[site_of], counts) + within]
+    reach = vertices[corner] - sites_mm[site]  # (pairs, 2) from site to vertex
     radius = np.hypot(reach[:, 0], reach[:, 1])
     farthest = _first_per_site(site, radius, np.ones(len(site), dtype=bool), n)
     opposite = _first_per_site(site, radius, (reach * reach[farthest[site]]).sum(axis=1) < 0, n)
@@ -100,10 +115,11 @@ def _poles(
     on_left, on_right = _first_per_site(site, radius, side, n), _first_per_site(site, radius, ~side, n)
     angle = _angle_deg(reach[farthest], reach[opposite])
     angle[opposite < 0] = 0.0
-    left_radius, right_radius = np.where(on_left < 0, np.inf, radius[on_left]), np.where(on_right < 0, np.inf, radius[on_right])
-    left = np.where((on_left < 0)[:, None], normal, reach[on_left] / radius[on_left][:, None])
-    right = np.where((on_right < 0)[:, None], -normal, reach[on_right] / radius[on_right][:, None])
-    return left, right, left_radius, right_radius, angle
+    left_far = (on_left < 0) | (is_straight & at_box[corner[on_left]])
+    right_far = (on_right < 0) | (is_straight & at_box[corner[on_right]])
+    left = np.where(left_far[:, None], normal, reach[on_left] / radius[on_left][:, None])
+    right = np.where(right_far[:, None], -normal, reach[on_right] / radius[on_right][:, None])
+    return left, right, np.where(left_far, np.inf, radius[on_left]), np.where(right_far, np.inf, radius[on_right]), angle
 
 
 def _first_per_site(site: NDArray[np.int64], radius: Array, chosen: NDArray[np.bool_], n: int) -> NDArray[np.int64]:
