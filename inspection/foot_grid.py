@@ -12,20 +12,13 @@ from numpy.typing import NDArray
 
 from inspection.curve import NurbsCurve, left_of
 from inspection.errors import NominalError
+from inspection.kernels import BLOCK_LEVEL, FAR, LISTED, MOST_BRANCHES, VERTEX_WIDTH
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-FAR, LISTED = -1, -2  # what a cell holds instead of a piece: nothing, or LISTED - (place of its list)
-MOST_BRANCHES = 4  # cells with more stretches than this are left to the search over the whole curve
 LIST_WIDTH = 1 + MOST_BRANCHES
 HEADER = 16  # numbers before the packed tables, in both arrays
-PIECE_WIDTH = (
-    24  # 6 + 6 coefficients of x and y, parameter at the middle and per unit of t, valid t from and to, 8 coefficients of the arc length
-)
-VERTEX_WIDTH = 8  # x, y, pseudo-normal x, y, parameter, kind, arc length, 0
-
-BLOCK_LEVEL = 6  # the quadtree's root is cut into 64 x 64 blocks, found by one division
 _DEEPEST = 11  # smallest cells: half a thousandth of the size of the curve
 _NEAR = 0.015  # band in which cells may become that small, as a fraction of the size
 _BAND = 0.08  # band of the whole grid: beyond it every point is searched for along the whole curve

@@ -8,7 +8,7 @@ vectorised and scalar code. Nothing is compiled when this file is imported; the 
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 from llvmlite import ir
@@ -17,10 +17,24 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from inspection.foot_grid import BLOCK_LEVEL, FAR, LISTED, MOST_BRANCHES, PIECE_WIDTH, VERTEX_WIDTH, FootGrid
-from inspection.sample_table import LEAF, LINK_WIDTH, SAMPLE_WIDTH, SampleTable
+if TYPE_CHECKING:
+    from inspection.foot_grid import FootGrid
+    from inspection.sample_table import SampleTable
 
 Array = NDArray[np.float64]
+
+# The layout of the packed tables. All that the loops are compiled from stands in this file: numba's cache looks at its age only.
+FAR, LISTED = -1, -2  # what a cell holds instead of a piece: nothing, or LISTED - (place of its list)
+MOST_BRANCHES = 4  # cells with more stretches than this are left to the search over the whole curve
+BLOCK_LEVEL = 6  # the quadtree's root is cut into 64 x 64 blocks, found by one division
+# A piece: 6 + 6 coefficients of x and y, parameter at the middle and per unit of t, valid t from and to, 8 coefficients of the arc length
+PIECE_WIDTH = 24
+VERTEX_WIDTH = 8  # x, y, pseudo-normal x, y, parameter, kind, arc length, 0
+# A sample: place, tangent, normal (2 each), curvature, parameter, station, speed, left and right pole direction (2 each), their
+# curvatures, left and right end of the Voronoi edge shared with the next sample (2 each)
+SAMPLE_WIDTH = 20
+LINK_WIDTH = 4  # next, previous, twin, 1 at an open end
+LEAF = 16  # samples in a leaf of the search tree
 
 _BLOCK = 128  # points worked on together: their intermediate values stay in the first-level cache
 _QUEUE = _BLOCK * (MOST_BRANCHES + 1)  # a block is taken while fewer than a block's items wait
@@ -35,7 +49,7 @@ _STEP = 3e-9  # largest last step, in pieces, after which the square of the erro
 _CHUNK = 8 * _BLOCK  # points that a thread claims at a time
 _SHARED = 65_536  # points from which a batch is worth waking other threads
 SAMPLE_METHODS = ("circle", "chord", "pcp", "veaw")
-_EXACT, _CIRCLE, _CHORD, _PCP = range(-1, 3)
+_CIRCLE, _CHORD, _PCP = range(3)
 _HELPERS = ThreadPoolExecutor(max(1, (os.cpu_count() or 1) - 1), "projection")  # started when first needed: a start takes 0.1 ms
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -155,7 +169,7 @@ class Feet(NamedTuple):
     vertex: NDArray[np.uint8]
 
 
-def project(points_mm: Array, grid: FootGrid, threads: int | None = None) -> Feet:
+def project(points_mm: Array, grid: "FootGrid", threads: int | None = None) -> Feet:
     """Globally closest points of the curve of `grid` to points (m, 2). Points that are not finite give NaN.
 
     threads : None chooses by the number of points; the result is the same.
@@ -201,7 +215,7 @@ def compile_kernels() -> None:
     exact: Any = _project
     on_samples: Any = _project_on_samples
     exact.compile((fixed, fixed, index32, feet, claimed))
-    on_samples.compile((fixed, fixed, index64, fixed, index64, fixed, types.int64, feet, claimed))
+    on_samples.compile((fixed, types.Tuple((fixed, index64, fixed, index64, fixed, types.int64)), feet, claimed))
 
 
 # Where the memory of a block keeps what, _BLOCK numbers each. Reals: the row of the piece (24 columns), then
@@ -699,32 +713,23 @@ def _finish_vertex(x: float, y: float, vertices: Any, row: int, grain: float, be
 # --- the paper's methods: projections made at the nearest sample ---------------------------------------------------------
 
 
-def project_on_samples(points_mm: Array, grid: FootGrid, table: SampleTable, method: str, threads: int | None = None) -> Feet:
+def project_on_samples(points_mm: Array, grid: "FootGrid", table: "SampleTable", method: str, threads: int | None = None) -> Feet:
     """Feet of points (m, 2) by a method that looks at samples only: circle, chord, pcp or veaw (see profile_error).
 
     The grid merely says where to begin the search for the nearest sample. Points that are not finite give NaN.
     """
     points = _flat(points_mm)
     feet = _empty_feet(len(points) // 2)
-    number, tables = SAMPLE_METHODS.index(method), table.flat
+    samples = (*table.flat, SAMPLE_METHODS.index(method))
     _share(lambda claimed: _project(points, grid.reals, grid.integers, feet, claimed), len(feet.vertex), threads)
-    _share(lambda claimed: _project_on_samples(points, *tables, number, feet, claimed), len(feet.vertex), threads)
+    _share(lambda claimed: _project_on_samples(points, samples, feet, claimed), len(feet.vertex), threads)
     return feet
 
 
 @_compiled
-def _project_on_samples(
-    points: Any,
-    samples: Any,
-    links: Any,
-    boxes: Any,
-    starts: Any,
-    domain: Any,
-    method: int,
-    feet: Any,
-    claimed: Any,
-) -> None:
+def _project_on_samples(points: Any, tables: Any, feet: Any, claimed: Any) -> None:
     """Projections of the points, chunk by chunk as claimed; feet hold the exact ones and take the new ones in their place."""
+    samples, links, boxes, starts, domain, method = tables
     stack, best = np.empty(64, dtype=np.int64), np.empty(9)
     first = _claim(claimed)
     while first < len(feet.vertex):
@@ -1024,73 +1029,59 @@ class PoseFit:
     weights : (m,) share of each point in the sums; a settled fit has set those of points that hover at an open end to 0
     """
 
-    def __init__(self, points_mm: Array, grid: FootGrid, table: SampleTable, method: str, outward: float, tip_radius_mm: float) -> None:
+    def __init__(self, points_mm: Array, grid: "FootGrid", table: "SampleTable", method: str, outward: float, tip_radius_mm: float) -> None:
         m = len(points_mm)
         moved = np.empty(2 * m)
         self.weights = np.ones(m)
-        number = SAMPLE_METHODS.index(method) if method in SAMPLE_METHODS else _EXACT
-        tables = (grid.reals, grid.integers, *table.flat)
-        self._problem = (_flat(points_mm), self.weights, tables, number, float(outward), float(tip_radius_mm))
+        self._problem = (_flat(points_mm), self.weights, grid.reals, grid.integers, float(outward), float(tip_radius_mm))
+        self._samples = (*table.flat, SAMPLE_METHODS.index(method)) if method in SAMPLE_METHODS else None
         self._memory = (moved, _flat(moved), np.ones(m), np.empty(m), _empty_feet(m))
 
     def settle(self, pose: tuple[float, float, float], most_steps: int) -> Fit:
         """From a pose to the least mean square of the deviations, by at most so many steps."""
-        state, covariance = np.empty(6), np.empty((3, 3))
-        state[:3] = pose
-        steps, settled = _settle_pose(*self._problem, self._memory, state, covariance, most_steps)
+        state, covariance = np.array([*pose, 0.0, 0.0, 0.0]), np.empty((3, 3))
+        steps, settled = _settle_pose(self._problem, self._samples, self._memory, state, covariance, most_steps)
         angle, x, y, mean_square, _, _ = state.tolist()
         return Fit((angle, x, y), steps, settled, mean_square, state[4:], covariance)
 
     def outliers(self, pose: tuple[float, float, float], mads: float, most_steps: int, settled_mm: float) -> NDArray[np.bool_]:
         """Points (m,) farther than so many median absolute deviations, once the fit by Tukey's weights moves no point further."""
         found = np.zeros(len(self.weights), dtype=np.bool_)
-        _find_outliers(*self._problem, self._memory, np.array(pose), mads, most_steps, settled_mm, found)
+        _find_outliers(self._problem, self._samples, self._memory, pose, mads, most_steps, settled_mm, found)
         return found
 
 
 @_compiled
-def _settle_pose(
-    points: Any,
-    weights: Any,
-    tables: Any,
-    method: int,
-    outward: float,
-    tip: float,
-    memory: Any,
-    state: Any,
-    covariance: Any,
-    most_steps: int,
-) -> tuple[int, bool]:
+def _settle_pose(problem: Any, samples: Any, memory: Any, state: Any, covariance: Any, most_steps: int) -> tuple[int, bool]:
     """Full Newton steps where the second derivative allows, each halved until the mean square falls."""
+    points, weights, _, _, outward, tip = problem
     moved, seen, takes_part, new_part, feet = memory
-    span, step = _span(points), np.zeros(4)
-    pose, next_pose, here, trial = state[:3].copy(), np.empty(3), np.empty(_SUMS), np.empty(_SUMS)
-    _evaluate(points, weights, tables, method, outward, tip, pose, span, moved, seen, takes_part, takes_part, feet, here)
+    span, pose, here, trial = _span(points), (state[0], state[1], state[2]), np.empty(_SUMS), np.empty(_SUMS)
+    _evaluate(problem, samples, pose, span, moved, seen, takes_part, takes_part, feet, here)
     steps, settled, lower = 0, False, True
     while lower and not settled and steps < most_steps:
         steps += 1
-        _newton_step(here, span[2], step)
-        lower = False
+        step, next_pose, share, lower = _newton_step(here, span[2]), pose, 1.0, False
         for _ in range(_HALVINGS):
-            _moved_pose(pose, span, step, next_pose)
-            settled = step[3] <= _STANDSTILL_MM  # it changes no deviation by more: nothing to project again
+            next_pose = _moved_pose(pose, span, step, share)
+            settled = share * step[3] <= _STANDSTILL_MM  # it changes no deviation by more: nothing to project again
             if settled:
                 break
-            _evaluate(points, weights, tables, method, outward, tip, next_pose, span, moved, seen, takes_part, new_part, feet, trial)
+            _evaluate(problem, samples, next_pose, span, moved, seen, takes_part, new_part, feet, trial)
             lower = trial[_SQUARE_BEFORE] <= here[_SQUARE] * (1.0 + 1e-12)
             if lower:
                 break
-            step *= 0.5
-        if lower and steps >= _HOVERING_STEPS and step[3] < _HOVERING_MM and trial[_COUNT] != here[_COUNT]:
+            share *= 0.5
+        if lower and steps >= _HOVERING_STEPS and share * step[3] < _HOVERING_MM and trial[_COUNT] != here[_COUNT]:
             for i in range(len(weights)):
                 weights[i] *= takes_part[i] * new_part[i]
             _add_up(weights, takes_part, new_part, outward, tip, next_pose, span, moved, feet, trial)
-        if lower or settled:
-            pose[:] = next_pose
         if lower:
-            here[:] = trial
-            takes_part[:] = new_part
-    state[:3] = pose
+            here, trial = trial, here
+            takes_part, new_part = new_part, takes_part
+        if lower or settled:
+            pose = next_pose
+    state[0], state[1], state[2] = pose
     state[3] = here[_SQUARE] / here[_COUNT] if here[_COUNT] > 0.0 else np.inf
     state[4], state[5] = _centre(pose, span)
     _covariance(here, span[2], here[_SQUARE] / max(here[_COUNT] - 3.0, 1.0), covariance)
@@ -1098,26 +1089,15 @@ def _settle_pose(
 
 
 @_compiled
-def _find_outliers(
-    points: Any,
-    weights: Any,
-    tables: Any,
-    method: int,
-    outward: float,
-    tip: float,
-    memory: Any,
-    pose: Any,
-    mads: float,
-    most_steps: int,
-    settled_mm: float,
-    found: Any,
-) -> None:
+def _find_outliers(problem: Any, samples: Any, memory: Any, pose: Any, mads: float, most_steps: int, settled_mm: float, found: Any) -> None:
     """Weighted steps; the weights follow from the deviations at every pose."""
+    points, weights, _, _, outward, tip = problem
     moved, seen, takes_part, off, feet = memory
-    span, step, sums, next_pose, m = _span(points), np.empty(4), np.empty(_SUMS), np.empty(3), len(weights)
+    span, sums, m = _span(points), np.empty(_SUMS), len(weights)
     for _ in range(most_steps):
-        weights[:] = 1.0
-        _evaluate(points, weights, tables, method, outward, tip, pose, span, moved, seen, takes_part, takes_part, feet, sums)
+        for i in range(m):
+            weights[i] = 1.0
+        _evaluate(problem, samples, pose, span, moved, seen, takes_part, takes_part, feet, sums)
         for i in range(m):
             off[i] = abs(outward * feet.distance_mm[i] - tip)
         limit = mads * np.median(off[takes_part > 0.0]) if sums[_COUNT] > 0.0 else np.inf
@@ -1126,9 +1106,8 @@ def _find_outliers(
             weights[i] = (1.0 - share * share) ** 2 if off[i] < limit else 0.0
             found[i] = off[i] >= limit and takes_part[i] > 0.0
         _add_up(weights, takes_part, takes_part, outward, tip, pose, span, moved, feet, sums)
-        _newton_step(sums, span[2], step)
-        _moved_pose(pose, span, step, next_pose)
-        pose[:] = next_pose
+        step = _newton_step(sums, span[2])
+        pose = _moved_pose(pose, span, step, 1.0)
         if step[3] <= settled_mm:
             break
 
@@ -1156,43 +1135,32 @@ def _centre(pose: Any, span: Any) -> tuple[float, float]:
 
 
 @_compiled
-def _moved_pose(pose: Any, span: Any, step: Any, moved: Any) -> None:
-    """The pose, then a rotation about its centre and a shift: the centre moves by the shift alone."""
+def _moved_pose(pose: Any, span: Any, step: Any, share: float) -> tuple[float, float, float]:
+    """The pose after a share of a step: its rotation about the centre, which moves by its shift alone."""
     x, y = _centre(pose, span)
-    angle = pose[0] + step[2]
-    moved[0] = np.arctan2(np.sin(angle), np.cos(angle))
-    c, s = np.cos(moved[0]), np.sin(moved[0])
-    moved[1] = x + step[0] - (c * span[0] - s * span[1])
-    moved[2] = y + step[1] - (s * span[0] + c * span[1])
+    angle = pose[0] + share * step[2]
+    angle = np.arctan2(np.sin(angle), np.cos(angle))
+    c, s = np.cos(angle), np.sin(angle)
+    return angle, x + share * step[0] - (c * span[0] - s * span[1]), y + share * step[1] - (s * span[0] + c * span[1])
 
 
 @_compiled
 def _evaluate(
-    points: Any,
-    weights: Any,
-    tables: Any,
-    method: int,
-    outward: float,
-    tip: float,
-    pose: Any,
-    span: Any,
-    moved: Any,
-    seen: Any,
-    before: Any,
-    takes_part: Any,
-    feet: Any,
-    sums: Any,
+    problem: Any, samples: Any, pose: Any, span: Any, moved: Any, seen: Any, before: Any, takes_part: Any, feet: Any, sums: Any
 ) -> None:
-    """Points at a pose: moved there (`seen` is the same memory), their feet, and the sums over them."""
+    """Points at a pose: moved there (`seen` is the same memory), their feet, and the sums over them.
+
+    samples : tables and number of a method that looks at samples only, or None for the exact feet
+    """
+    points, weights, reals, integers, outward, tip = problem
     c, s, m = np.cos(pose[0]), np.sin(pose[0]), len(weights)
     for i in range(m):
         x, y = points[2 * i], points[2 * i + 1]
         moved[2 * i] = c * x - s * y + pose[1]
         moved[2 * i + 1] = s * x + c * y + pose[2]
-    reals, integers, samples, links, boxes, starts, domain = tables
     _project(seen, reals, integers, feet, np.zeros(1, dtype=np.int64))
-    if method != _EXACT:
-        _project_on_samples(seen, samples, links, boxes, starts, domain, method, feet, np.zeros(1, dtype=np.int64))
+    if samples is not None:
+        _project_on_samples(seen, samples, feet, np.zeros(1, dtype=np.int64))
     _add_up(weights, before, takes_part, outward, tip, pose, span, moved, feet, sums)
 
 
@@ -1202,7 +1170,8 @@ def _add_up(
 ) -> None:
     """The sums, in columns of their own for every place in a block, so that the loop vectorises, and always in the same order."""
     w = carray(_stack_reals(), _REALS)
-    w[: _SUMS * _BLOCK] = 0.0
+    for i in range(_SUMS * _BLOCK):
+        w[i] = 0.0
     x0, y0 = _centre(pose, span)
     for block in range(0, len(weights), _BLOCK):
         end = min(block + _BLOCK, len(weights))
@@ -1275,7 +1244,7 @@ def _add_point(
 
 
 @_compiled
-def _newton_step(sums: Any, reach: float, step: Any) -> None:
+def _newton_step(sums: Any, reach: float) -> tuple[float, float, float, float]:
     """Shift and rotation to the least (weighted) mean square of the second-order model, and how far they move the farthest point.
 
     Full second derivative where it is positive definite, its Gauss-Newton part otherwise; motions that the points do not
@@ -1284,17 +1253,17 @@ def _newton_step(sums: Any, reach: float, step: Any) -> None:
     matrix, values, vectors = np.empty((3, 3)), np.empty(3), np.empty((3, 3))
     _scaled(sums, 1.0, reach, matrix)
     _eigen(matrix, values, vectors)
-    if values.min() <= _TRUSTED * values.max():
+    if min(values[0], values[1], values[2]) <= _TRUSTED * max(values[0], values[1], values[2]):
         _scaled(sums, 0.0, reach, matrix)
         _eigen(matrix, values, vectors)
-    step[:] = 0.0
+    x = y = turn = 0.0
     for i in range(3):
-        if values[i] > _FREE * values.max():
+        if values[i] > _FREE * max(values[0], values[1], values[2]):
             along = vectors[0, i] * sums[_SLOPE] + vectors[1, i] * sums[_SLOPE + 1] + vectors[2, i] * (sums[_SLOPE + 2] / reach)
-            for k in range(3):
-                step[k] -= vectors[k, i] * (along / values[i])
-    step[3] = np.hypot(step[0], step[1]) + abs(step[2])
-    step[2] /= reach
+            x -= vectors[0, i] * (along / values[i])
+            y -= vectors[1, i] * (along / values[i])
+            turn -= vectors[2, i] * (along / values[i])
+    return x, y, turn / reach, np.hypot(x, y) + abs(turn)
 
 
 @_compiled
@@ -1303,10 +1272,12 @@ def _covariance(sums: Any, reach: float, scatter: float, covariance: Any) -> Non
     matrix, values, vectors = np.empty((3, 3)), np.empty(3), np.empty((3, 3))
     _scaled(sums, 0.0, reach, matrix)
     _eigen(matrix, values, vectors)
-    vectors[2] /= reach
-    covariance[:] = 0.0
+    for k in range(3):
+        for j in range(3):
+            covariance[k, j] = 0.0
     for i in range(3):
-        variance = scatter / values[i] if values[i] > _FREE * values.max() else reach * reach
+        variance = scatter / values[i] if values[i] > _FREE * max(values[0], values[1], values[2]) else reach * reach
+        vectors[2, i] /= reach
         for k in range(3):
             for j in range(3):
                 covariance[k, j] += variance * vectors[k, i] * vectors[j, i]
@@ -1444,9 +1415,7 @@ def _grow(
 
 @_compiled
 def _move(sums: Any, frame: Any, motion: Any) -> None:
-    step = np.empty(4)
-    _newton_step(sums, frame[2], step)
-    motion[:] = step[:3]
+    motion[0], motion[1], motion[2], _ = _newton_step(sums, frame[2])
 
 
 @_compiled

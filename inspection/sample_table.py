@@ -6,16 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inspection.curve import NurbsCurve
+from inspection.kernels import LEAF
 from inspection.voronoi import SitePoles
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-
-# A sample: place, tangent, normal (2 each), curvature, parameter, station, speed, left and right pole direction (2 each), their
-# curvatures, left and right end of the Voronoi edge shared with the next sample (2 each)
-SAMPLE_WIDTH = 20
-LINK_WIDTH = 4  # next, previous, twin, 1 at an open end
-LEAF = 16  # samples in a leaf of the search tree
 
 
 @dataclass(frozen=True, slots=True, eq=False)
