@@ -46,7 +46,7 @@ from cmmlink.nominal_files import NominalFile, load_nominal, material_side
 from cmmlink.open3d_doctor import look_after_open3d
 from cmmlink.parts import planned_inspection, planned_profile, profile_of
 from cmmlink.pipeline import RunOutcome, run_inspection
-from cmmlink.plan import Device, FileDevice, ModbusDevice, Plan, SerialDevice, load_plan, place_of
+from cmmlink.plan import Device, FileDevice, ModbusDevice, Plan, Registration, SerialDevice, load_plan, place_of
 from cmmlink.recorder import Basis, Evidence, Recorder, software
 from cmmlink.records import check_chain, default_folder, describe, find_run, list_runs, reading, recorded_run, recording
 from cmmlink.replay import Replay
@@ -86,6 +86,9 @@ _LONGEST_PLAN = 200_000
 Connect = Callable[[Plan], AbstractContextManager[Connected]]
 PlanFile = Annotated[Path, typer.Argument(metavar="PLAN.yaml", help="The inspection plan.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of words.")]
+RejectOutliers = Annotated[
+    bool, typer.Option("--reject-outliers", help="Fit without gross outliers and reject them; conform is then not proven.")
+]
 Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for deviations.csv, result.json and profile.png.")]
 Records = Annotated[Path | None, typer.Option("--records", metavar="DIR", help="Folder of the run records.")]
 RunName = Annotated[str, typer.Argument(metavar="RUN", help="The id of a run, the beginning of one, or last.")]
@@ -325,7 +328,7 @@ def _naming(plan_file: Path, key: str) -> Iterator[None]:
 
 def _run(plan: Plan, profile: NominalProfile, device: Connected, telling: Telling) -> int:
     """Carry out a plan and tell what came of it."""
-    _rehearsed(profile)
+    _rehearsed(profile, plan.registration)
     live = planned_inspection(plan, profile)
     started = RunStarted(plan.part.name, plan.part.serial_number or "", plan.operator or "", device.device, device.simulated)
     table = LiveTable(Console(stderr=True), plan.tolerance.zone)
@@ -389,13 +392,13 @@ def _basis(plan: Plan) -> Basis:
     return Basis(plan.effective_yaml(), plan.nominal.file.name, plan.nominal.file.read_bytes(), software())
 
 
-def _rehearsed(profile: NominalProfile) -> None:
+def _rehearsed(profile: NominalProfile, registration: Registration) -> None:
     """Have everything compiled before a device is asked for points, saying so when that takes a while."""
-    message = "cmmlink: compiling the inspection, once after installation (about ten seconds)\n"
+    message = "cmmlink: compiling the inspection, once after installation (about twenty seconds)\n"
     patience = threading.Timer(1.0, sys.stderr.write, (message,))
     patience.start()
     try:
-        rehearse(profile)
+        rehearse(profile, registration.method, registration.reject_outliers)
     finally:
         patience.cancel()
 
@@ -534,15 +537,26 @@ def inspect(
     coverage_min: Annotated[
         float, typer.Option(min=0, max=1, metavar="SHARE", help="Share of the nominal to be measured before conform is proven.")
     ] = 0.95,
+    reject_outliers: RejectOutliers = False,
     out: Out = None,
     as_json: Json = False,
 ) -> int:
     """Inspect a file of points."""
     zone = _zone(tolerance, uncertainty)
+    if reject_outliers and fit is FitName.NONE:
+        raise PlanError("--reject-outliers needs a fit: outliers are found by fitting the other points. Leave out --fit none")
     profile = profile_of(load_nominal(nominal, scale, closed), nominal, material.value if material else None)
     source = PointFileSource(points)
     try:
-        live = LiveInspection(profile, zone, fit=fit.value, method=method.value, tip_radius_mm=tip_radius, coverage_min=coverage_min)
+        live = LiveInspection(
+            profile,
+            zone,
+            fit=fit.value,
+            method=method.value,
+            tip_radius_mm=tip_radius,
+            coverage_min=coverage_min,
+            reject_outliers=reject_outliers,
+        )
     except ValueError as error:
         raise PlanError(f"--tip-radius {tip_radius:g}: {error}") from None
     prepare(out)
@@ -583,6 +597,7 @@ def ct(
     closed: Annotated[bool | None, typer.Option("--closed/--open", help="Close the nominal, or leave it open.")] = None,
     material: Annotated[Side | None, typer.Option(help="Side of the material, seen along the nominal.")] = None,
     coverage_min: Annotated[float, typer.Option(help="Share of a nominal to be there before conform is proven.")] = 0.95,
+    reject_outliers: RejectOutliers = False,
     cutter: Annotated[CutterName, typer.Option(help="auto: Open3D, and numpy for more than 50 sections; same points.")] = CutterName.AUTO,
     weld: Annotated[float, typer.Option(metavar="MM", help="Loose ends no farther apart are one point.")] = 1e-6,
     shortest: Annotated[float | None, typer.Option(metavar="MM", help="Shorter pieces are dust; 5 % of the longest if not given.")] = None,
@@ -609,7 +624,7 @@ def ct(
             "nominal_at": own_nominals(nominal_at or ()),
         },
         "cut": {"cutter": cutter.value, "weld_mm": weld, "shortest_mm": shortest},
-        "registration": {"fit": fit.value, "method": method.value, "coverage_min": coverage_min},
+        "registration": {"fit": fit.value, "method": method.value, "coverage_min": coverage_min, "reject_outliers": reject_outliers},
     }
     return _ct(plan_from(settings), Telling(False, as_json, out), pictures)
 
@@ -753,7 +768,8 @@ def _section(plan: CtPlan, outcome: SectionOutcome, plan_name: str) -> Section:
 def doctor() -> int:
     """Look at what cmmlink needs of this computer, and mend or name what is missing."""
     typer.echo(f"cmmlink {__version__} on Python {platform.python_version()}, {platform.system()} {platform.machine()}")
-    _rehearsed(planned_profile(load_plan(demo_plan_file())))
+    plan = load_plan(demo_plan_file())
+    _rehearsed(planned_profile(plan), plan.registration)
     typer.echo("inspection: compiled and working")
     folder = default_folder()
     nearest = next(path for path in (folder, *folder.parents) if path.exists())

@@ -263,6 +263,7 @@ def _run(
         method=registration.method,
         section=SectionPlane(cut.height_mm * cut.axes.normal, cut.axes.x, cut.axes.normal),
         coverage_min=registration.coverage_min,
+        reject_outliers=registration.reject_outliers,
         provisional=False,
     )
     source = ContourSource(judged, plan.mesh.file.name)

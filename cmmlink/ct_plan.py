@@ -15,7 +15,7 @@
       cutter: auto                            # auto, open3d, numpy; auto: Open3D, and numpy for more than 50 sections
       weld_mm: 1e-6                           # loose ends no farther apart are one point
       shortest_mm: null                       # shorter pieces are dust; null: 5 % of the section's longest
-    registration: {fit: best-fit, method: exact, datum: null, coverage_min: 0.95}
+    registration: {fit: best-fit, method: exact, datum: null, coverage_min: 0.95, reject_outliers: false}
     out: null
 
 Relative paths are relative to the plan's own folder.

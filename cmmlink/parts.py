@@ -50,4 +50,5 @@ def planned_inspection(plan: Plan, profile: NominalProfile) -> LiveInspection:
         section=SectionPlane(np.array(section.origin_mm), np.array(section.x_axis), np.array(section.normal)),
         off_section_max_mm=section.off_plane_max_mm,
         coverage_min=registration.coverage_min,
+        reject_outliers=registration.reject_outliers,
     )

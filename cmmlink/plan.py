@@ -43,6 +43,7 @@ A plan needs four keys; everything else has the default shown. Relative paths ar
       method: exact                 # exact, circle, chord, pcp, veaw, inversion
       datum: null                   # {rotation_deg: 0, translation_mm: [0, 0]}: known pose, nominal from section
       coverage_min: 0.95            # fraction of the nominal's length to be measured before conform is proven
+      reject_outliers: false        # find gross outliers, fit without them, report them as rejected; conform is then not proven
     discretisation: {samples: 10000, pole_angle_min_deg: 178.0, step_min: 1e-4}
     buffer_points: 500000
     out: null                       # folder for the results; null: none written
@@ -230,6 +231,7 @@ class Registration(_Settings):
     fit: Annotated[Literal["best-fit", "minimum-zone", "none"], Field(validate_default=True)] = "best-fit"
     method: Literal["exact", "circle", "chord", "pcp", "veaw", "inversion"] = "exact"
     coverage_min: Annotated[float, Field(ge=0, le=1)] = 0.95
+    reject_outliers: bool = False
 
     @model_validator(mode="before")
     @classmethod
@@ -242,6 +244,13 @@ class Registration(_Settings):
         if fit != "none" and info.data.get("datum") is not None:
             raise ValueError("none, or no fit at all, beside a datum: a known pose is not fitted away")
         return fit
+
+    @field_validator("reject_outliers")
+    @classmethod
+    def _outliers_are_those_of_a_fit(cls, reject: bool, info: ValidationInfo) -> bool:
+        if reject and info.data.get("fit") == "none":
+            raise ValueError("false without a fit: outliers are found by fitting the other points")
+        return reject
 
 
 class Discretisation(_Settings):

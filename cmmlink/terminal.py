@@ -12,7 +12,7 @@ from rich.table import Table
 
 from cmmlink.events import Arrived, Counts, Event, Judged, RunStarted
 from drivers.source import LinkDown, LinkUp, ScanOpened
-from inspection import InspectionResult, LiveUpdate, ToleranceZone, Verdict
+from inspection import InspectionResult, LiveUpdate, Rejection, ToleranceZone, Verdict
 
 WORDS = {Verdict.CONFORM: "CONFORM", Verdict.UNCERTAIN: "NOT PROVEN", Verdict.NONCONFORM: "NOT CONFORM"}
 STYLES = {Verdict.CONFORM: "bold green", Verdict.UNCERTAIN: "bold yellow", Verdict.NONCONFORM: "bold red"}
@@ -136,10 +136,13 @@ def _reservations(result: InspectionResult | None) -> Iterator[str]:
         yield "nothing was judged"
         return
     near = int(np.count_nonzero(result.verdicts == Verdict.UNCERTAIN))
+    outliers = result.rejected_by_reason.get(Rejection.OUTLIER.words, 0)
     if not result.complete:
         yield "the scan was cut short"
-    if result.coverage < _WHOLE or (result.verdict == Verdict.UNCERTAIN and result.complete and not near):
+    if result.coverage < _WHOLE or (result.verdict == Verdict.UNCERTAIN and result.complete and not near and not outliers):
         yield f"only {result.coverage:.1%} of the nominal was measured: nothing is known of the rest"
+    if outliers:
+        yield f"{outliers} outliers were rejected, not judged: look whether they are dirt or a defect"
     if near:
         yield f"{near} points lie nearer to a limit than the uncertainty"
     if not result.registration.converged:

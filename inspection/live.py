@@ -76,7 +76,8 @@ class LiveInspection:
     tip_radius_mm   : points are centres of a ball of this radius
     section         : plane for points in space (m, 3); off_section_max_mm rejects points farther from it
     coverage_min    : share of the nominal's length below which conformity is not proven
-    reject_outliers : find gross outliers in the final registration and reject them
+    reject_outliers : find gross outliers in the final registration and reject them. What was rejected was not judged, and from
+                      far off a defect looks like dust: conformity is then not proven
     provisional     : False seeks no pose before `finish`, for points that are all there from the start; the result is the same
     """
 
@@ -267,7 +268,7 @@ class LiveInspection:
         station, deviation, verdicts = settled.station[judged], settled.deviation[judged], settled.verdicts[judged]
         covered = coverage(station, self._nominal)
         verdict = self._zone.verdict(deviation)
-        proven = complete and covered >= self._coverage_min
+        proven = complete and covered >= self._coverage_min and not registration.outliers.any()
         return InspectionResult(
             settled.actual,
             settled.foot,
@@ -286,12 +287,12 @@ class LiveInspection:
         )
 
 
-def rehearse(nominal: NominalProfile) -> None:
-    """Inspect a made-up scan of the nominal itself, so that every compiled loop is compiled before a real scan begins.
+def rehearse(nominal: NominalProfile, method: Method = "exact", reject_outliers: bool = False) -> None:
+    """Inspect a made-up scan of the nominal itself, so that every loop it needs is compiled before a real scan begins.
 
     Takes seconds on the first use after an installation, milliseconds from the cache afterwards.
     """
-    live = LiveInspection(nominal, ToleranceZone(-1.0, 1.0))
+    live = LiveInspection(nominal, ToleranceZone(-1.0, 1.0), method=method, reject_outliers=reject_outliers)
     points = nominal.points_mm[:: max(1, len(nominal) // (4 * _BLOCK))]
     live.add(np.column_stack([points, np.zeros(len(points))]))
     live.add(points)

@@ -55,7 +55,7 @@ class InspectionResult:
     deviation_mm : (m,) positive out of material
     verdicts     : (m,) codes of `Verdict`
     rejection    : (m,) codes of `Rejection`
-    verdict      : on the profile; not better than uncertain where the scan was incomplete
+    verdict      : on the profile; not better than uncertain where the scan was incomplete or outliers were rejected
     coverage     : share of the nominal's length that has points
     complete     : the scan came to its end
     """

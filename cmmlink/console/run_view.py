@@ -311,6 +311,8 @@ def _why(ended: Ended, verdict: Verdict, coverage_min: float) -> str:
         return "no point could be judged"
     if facts["coverage"] < coverage_min:
         return f"only {facts['coverage']:.1%} measured, {coverage_min:.1%} needed"
+    if outliers := facts["rejected_by_reason"].get("outlier"):
+        return f"{_points(outliers)} rejected as outliers, not judged"
     return "too close to a limit for the uncertainty"
 
 

@@ -389,7 +389,8 @@ class Station:
 
     def _measure(self, plan: Plan, profile: NominalProfile, started: RunStarted, view: RunView) -> None:
         with ExitStack() as stack:
-            rehearse(profile)  # compiled before the device is asked for points: ten seconds, once after installation
+            # compiled before the device is asked for points: twenty seconds, once after installation
+            rehearse(profile, plan.registration.method, plan.registration.reject_outliers)
             view.prepared()
             live = planned_inspection(plan, profile)
             connected = stack.enter_context(self._means.connect(plan))

@@ -89,6 +89,22 @@ def test_a_part_measured_in_part_says_so(nominal: Path) -> None:
     assert said in proven.out.splitlines()
 
 
+def test_rejected_outliers_neither_pass_nor_prove_a_part(nominal: Path) -> None:
+    noisy = np.random.default_rng(3).normal(0, 0.004, 360)
+    noisy[[40, 41, 200, 300]] = (1.5, 1.5, -0.8, 2.0)
+    points = write_points(nominal.parent / "points.csv", oval_points(noisy))
+    told = ("inspect", points, "--nominal", nominal, *TOLERANCE)
+    assert cmmlink(*told, "--json").json()["verdict"] == "nonconform"
+    ended = cmmlink(*told, "--reject-outliers")
+    assert ended.code == 3
+    lines = ended.out.splitlines()
+    assert lines[1] == "  4 outliers were rejected, not judged: look whether they are dirt or a defect"
+    assert "received 360 = judged 356 + rejected 4; lost 0 points" in lines
+    facts = cmmlink(*told, "--reject-outliers", "--json").json()
+    assert (facts["verdict"], facts["rejected_by_reason"], facts["out_of_tolerance"]) == ("uncertain", {"outlier": 4}, 0)
+    assert facts["max_deviation_mm"] < 0.02
+
+
 def test_many_stretches_are_summed_up(nominal: Path) -> None:
     deviation = np.where(np.arange(360) % 20 == 0, 0.1 + np.arange(360) * 1e-4, 0.0)
     lines = [line for line in inspected(nominal, deviation).out.splitlines() if "out of tolerance" in line]
@@ -344,6 +360,7 @@ WRONG_OPTIONS = [
     (("--scale", 0), r"the scale must be a positive number, not 0"),
     (("--scale", "nan"), r"the scale must be a positive number, not nan"),
     (("--coverage-min", 2), r"Invalid value for '--coverage-min': .*less than or equal to 1"),
+    (("--reject-outliers",), r"--reject-outliers needs a fit: .*Leave out --fit none"),
     (("--metod", "exact"), r"No such option: --metod.*--method"),
     (("further.csv",), r"Got unexpected extra argument"),
     (("--out",), r"Option '--out' requires an argument"),

@@ -123,6 +123,10 @@ MISTAKES = {
         SHORT.replace("address", "adress"),
         "line 6: device.adress is not a known key; did you mean address? Allowed: type, address, baud_rate, silence_s",
     ),
+    "outliers without a fit": (
+        SHORT + "registration:\n  fit: none\n  reject_outliers: true\n",
+        "line 9: registration.reject_outliers is 'true'; expected false without a fit: outliers are found by fitting the other points",
+    ),
     "baud rate": (SHORT.replace("COM3", "COM3, baud_rate: 9.6k"), "line 6: device.baud_rate is '9.6k'; expected a whole number"),
     "device no mapping": (
         SHORT.replace("{type: serial, address: COM3}", "COM3"),
