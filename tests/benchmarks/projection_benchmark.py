@@ -5,14 +5,13 @@
 Every table is one process: the ways are timed in turn, round after round, and the median round counts, so that a busy
 machine slows all of them alike. Points lie evenly in the parameter, at random up to 1 mm off the curve, in order or
 shuffled. Errors are of the distance, against the oracle of the tests, which shares no code with the kernels.
-Rivals that are not installed are left out: pip install 'cmmlink[bench]'.
+Rivals that are not installed are left out: pip install 'cmmlink[bench]'. With --rivals and --millions the tables are written to
+tests/benchmarks/projection.md.
 """
 
 import argparse
 import importlib
 import importlib.util
-import os
-import platform
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -25,11 +24,13 @@ from inspection import NurbsCurve
 from inspection.foot_grid import FootGrid, build_foot_grid
 from inspection.kernels import compile_kernels, project, project_on_samples
 from inspection.nominal import NominalProfile, discretize
+from tests.benchmarks.machine import machine
 from tests.inspection import profiles
 from tests.inspection import projections_reference as reference
 from tests.inspection.oracle import closest_point
 from tests.inspection.profiles import Array
 
+RESULT = Path(__file__).with_name("projection.md")
 Distances = Callable[[Array], Array]
 PROFILES: dict[str, Callable[[], NurbsCurve]] = {
     "P1": profiles.p1,
@@ -74,11 +75,18 @@ def rounds_ns(ways: dict[str, Callable[[Array], object]], points: Array, rounds:
     return {name: float(np.median(times)) for name, times in taken.items()}
 
 
-def errors_mm(way: Distances, points: Array, curve: NurbsCurve) -> tuple[float, float]:
-    """Largest and mean error of the distance over at most 1,000 of the points."""
-    few = points[:: max(1, len(points) // 1000)]
-    error = np.abs(way(few) - np.abs(closest_point(curve, few).left_mm))
-    return float(error.max()), float(error.mean())
+def errors_mm(way: Distances, points: Array, truth: Array) -> str:
+    """Largest and mean error of the distance, against the true ones of some of the points."""
+    error = np.abs(way(_some(points)) - truth)
+    return f"{error.max():.0e} / {error.mean():.0e}"
+
+
+def true_distances(points: Array, curve: NurbsCurve) -> Array:
+    return np.abs(closest_point(curve, _some(points)).left_mm)
+
+
+def _some(points: Array) -> Array:
+    return points[:: max(1, len(points) // 1000)]
 
 
 def exact_way(grid: FootGrid, threads: int | None) -> Distances:
@@ -103,11 +111,11 @@ def main_table(sizes: list[int], rounds: int) -> Iterator[str]:
                     "inversion": inversion,
                 }
                 ns = rounds_ns(ways, points, rounds)
-                most, mean = errors_mm(exact_way(grid, 1), points, curve)
+                errors = errors_mm(exact_way(grid, 1), points, true_distances(points, curve))
                 yield (
                     f"| {name} | {count:,} | {'shuffled' if shuffled else 'ordered'} | {ns['exact']:.1f} | {ns['two']:.1f} "
                     f"| {ns['exact'] / ns['two']:.2f} | {ns['tree']:.0f} | **{ns['tree'] / ns['exact']:.1f}** | {ns['inversion']:.0f} "
-                    f"| **{ns['inversion'] / ns['exact']:.0f}** | {most:.0e} / {mean:.0e} |"
+                    f"| **{ns['inversion'] / ns['exact']:.0f}** | {errors} |"
                 )
 
 
@@ -308,43 +316,41 @@ def open3d_way(curve: NurbsCurve, samples: Array) -> Distances:
 
 RIVALS: dict[str, tuple[str, str, Callable[[NurbsCurve, Array], Distances], int]] = {
     # name, what it is measured with, its module, its maker, most points at a time
-    "engeom": ("distance to the polyline, a Python call a point", "engeom", engeom_way, 2_000),
+    "engeom": ("distance to the polyline, a Python call a point", "engeom", engeom_way, 100_000),
     "OpenCASCADE": ("its own projection, a Python call a point", "OCP", opencascade_way, 1_000),
-    "geomdl": ("Newton on its derivatives", "geomdl", geomdl_way, 200),
+    "geomdl": ("Newton on its derivatives", "geomdl", geomdl_way, 1_000),
     "splipy": ("Newton on its derivatives, all points at once", "splipy", splipy_way, 100_000),
-    "libigl": ("distance to the polyline", "igl", libigl_way, 100_000),
-    "small_gicp": ("nearest sample", "small_gicp", small_gicp_way, 100_000),
-    "Open3D": ("nearest sample, all cores", "open3d", open3d_way, 100_000),
+    "libigl": ("distance to the polyline", "igl", libigl_way, 1_000_000),
+    "small_gicp": ("nearest sample", "small_gicp", small_gicp_way, 1_000_000),
+    "Open3D": ("nearest sample, all cores", "open3d", open3d_way, 1_000_000),
 }
 
 
-def rivals_table(rounds: int) -> Iterator[str]:
-    yield "| profile | rival | what | ns a point | exact ns | ratio | max error mm | exact max error mm |"
-    yield "|---|---|---|---|---|---|---|---|"
+PACKAGES = ("engeom", "cadquery-ocp-novtk", "geomdl", "splipy", "libigl", "small_gicp", "open3d-cpu")
+
+
+def rivals_table(sizes: list[int], rounds: int) -> Iterator[str]:
+    missing = [rival for rival, (_, module, _, _) in RIVALS.items() if importlib.util.find_spec(module) is None]
+    yield f"Not installed: {', '.join(missing) or 'none'}. Ours: one thread."
+    yield ""
+    yield "| profile | points | order | rival | what | ns a point | exact ns | ratio | max / mean error mm | of exact |"
+    yield "|---|---|---|---|---|---|---|---|---|---|"
     for name, make in PROFILES.items():
         curve = make()
-        grid = build_foot_grid(curve)
+        ours = exact_way(build_foot_grid(curve), 1)
         samples = curve.point(np.linspace(*curve.domain, SAMPLES))
-        for rival, (what, module, maker, most) in RIVALS.items():
-            if importlib.util.find_spec(module) is None:
-                yield f"| {name} | {rival} | not installed | | | | | |"
-                continue
-            way = maker(curve, samples)
-            points = measured_points(curve, 100_000, np.random.default_rng(5), False)
-            few = points[:: len(points) // most]
-            theirs = rounds_ns({"way": way}, few, 3)["way"]
-            ours = rounds_ns({"exact": exact_way(grid, 1)}, points, rounds)["exact"]
-            theirs = min(theirs, rounds_ns({"way": way}, few, 2)["way"])
-            error, exact = errors_mm(way, few, curve)[0], errors_mm(exact_way(grid, 1), points, curve)[0]
-            yield f"| {name} | {rival} | {what} | {theirs:,.0f} | {ours:.1f} | **{theirs / ours:,.0f}** | {error:.0e} | {exact:.0e} |"
-
-
-def machine() -> str:
-    cpu = platform.processor() or platform.machine()
-    info = Path("/proc/cpuinfo")
-    if info.is_file():
-        cpu = next((line.split(":")[1].strip() for line in info.read_text().splitlines() if line.startswith("model name")), cpu)
-    return f"{cpu}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}, numpy {np.__version__}"
+        ways = {rival: maker(curve, samples) for rival, (_, _, maker, _) in RIVALS.items() if rival not in missing}
+        for count, shuffled in ((count, shuffled) for count in sizes for shuffled in (False, True)):
+            points = measured_points(curve, count, np.random.default_rng(5), shuffled)
+            truth = true_distances(points, curve)
+            able = {rival: way for rival, way in ways.items() if count <= RIVALS[rival][3]}
+            ns = rounds_ns({**able, "exact": ours}, points, rounds)
+            errors = errors_mm(ours, points, truth)
+            for rival, way in able.items():
+                yield (
+                    f"| {name} | {count:,} | {'shuffled' if shuffled else 'ordered'} | {rival} | {RIVALS[rival][0]} | {ns[rival]:,.0f} "
+                    f"| {ns['exact']:.1f} | **{ns[rival] / ns['exact']:,.0f}** | {errors_mm(way, points, truth)} | {errors} |"
+                )
 
 
 def main() -> None:
@@ -355,15 +361,19 @@ def main() -> None:
     options = parser.parse_args()
     begin = time.perf_counter()
     compile_kernels()
-    print(f"{machine()}; n = {SAMPLES:,} samples; kernels ready after {time.perf_counter() - begin:.1f} s\n")
+    versions = machine("numpy", "scipy", "numba", *PACKAGES)
+    lines = ["# Closest points", "", f"{versions} n = {SAMPLES:,} samples; kernels ready after {time.perf_counter() - begin:.1f} s.", ""]
+    print(*lines, sep="\n")
     sizes = [100_000] if options.quick else [1_000, 100_000, 1_000_000]
     tables = [main_table(sizes, 9), growth_in_points(options.millions), growth_in_samples(9), small_batches(), methods_table(5)]
     if options.rivals:
-        tables.append(rivals_table(9))
+        tables.append(rivals_table(sizes, 5))
     for table in tables:
-        for line in table:
+        for line in (*table, ""):
+            lines.append(line)
             print(line, flush=True)
-        print(flush=True)
+    if options.rivals and options.millions and not options.quick:
+        RESULT.write_text("\n".join(lines), encoding="utf-8")
 
 
 if __name__ == "__main__":

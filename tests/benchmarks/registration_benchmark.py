@@ -48,11 +48,11 @@ ZONE = ToleranceZone(-0.05, 0.05, 0.005)
 
 
 def speed(every: Profiles, rounds: int) -> Iterator[str]:
-    yield "| profile | start | steps | ms | off mm | ICP steps | ICP ms | off mm | ratio | engeom ms | off mm | ratio |"
-    yield "|---|---|---|---|---|---|---|---|---|---|---|---|"
+    yield "| profile | start | way | steps | ms | off mm | times ours |"
+    yield "|---|---|---|---|---|---|---|"
     for name, nominal in every.items():
         if isinstance(nominal, Missing):
-            yield f"| {name} | {nominal.reason} |" + " |" * 10
+            yield f"| {name} | {nominal.reason} |" + " |" * 5
             continue
         rng = np.random.default_rng(1)
         part = cross_section(nominal, even_stations(nominal, POINTS), random_pose(rng), rng)
@@ -60,57 +60,111 @@ def speed(every: Profiles, rounds: int) -> Iterator[str]:
         place, _ = best_place(nominal.curve, part.nominal_from_section.apply(points))
         starts = {"ours": register_coarse(points, nominal).nominal_from_section, "published": _published_coarse(points, nominal)}
         for kind, start in starts.items():
-            yield f"| {name} | {kind} | {_compared(points, nominal, start, place, rounds)} |"
+            for row in _compared(points, nominal, start, place, rounds):
+                yield f"| {name} | {kind} | {row} |"
 
 
 def _published_coarse(points: Array, nominal: NominalProfile) -> RigidTransform:
     return published_method.tuned(points, published_method.boxes(points, nominal), nominal)
 
 
-def _compared(points: Array, nominal: NominalProfile, start: RigidTransform, place: Array, rounds: int) -> str:
-    ways: dict[str, Callable[[], object]] = {
-        "ours": lambda: register_fine(points, nominal, start),
-        "icp": lambda: published_method.icp(points, nominal, start),
+Aligned = tuple[RigidTransform, int | None]  # a pose and the steps made, where the way tells
+
+
+def _compared(points: Array, nominal: NominalProfile, start: RigidTransform, place: Array, rounds: int) -> Iterator[str]:
+    ways: dict[str, Callable[[], Aligned]] = {
+        "Gauss-Newton": lambda: _ours(points, nominal, start),
+        "ICP, point inversion": lambda: published_method.icp(points, nominal, start),
     }
-    theirs: Callable[[], RigidTransform] | None = None
-    if importlib.util.find_spec("engeom") is not None:
-        theirs = _engeom(points, nominal, start)
-        ways["engeom"] = theirs
+    for package, make in {"engeom": _engeom, "small_gicp": _small_gicp, "open3d": _open3d}.items():
+        if importlib.util.find_spec(package) is not None:
+            ways[package] = make(points, nominal, start)
     ms = _medians_ms(ways, rounds)
-    ours = register_fine(points, nominal, start)
-    icp, iterations = published_method.icp(points, nominal, start)
-    cells = [f"{ours.iterations}", f"{ms['ours']:.2f}", f"{farthest_mm(ours.nominal_from_section, points, place):.0e}", f"{iterations}"]
-    cells += [f"{ms['icp']:.0f}", f"{farthest_mm(icp, points, place):.0e}", f"**{ms['icp'] / ms['ours']:.0f}**"]
-    if theirs is None:
-        return " | ".join([*cells, "not installed", "", ""])
-    return " | ".join(
-        [*cells, f"{ms['engeom']:.1f}", f"{farthest_mm(theirs(), points, place):.0e}", f"**{ms['engeom'] / ms['ours']:.1f}**"]
-    )
+    for way, align in ways.items():
+        pose, steps = align()
+        off = farthest_mm(pose, points, place)
+        yield f"{way} | {steps or ''} | {ms[way]:.3g} | {off:.0e} | {ms[way] / ms['Gauss-Newton']:.0f}"
 
 
-def _engeom(points: Array, nominal: NominalProfile, start: RigidTransform) -> Callable[[], RigidTransform]:
+def _ours(points: Array, nominal: NominalProfile, start: RigidTransform) -> Aligned:
+    found = register_fine(points, nominal, start)
+    return found.nominal_from_section, found.iterations
+
+
+def _engeom(points: Array, nominal: NominalProfile, start: RigidTransform) -> Callable[[], Aligned]:
     """Its least-squares alignment of points to the polygon of the 10,000 samples, without the robust rounds that follow by default."""
     from engeom.align2 import AlignParams2, points_to_curve
     from engeom.geom2 import Curve2, Point2
 
     polygon = Curve2(nominal.points_mm, tol=1e-9, force_closed=nominal.curve.closed)
 
-    def align() -> RigidTransform:
+    def align() -> Aligned:
         placed = start.apply(points)
         params = AlignParams2(center=Point2(*placed.mean(axis=0).tolist()))
         found = points_to_curve(placed, polygon, params, ignore_off_target=True, refinement_steps=0)
         matrix = found.alignment.full_transform.as_numpy()
-        return RigidTransform(float(np.arctan2(matrix[1, 0], matrix[0, 0])), matrix[:2, 2]).after(start)
+        return _planar(matrix).after(start), None
 
     return align
 
 
-def _medians_ms(ways: dict[str, Callable[[], object]], rounds: int) -> dict[str, float]:
+def _small_gicp(points: Array, nominal: NominalProfile, start: RigidTransform) -> Callable[[], Aligned]:
+    """Its point-to-point ICP onto the 10,000 samples on one thread; tree and target are made before."""
+    import small_gicp
+
+    target = small_gicp.PointCloud(_solid(nominal.points_mm))
+    tree = small_gicp.KdTree(target)
+
+    def align() -> Aligned:
+        source = small_gicp.PointCloud(_solid(start.apply(points)))
+        found = small_gicp.align(
+            target,
+            source,
+            tree,
+            registration_type="ICP",
+            max_correspondence_distance=10.0,
+            num_threads=1,
+            max_iterations=500,
+            rotation_epsilon=1e-8,
+            translation_epsilon=1e-6,
+        )
+        return _planar(found.T_target_source[:, [0, 1, 3]]).after(start), found.iterations
+
+    return align
+
+
+def _open3d(points: Array, nominal: NominalProfile, start: RigidTransform) -> Callable[[], Aligned]:
+    """Its point-to-plane ICP onto the 10,000 samples with the nominal's normals; the target is made before."""
+    import open3d
+
+    target = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(_solid(nominal.points_mm)))
+    target.normals = open3d.utility.Vector3dVector(_solid(nominal.normal))
+    kind = open3d.pipelines.registration
+    until = kind.ICPConvergenceCriteria(relative_fitness=1e-6, relative_rmse=1e-6, max_iteration=500)
+
+    def align() -> Aligned:
+        source = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(_solid(start.apply(points))))
+        found = kind.registration_icp(source, target, 10.0, np.eye(4), kind.TransformationEstimationPointToPlane(), until)
+        return _planar(found.transformation[:, [0, 1, 3]]).after(start), None
+
+    return align
+
+
+def _solid(vectors: Array) -> Array:
+    return np.column_stack([vectors, np.zeros(len(vectors))])
+
+
+def _planar(matrix: Array) -> RigidTransform:
+    """The motion whose first two rows are those of a homogeneous matrix."""
+    return RigidTransform(float(np.arctan2(matrix[1, 0], matrix[0, 0])), matrix[:2, 2])
+
+
+def _medians_ms(ways: dict[str, Callable[[], Aligned]], rounds: int) -> dict[str, float]:
     """Median time of each way, taken in turn; quick ways are repeated within a round."""
     taken: dict[str, list[float]] = {name: [] for name in ways}
     for _ in range(rounds):
         for name, way in ways.items():
-            for _ in range(1 if name == "icp" else 5):
+            for _ in range(1 if name.startswith("ICP") else 5):
                 begin = time.perf_counter_ns()
                 way()
                 taken[name].append((time.perf_counter_ns() - begin) / 1e6)
@@ -284,10 +338,11 @@ def _ns_a_point(way: Callable[[], object], count: int, rounds: int) -> tuple[flo
 
 SPEED = """Section of 2,000 points, even in arc length, with form error of 20 and 10 um and noise of 6.5 um; nominal of 10,000 samples.
 Start: our coarse pose (arc-length weights), or the published one (unweighted axes, tuned on dominant points).
-Ours: `register_fine`, Gauss-Newton on exact feet, compiled. ICP: KD-tree, three Newton steps of inversion and best motion in numpy,
-until the mean square changes by less than 1e-6 of itself. engeom: least squares to the polygon of the samples, native code.
-All on one thread. Off: farthest point from the optimum, which is found with the tests' own closest point. Demanded: 6 steps,
-1e-9 mm, 300 times ICP, 8 times engeom."""
+Gauss-Newton: ours, `register_fine` on exact feet. ICP: KD-tree, three Newton steps of inversion and best motion in numpy, until
+the mean square changes by less than 1e-6 of itself. engeom: least squares to the polygon of the samples; small_gicp: ICP point to
+point; Open3D: ICP point to plane on all cores; all three native code, onto the same samples. The others run on one thread. Off:
+farthest point from the optimum, which is found with the tests' own closest point. Demanded: 6 steps, 1e-9 mm, 300 times ICP, 8 times
+engeom."""
 PARTIAL = """A random run of neighbouring points of a scan of 2,000, at a random pose, every second one against the profile's direction.
 Counted: scans of which no point lies farther than 1 mm from where the full scan's pose puts it; demanded: all at 40 %. Best pose: the
 least-squares pose of those points alone, reached from the truth; where it lies farther than 1 mm off, form error has moved a nearly
@@ -316,7 +371,7 @@ def main() -> None:
         "Streaming": (STREAMING, streaming(every, 2_000 if quick else 16_384)),
         "Growth with the number of points": (GROWTH, growth(every, 1_000_000 if quick else 10_000_000)),
     }
-    text = f"# Registration\n\n{machine('numpy', 'scipy', 'numba', 'engeom')}\n"
+    text = f"# Registration\n\n{machine('numpy', 'scipy', 'numba', 'engeom', 'small_gicp', 'open3d-cpu')}\n"
     print(text)
     for title, (explained, lines) in tables.items():
         text += f"\n## {title}\n\n{explained}\n\n"
