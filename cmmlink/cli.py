@@ -47,7 +47,7 @@ from cmmlink.open3d_doctor import look_after_open3d
 from cmmlink.parts import planned_inspection, planned_profile, profile_of
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan import Device, FileDevice, ModbusDevice, Plan, Registration, SerialDevice, load_plan, place_of
-from cmmlink.recorder import Basis, Evidence, Recorder, software
+from cmmlink.recorder import Basis, Evidence, Recorder
 from cmmlink.records import check_chain, default_folder, describe, find_run, list_runs, reading, recorded_run, recording
 from cmmlink.replay import Replay
 from cmmlink.replay import replay as replayed
@@ -335,7 +335,7 @@ def _run(plan: Plan, profile: NominalProfile, device: Connected, telling: Tellin
     quiet = telling.headless or telling.as_json or not sys.stderr.isatty()
     with (
         recording(telling.records or default_folder(), _today) as store,
-        Recorder(store, _basis(plan), clock=time.monotonic, today=_today) as recorder,
+        Recorder(store, Basis.of(plan), clock=time.monotonic, today=_today) as recorder,
         nullcontext() if quiet else table,
     ):
         outcome = _carry_out(device.source, live, started, [recorder, *([] if quiet else [table])], plan.buffer_points)
@@ -386,10 +386,6 @@ def _show(server: "ConsoleServer", no_browser: bool) -> None:
 
 def _today() -> datetime:
     return datetime.now().astimezone()
-
-
-def _basis(plan: Plan) -> Basis:
-    return Basis(plan.effective_yaml(), plan.nominal.file.name, plan.nominal.file.read_bytes(), software())
 
 
 def _rehearsed(profile: NominalProfile, registration: Registration) -> None:

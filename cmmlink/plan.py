@@ -54,7 +54,7 @@ A further device is a further model with its own `type`, added to the union `Dev
 
 from math import hypot
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
@@ -164,7 +164,7 @@ class ModbusDevice(_Settings):
 
     type: Literal["modbus"]
     address: Text = Field(description="host:port, or the port name of an RTU line")
-    map: Text = Field(description="a register map: a yaml file, or the name of a shipped one like generic-ring or gocator")
+    map: Text | dict[str, Any] = Field(description="a register map: a yaml file, or the name of a shipped one like generic-ring or gocator")
     device_id: Annotated[int, Field(ge=0, le=255)] = 1
     points: Annotated[int, Field(ge=1)] | None = None
     baud_rate: Annotated[int, Field(gt=0)] = 19200
@@ -173,6 +173,11 @@ class ModbusDevice(_Settings):
     silence_s: Positive = 5.0
     reconnect_s: Annotated[float, Field(ge=0)] = 0.0
     axis: Axis | None = None
+
+    @property
+    def own_map(self) -> Path | None:
+        """The file of a map that is not shipped; None also where the plan holds the map itself, as that of a record does."""
+        return Path(self.map) if isinstance(self.map, str) and Path(self.map).suffix else None
 
 
 class FileDevice(_Settings):
@@ -309,8 +314,8 @@ def _with_paths_from(folder: Path, plan: Plan) -> Plan:
     device = plan.device
     if isinstance(device, FileDevice):
         device = device.model_copy(update={"file": folder / device.file})
-    elif isinstance(device, ModbusDevice) and Path(device.map).suffix:
-        device = device.model_copy(update={"map": str(folder / device.map)})
+    elif isinstance(device, ModbusDevice) and device.own_map is not None:
+        device = device.model_copy(update={"map": str(folder / device.own_map)})
     return plan.model_copy(
         update={
             "nominal": plan.nominal.model_copy(update={"file": folder / plan.nominal.file}),

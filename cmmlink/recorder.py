@@ -14,12 +14,15 @@ from datetime import datetime
 from importlib import metadata
 from typing import Any
 
+import yaml
+
 from cmmlink import __version__
 from cmmlink.buffer import HandOver
 from cmmlink.chain import Draft, Kind
 from cmmlink.chunks import Moment, pack_document, pack_judged, pack_moments, pack_points, pack_reads
 from cmmlink.errors import StoreError
 from cmmlink.events import Arrived, Event, Judged, RunFinished, RunStarted
+from cmmlink.plan import ModbusDevice, Plan
 from cmmlink.report.summary import number, summary
 from cmmlink.store import Store
 from drivers.source import PointBatch, Rejected, WireBytes
@@ -40,6 +43,15 @@ class Basis:
     nominal_name: str
     nominal: bytes
     software: Mapping[str, str]
+
+    @classmethod
+    def of(cls, plan: Plan) -> "Basis":
+        """What a plan rests on at this moment. A register map of the user's own becomes part of the plan."""
+        device = plan.device
+        if isinstance(device, ModbusDevice) and device.own_map is not None:
+            own = yaml.safe_load(device.own_map.read_text(encoding="utf-8"))
+            plan = plan.model_copy(update={"device": device.model_copy(update={"map": own})})
+        return cls(plan.effective_yaml(), plan.nominal.file.name, plan.nominal.file.read_bytes(), software())
 
 
 @dataclass(frozen=True, slots=True)

@@ -34,10 +34,10 @@ Coordinates that are not named are 0; a distance sensor's distance is z.
 """
 
 from binascii import crc_hqx
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import yaml
@@ -139,8 +139,10 @@ def _only(block: Block | None, names: set[str], where: str) -> None:
         raise ValueError(f"{where}: field {unknown[0]!r} is none of {', '.join(sorted(names))}")
 
 
-def load_map(name: str | Path) -> RegisterMap:
-    """Read a map: a YAML file, or the name of one that is shipped; raise `ValueError` naming file, line and key."""
+def load_map(name: str | Path | Mapping[str, Any]) -> RegisterMap:
+    """Read a map: a YAML file, the name of one that is shipped, or its content; raise `ValueError` naming file, line and key."""
+    if isinstance(name, Mapping):
+        return _checked(name, "map", lambda _: "")
     path = Path(name)
     if not path.suffix and not path.exists():
         path = MAPS / f"{name}.yaml"
@@ -151,14 +153,19 @@ def load_map(name: str | Path) -> RegisterMap:
         raise ValueError(f"{path}: {error.strerror or error}; give a YAML file or one of {shipped}") from error
     try:
         tree = yaml.safe_load(text)
-        return RegisterMap.model_validate(tree)
     except yaml.YAMLError as error:
         raise ValueError(f"{path}: no YAML: {error}") from error
+    return _checked(tree, str(path), lambda keys: f", line {_line_of(text, keys)}")
+
+
+def _checked(tree: object, file: str, line_of: Callable[[list[str]], str]) -> RegisterMap:
+    try:
+        return RegisterMap.model_validate(tree)
     except ValidationError as error:
         first = error.errors()[0]
         keys = [str(key) for key in first["loc"]]
-        where = f", line {_line_of(text, keys)}" if keys else ""
-        raise ValueError(f"{path}{where}: {'.'.join(keys) or 'map'}: {first['msg']}; found {first['input']!r:.80}") from error
+        where = line_of(keys) if keys else ""
+        raise ValueError(f"{file}{where}: {'.'.join(keys) or 'map'}: {first['msg']}; found {first['input']!r:.80}") from error
 
 
 def _line_of(text: str, keys: Iterable[str]) -> int:

@@ -19,8 +19,10 @@ class Registration:
     iterations           : steps taken by the fine registration; 0 for a coarse or given pose
     converged            : the last step moved no point by more than the stated limit
     covariance           : (3, 3) of the pose (x, y in mm, rotation in rad about `centre_mm`) from the scatter of the
-                           deviations; zero for a given pose. A motion that changes no deviation (a circle's rotation)
-                           has the size of the part as its standard deviation
+                           deviations taken as independent: where they are form error, above all on a part of a profile,
+                           the pose is less certain (`LiveUpdate.can_move_mm` reckons with that). Zero for a given pose. A
+                           motion that changes no deviation (a circle's rotation) has the size of the part as its
+                           standard deviation
     centre_mm            : (2,) in nominal coordinates
     rivals               : other poses that fit as well, on symmetric parts: the points cannot tell which one is true
     outliers             : (m,) points left out of the fit as outliers, all False unless a robust fit was asked for

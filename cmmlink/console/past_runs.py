@@ -16,7 +16,7 @@ from cmmlink.errors import StoreError
 from cmmlink.events import Counts, RunStarted, Sink
 from cmmlink.export import export_run
 from cmmlink.plan import Device, Plan
-from cmmlink.recorder import Basis, Evidence, Recorder, software
+from cmmlink.recorder import Basis, Evidence, Recorder
 from cmmlink.records import find_run, list_runs, reading, recorded_run, recording
 from cmmlink.replay import Replay, recorded_plan, recorded_profile, replay
 from cmmlink.report.summary import summary
@@ -75,8 +75,7 @@ class PastRuns:
     @contextmanager
     def recorder(self, plan: Plan, started: RunStarted) -> Iterator[Sink]:
         """Give the sink that writes the record of a run. Raises StoreError."""
-        basis = Basis(plan.effective_yaml(), plan.nominal.file.name, plan.nominal.file.read_bytes(), software())
-        with recording(self.folder, self.today) as store, Recorder(store, basis, clock=self.clock, today=self.today) as recorder:
+        with recording(self.folder, self.today) as store, Recorder(store, Basis.of(plan), clock=self.clock, today=self.today) as recorder:
             yield recorder
         self.evidence = recorder.evidence
 

@@ -15,6 +15,7 @@ import importlib.util
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -369,7 +370,7 @@ def main() -> None:
     if options.rivals:
         tables.append(rivals_table(sizes, 5))
     for table in tables:
-        for line in (*table, ""):
+        for line in chain(table, [""]):
             lines.append(line)
             print(line, flush=True)
     if options.rivals and options.millions and not options.quick:

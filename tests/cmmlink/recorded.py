@@ -15,7 +15,7 @@ from cmmlink.events import RunStarted, Sink
 from cmmlink.parts import planned_inspection, planned_profile
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan import Datum, Plan, Registration, load_plan
-from cmmlink.recorder import Acknowledged, Basis, Recorder, software
+from cmmlink.recorder import Acknowledged, Basis, Recorder
 from cmmlink.records import recording
 from drivers.ascii_frames import AsciiDecoder
 from drivers.source import Arrival, Damaged, Lost, PointBatch, Rejected, ScanClosed, ScanOpened, ScanSource
@@ -104,12 +104,11 @@ def record(
 ) -> tuple[RunOutcome, Recorder]:
     """Carry out and record one run; `before` are sinks that hear of every event before the recorder."""
     plan = plan or small_plan()
-    basis = Basis(plan.effective_yaml(), plan.nominal.file.name, plan.nominal.file.read_bytes(), software())
     started = RunStarted(plan.part.name, "T-1", "operator", "scripted", True)
     live = planned_inspection(plan, small_profile())
     with (
         recording(folder, today) as store,
-        Recorder(store, basis, clock=time.monotonic, today=today, acknowledge=acknowledge, commit_s=commit_s) as recorder,
+        Recorder(store, Basis.of(plan), clock=time.monotonic, today=today, acknowledge=acknowledge, commit_s=commit_s) as recorder,
     ):
         outcome = run_inspection(
             source,

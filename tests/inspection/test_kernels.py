@@ -1,5 +1,8 @@
 """The compiled closest point against the independent oracle and closed forms; the compiled methods against plain numpy."""
 
+import os
+import subprocess
+import sys
 from collections.abc import Callable
 from functools import cache
 
@@ -222,6 +225,27 @@ def test_moving_curve_and_points_together_moves_the_feet(name: str, angle: float
     assert np.abs(a.distance_mm - b.distance_mm).max() < 2e-12
     assert np.abs(profiles.rotated(a.foot_mm, angle, shift) - b.foot_mm).max() < 1e-10
     assert np.abs(profiles.rotated(a.gradient, angle) - b.gradient).max() < 1e-10
+
+
+FORKED = """
+import os
+import numpy as np
+from inspection.foot_grid import build_foot_grid
+from inspection.kernels import project
+from tests.inspection import profiles
+
+grid, points = build_foot_grid(profiles.p3()), np.random.default_rng(1).uniform(-60, 60, (20_000, 2))
+before = project(points, grid, threads=3).distance_mm
+child = os.fork()
+if child == 0:
+    os._exit(0 if np.array_equal(project(points, grid, threads=3).distance_mm, before) else 1)
+assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
+def test_a_forked_process_does_not_wait_for_the_threads_it_left_behind() -> None:
+    subprocess.run([sys.executable, "-W", "ignore", "-c", FORKED], check=True, timeout=120)
 
 
 @pytest.mark.parametrize("name", ["P2", "P3", "MH42 sharp", "NACA 4412 blunt", "square"])

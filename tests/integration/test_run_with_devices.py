@@ -25,15 +25,17 @@ device: {device}
 """
 
 
-def run(folder: Path, device: str) -> tuple[int, dict[str, Any], str]:
+def run(folder: Path, device: str, *options: str) -> tuple[int, dict[str, Any], str]:
     np.savetxt(folder / "nominal.csv", PART_MM[::20], delimiter=",")
     plan = folder / "plan.yaml"
     plan.write_text(PLAN.format(device=device), encoding="utf-8")
-    done = subprocess.run(
-        [sys.executable, "-m", "cmmlink", "run", str(plan), "--json"], cwd=ROOT, capture_output=True, text=True, timeout=100, check=False
-    )
+    done = command("run", str(plan), "--json", *options)
     assert done.stdout, done.stderr
     return done.returncode, json.loads(done.stdout), done.stderr
+
+
+def command(*words: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-m", "cmmlink", *words], cwd=ROOT, capture_output=True, text=True, timeout=100, check=False)
 
 
 def scanned_oval(folder: Path, *options: str, name: str = "modbus-ring") -> AbstractContextManager[Simulated]:
@@ -80,6 +82,20 @@ def test_a_device_that_dies_half_way_ends_with_code_4_and_what_was_received(tmp_
     assert 0 < facts["received"] < COUNT
 
 
+def test_a_replay_reads_registers_as_the_map_of_that_day_told(tmp_path: Path) -> None:
+    shipped = (ROOT / "drivers" / "maps" / "generic-ring.yaml").read_text(encoding="utf-8")
+    own = tmp_path / "mine.yaml"
+    own.write_text(shipped, encoding="utf-8")
+    with scanned_oval(tmp_path, "--unpaced") as device:
+        code, facts, errors = run(tmp_path, f"{{type: modbus, map: mine.yaml, address: '{device.address}'}}", "--records", str(tmp_path))
+    assert (code, facts["received"]) == (0, COUNT), errors
+    for changed in (shipped.replace("1.0e-5", "2.0e-5"), "no map any more"):
+        own.write_text(changed, encoding="utf-8")
+        again = command("replay", facts["run"], "--records", str(tmp_path), "--json")
+        assert again.returncode == 0, again.stderr
+        assert json.loads(again.stdout)["identical"] is True
+
+
 def test_a_map_with_a_mistake_is_named_with_its_file(tmp_path: Path) -> None:
     (tmp_path / "mine.yaml").write_text(
         "device: mine\npattern: newest\npoints: {at: 0, fields: {x: {at: 0, type: int16}}}\n", encoding="utf-8"
@@ -87,9 +103,7 @@ def test_a_map_with_a_mistake_is_named_with_its_file(tmp_path: Path) -> None:
     np.savetxt(tmp_path / "nominal.csv", PART_MM[::20], delimiter=",")
     plan = tmp_path / "plan.yaml"
     plan.write_text(PLAN.format(device="{type: modbus, map: mine.yaml, address: '127.0.0.1:1'}"), encoding="utf-8")
-    done = subprocess.run(
-        [sys.executable, "-m", "cmmlink", "check", str(plan)], cwd=ROOT, capture_output=True, text=True, timeout=100, check=False
-    )
+    done = command("check", str(plan))
     assert done.returncode == 2
     assert "mine.yaml, line 2: pattern:" in done.stderr
     assert "Traceback" not in done.stderr
