@@ -31,7 +31,7 @@ class Missing:
 def airfoil(path: Path, chord_mm: float = AIRFOIL_CHORD_MM) -> NurbsCurve | Missing:
     """Open curve through the coordinates of a UIUC file (Selig order), or why there is none."""
     if not path.is_file():
-        return Missing(f"{path.name} is not beside the checkout and may not be shipped; give its path on the command line")
+        return Missing(f"no {path.name}: airfoil files are not shipped but looked for beside the checkout; --mh42 FILE names that of MH 42")
     return profiles.through_airfoil(chord_mm * np.loadtxt(path, skiprows=1), chord_mm)
 
 
