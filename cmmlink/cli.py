@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from numba.core.event import Event, Listener, install_listener
 from platformdirs import user_data_path
 from rich.console import Console
 
@@ -46,7 +47,7 @@ from cmmlink.nominal_files import NominalFile, load_nominal, material_side
 from cmmlink.open3d_doctor import look_after_open3d
 from cmmlink.parts import planned_inspection, planned_profile, profile_of
 from cmmlink.pipeline import RunOutcome, run_inspection
-from cmmlink.plan import Device, FileDevice, ModbusDevice, Plan, Registration, SerialDevice, load_plan, place_of
+from cmmlink.plan import Device, FileDevice, ModbusDevice, Plan, SerialDevice, load_plan, place_of
 from cmmlink.recorder import Basis, Evidence, Recorder
 from cmmlink.records import check_chain, default_folder, describe, find_run, list_runs, reading, recorded_run, recording
 from cmmlink.replay import Replay
@@ -150,7 +151,8 @@ class Telling:
 def main() -> None:
     """Run the command line; every error a user can cause ends as one message and an exit code."""
     try:
-        code = app(prog_name="cmmlink", standalone_mode=False)
+        with install_listener("numba:compile", _Compiling()):
+            code = app(prog_name="cmmlink", standalone_mode=False)
         if code == _STOPPED:
             _fail("stopped by the operator", _STOPPED)
     except typer.TyperException as error:
@@ -162,6 +164,21 @@ def main() -> None:
     except StoreError as error:
         code = _fail(str(error), _NO_RECORD)
     sys.exit(code or 0)
+
+
+class _Compiling(Listener):  # type: ignore[misc]  # numba has no types
+    """Say once why nothing happens while loops are compiled; what comes from the cache is not compiled."""
+
+    def __init__(self) -> None:
+        self._said = False
+
+    def on_start(self, event: Event) -> None:
+        if not self._said:
+            self._said = True
+            sys.stderr.write("cmmlink: compiling the inspection, once after an installation, up to half a minute\n")
+
+    def on_end(self, event: Event) -> None:
+        """Nothing more to say."""
 
 
 def _usage(error: typer.TyperException) -> str:
@@ -328,7 +345,7 @@ def _naming(plan_file: Path, key: str) -> Iterator[None]:
 
 def _run(plan: Plan, profile: NominalProfile, device: Connected, telling: Telling) -> int:
     """Carry out a plan and tell what came of it."""
-    _rehearsed(profile, plan.registration)
+    rehearse(profile, plan.registration.method, plan.registration.reject_outliers)
     live = planned_inspection(plan, profile)
     started = RunStarted(plan.part.name, plan.part.serial_number or "", plan.operator or "", device.device, device.simulated)
     table = LiveTable(Console(stderr=True), plan.tolerance.zone)
@@ -386,17 +403,6 @@ def _show(server: "ConsoleServer", no_browser: bool) -> None:
 
 def _today() -> datetime:
     return datetime.now().astimezone()
-
-
-def _rehearsed(profile: NominalProfile, registration: Registration) -> None:
-    """Have everything compiled before a device is asked for points, saying so when that takes a while."""
-    message = "cmmlink: compiling the inspection, once after installation (about twenty seconds)\n"
-    patience = threading.Timer(1.0, sys.stderr.write, (message,))
-    patience.start()
-    try:
-        rehearse(profile, registration.method, registration.reject_outliers)
-    finally:
-        patience.cancel()
 
 
 def _source_of(plan: Plan) -> tuple[ScanSource, str]:
@@ -764,8 +770,7 @@ def _section(plan: CtPlan, outcome: SectionOutcome, plan_name: str) -> Section:
 def doctor() -> int:
     """Look at what cmmlink needs of this computer, and mend or name what is missing."""
     typer.echo(f"cmmlink {__version__} on Python {platform.python_version()}, {platform.system()} {platform.machine()}")
-    plan = load_plan(demo_plan_file())
-    _rehearsed(planned_profile(plan), plan.registration)
+    rehearse(planned_profile(load_plan(demo_plan_file())))
     typer.echo("inspection: compiled and working")
     folder = default_folder()
     nearest = next(path for path in (folder, *folder.parents) if path.exists())

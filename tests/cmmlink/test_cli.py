@@ -221,8 +221,7 @@ def test_run_carries_out_a_plan(nominal: Path, deviation_mm: float, code: int, v
 
 def test_run_without_a_terminal_prints_the_summary_alone(nominal: Path) -> None:
     ended = cmmlink("run", planned(nominal, 0.01))
-    assert ended.code == 0
-    assert re.fullmatch(r"(cmmlink: compiling the inspection, .*\n)?", ended.err)  # said where it takes longer than a second
+    assert (ended.code, ended.err) == (0, "")
     assert ended.out.startswith("CONFORM   oval 0012, file points.csv\nreceived 360 = judged 360 + rejected 0; lost 0 points\n")
 
 
