@@ -181,9 +181,8 @@ def project(points_mm: Array, grid: "FootGrid", threads: int | None = None) -> F
 
 
 def _flat(points_mm: Array) -> Array:
-    points = np.ascontiguousarray(points_mm, dtype=np.float64).reshape(-1).view()
-    points.flags.writeable = False  # one type for the compiler, whatever the caller's flags
-    return points
+    points = np.ascontiguousarray(points_mm, dtype=np.float64).reshape(-1)
+    return points if points.flags.writeable else points.copy()  # one type for the compiler, whatever the caller's flags
 
 
 def _empty_feet(m: int) -> Feet:
@@ -214,8 +213,8 @@ def compile_kernels() -> None:
     fixed, index32, index64 = (types.Array(kind, 1, "C", readonly=True) for kind in (types.float64, types.int32, types.int64))
     exact: Any = _project
     on_samples: Any = _project_on_samples
-    exact.compile((fixed, fixed, index32, feet, claimed))
-    on_samples.compile((fixed, types.Tuple((fixed, index64, fixed, index64, fixed, types.int64)), feet, claimed))
+    exact.compile((flat, fixed, index32, feet, claimed))
+    on_samples.compile((flat, types.Tuple((fixed, index64, fixed, index64, fixed, types.int64)), feet, claimed))
 
 
 # Where the memory of a block keeps what, _BLOCK numbers each. Reals: the row of the piece (24 columns), then
@@ -1031,11 +1030,10 @@ class PoseFit:
 
     def __init__(self, points_mm: Array, grid: "FootGrid", table: "SampleTable", method: str, outward: float, tip_radius_mm: float) -> None:
         m = len(points_mm)
-        moved = np.empty(2 * m)
         self.weights = np.ones(m)
         self._problem = (_flat(points_mm), self.weights, grid.reals, grid.integers, float(outward), float(tip_radius_mm))
         self._samples = (*table.flat, SAMPLE_METHODS.index(method)) if method in SAMPLE_METHODS else None
-        self._memory = (moved, _flat(moved), np.ones(m), np.empty(m), _empty_feet(m))
+        self._memory = (np.empty(2 * m), np.ones(m), np.empty(m), _empty_feet(m))
 
     def settle(self, pose: tuple[float, float, float], most_steps: int) -> Fit:
         """From a pose to the least mean square of the deviations, by at most so many steps."""
@@ -1055,9 +1053,9 @@ class PoseFit:
 def _settle_pose(problem: Any, samples: Any, memory: Any, state: Any, covariance: Any, most_steps: int) -> tuple[int, bool]:
     """Full Newton steps where the second derivative allows, each halved until the mean square falls."""
     points, weights, _, _, outward, tip = problem
-    moved, seen, takes_part, new_part, feet = memory
+    moved, takes_part, new_part, feet = memory
     span, pose, here, trial = _span(points), (state[0], state[1], state[2]), np.empty(_SUMS), np.empty(_SUMS)
-    _evaluate(problem, samples, pose, span, moved, seen, takes_part, takes_part, feet, here)
+    _evaluate(problem, samples, pose, span, moved, takes_part, takes_part, feet, here)
     steps, settled, lower = 0, False, True
     while lower and not settled and steps < most_steps:
         steps += 1
@@ -1067,7 +1065,7 @@ def _settle_pose(problem: Any, samples: Any, memory: Any, state: Any, covariance
             settled = share * step[3] <= _STANDSTILL_MM  # it changes no deviation by more: nothing to project again
             if settled:
                 break
-            _evaluate(problem, samples, next_pose, span, moved, seen, takes_part, new_part, feet, trial)
+            _evaluate(problem, samples, next_pose, span, moved, takes_part, new_part, feet, trial)
             lower = trial[_SQUARE_BEFORE] <= here[_SQUARE] * (1.0 + 1e-12)
             if lower:
                 break
@@ -1092,12 +1090,12 @@ def _settle_pose(problem: Any, samples: Any, memory: Any, state: Any, covariance
 def _find_outliers(problem: Any, samples: Any, memory: Any, pose: Any, mads: float, most_steps: int, settled_mm: float, found: Any) -> None:
     """Weighted steps; the weights follow from the deviations at every pose."""
     points, weights, _, _, outward, tip = problem
-    moved, seen, takes_part, off, feet = memory
+    moved, takes_part, off, feet = memory
     span, sums, m = _span(points), np.empty(_SUMS), len(weights)
     for _ in range(most_steps):
         for i in range(m):
             weights[i] = 1.0
-        _evaluate(problem, samples, pose, span, moved, seen, takes_part, takes_part, feet, sums)
+        _evaluate(problem, samples, pose, span, moved, takes_part, takes_part, feet, sums)
         for i in range(m):
             off[i] = abs(outward * feet.distance_mm[i] - tip)
         limit = mads * np.median(off[takes_part > 0.0]) if sums[_COUNT] > 0.0 else np.inf
@@ -1145,10 +1143,8 @@ def _moved_pose(pose: Any, span: Any, step: Any, share: float) -> tuple[float, f
 
 
 @_compiled
-def _evaluate(
-    problem: Any, samples: Any, pose: Any, span: Any, moved: Any, seen: Any, before: Any, takes_part: Any, feet: Any, sums: Any
-) -> None:
-    """Points at a pose: moved there (`seen` is the same memory), their feet, and the sums over them.
+def _evaluate(problem: Any, samples: Any, pose: Any, span: Any, moved: Any, before: Any, takes_part: Any, feet: Any, sums: Any) -> None:
+    """Points at a pose: moved there, their feet, and the sums over them.
 
     samples : tables and number of a method that looks at samples only, or None for the exact feet
     """
@@ -1158,9 +1154,9 @@ def _evaluate(
         x, y = points[2 * i], points[2 * i + 1]
         moved[2 * i] = c * x - s * y + pose[1]
         moved[2 * i + 1] = s * x + c * y + pose[2]
-    _project(seen, reals, integers, feet, np.zeros(1, dtype=np.int64))
+    _project(moved, reals, integers, feet, np.zeros(1, dtype=np.int64))
     if samples is not None:
-        _project_on_samples(seen, samples, feet, np.zeros(1, dtype=np.int64))
+        _project_on_samples(moved, samples, feet, np.zeros(1, dtype=np.int64))
     _add_up(weights, before, takes_part, outward, tip, pose, span, moved, feet, sums)
 
 
