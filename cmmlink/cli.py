@@ -3,6 +3,7 @@
 0 conform, 1 nonconform, 3 uncertain; 2 unusable input or plan, 4 device or link failure, 5 the record could not be kept.
 """
 
+import io
 import itertools
 import json
 import math
@@ -16,8 +17,9 @@ import tempfile
 import textwrap
 import threading
 import time
+import traceback
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from enum import StrEnum
@@ -36,7 +38,7 @@ from cmmlink.console.past_runs import PastRuns
 from cmmlink.console.run_view import Ended, RunFacts
 from cmmlink.console.station import Connected, Means, Refused
 from cmmlink.ct import SectionOutcome, inspect_stack
-from cmmlink.ct_command import ManyHeights, SectionBar, own_nominals, plan_from, print_stack
+from cmmlink.ct_command import ManyHeights, SectionBar, given, own_nominals, plan_from, print_stack
 from cmmlink.ct_plan import CtPlan, load_ct_plan
 from cmmlink.demo import plan_file as demo_plan_file
 from cmmlink.demo import write_part_path
@@ -150,9 +152,11 @@ class Telling:
 
 def main() -> None:
     """Run the command line; every error a user can cause ends as one message and an exit code."""
+    _speak_somehow()
     try:
         with install_listener("numba:compile", _Compiling()):
             code = app(prog_name="cmmlink", standalone_mode=False)
+        sys.stdout.flush()
         if code == _STOPPED:
             _fail("stopped by the operator", _STOPPED)
     except typer.TyperException as error:
@@ -163,7 +167,30 @@ def main() -> None:
         code = _fail(str(error), _DEVICE_FAILED)
     except StoreError as error:
         code = _fail(str(error), _NO_RECORD)
+    except OSError as error:
+        code = _fail(str(error) if error.filename else f"the answer could not be written: {error}", _UNUSABLE)
+        _hush()
+    except SystemExit as ended:  # typer ends with 1 when nobody reads on, which would say that a part does not conform
+        code = _UNUSABLE if ended.code == 1 else ended.code
+    except Exception as error:  # likewise a defect must not end with 1
+        traceback.print_exc()
+        code = _fail(f"a defect of cmmlink, please report it: {error}", _UNUSABLE)
     sys.exit(code or 0)
+
+
+def _speak_somehow() -> None:
+    """Have streams to write to, and letters that they cannot show replaced: a verdict is not lost to a name in another script."""
+    sys.stdout = sys.stdout or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - for as long as the program runs
+    sys.stderr = sys.stderr or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
+
+
+def _hush() -> None:
+    """Let what is still to be written to a broken standard output go nowhere, or the interpreter fails once more at its end."""
+    with suppress(OSError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 class _Compiling(Listener):  # type: ignore[misc]  # numba has no types
@@ -489,26 +516,25 @@ def _carry_out(source: ScanSource, live: LiveInspection, started: RunStarted, si
 
 
 def _tell(outcome: RunOutcome, profile: NominalProfile, telling: Telling, started: RunStarted, evidence: Evidence | None = None) -> int:
-    """Print and write the outcome, the verdict first, whatever happens to the files; the exit code."""
+    """Write and print the outcome, each whatever happens to the other; the exit code."""
     facts = summary(outcome.result, outcome.counts) | identity(started) | (asdict(evidence) if evidence else {})
     message = str(outcome.failure or outcome.refusal or "")
     if outcome.ending == "aborted":
         message = message or "stopped by the operator: the scan is not complete"
     if message:
         sys.stderr.write(f"cmmlink: {message}\n")
-    if telling.as_json:
-        _print_json(facts)
-    else:
-        print_summary(
-            Console(highlight=False, soft_wrap=not sys.stdout.isatty()),
-            outcome.result,
-            outcome.counts,
-            f"{_title(started)}, {started.device}",
-        )
-    if telling.out is not None:
-        written = write_results(telling.out, facts, outcome.result, profile, _title(started))
-        if not telling.as_json:
-            typer.echo(f"results in {telling.out}: {', '.join(written)}")
+    written: Sequence[str] = ()
+    try:
+        if telling.out is not None:
+            written = write_results(telling.out, facts, outcome.result, profile, _title(started))
+    finally:
+        if telling.as_json:
+            _print_json(facts)
+        else:
+            heading = f"{_title(started)}, {started.device}"
+            print_summary(Console(highlight=False, soft_wrap=not sys.stdout.isatty()), outcome.result, outcome.counts, heading)
+    if written and not telling.as_json:
+        typer.echo(f"results in {telling.out}: {', '.join(written)}")
     if evidence is not None and not telling.as_json:
         typer.echo(f"recorded as run {evidence.run}")
     if outcome.failure is not None:
@@ -580,6 +606,7 @@ def _zone(tolerance: tuple[float, float], uncertainty: float) -> ToleranceZone:
 
 @app.command(cls=ManyHeights)
 def ct(
+    context: typer.Context,
     mesh: Annotated[Path, typer.Argument(metavar="MESH", help="Surface: STL, PLY, OBJ; or a plan (YAML) of all that follows.")],
     nominal: Annotated[Path | None, typer.Option(metavar="FILE", help="The nominal profile.")] = None,
     tolerance: Annotated[
@@ -609,6 +636,9 @@ def ct(
 ) -> int:
     """Inspect sections of a CT surface."""
     if mesh.suffix.lower() in (".yaml", ".yml"):
+        beside = [name for name in given(context) if name not in ("mesh", "out", "as_json", "pictures")]
+        if beside:
+            raise PlanError(f"{mesh}: --{beside[0].replace('_', '-')} stands beside a plan, which says it all itself: set it in the plan")
         return _ct(load_ct_plan(mesh), Telling(False, as_json, out), pictures)
     if nominal is None or tolerance is None:
         raise PlanError(f"{mesh}: a surface needs --nominal FILE and --tolerance LO HI")
@@ -632,7 +662,7 @@ def ct(
 
 
 def _ct(plan: CtPlan, telling: Telling, pictures: bool) -> int:
-    """Inspect a stack, with a progress bar, and tell what came of it: the verdict first, whatever happens to the files."""
+    """Inspect a stack, with a progress bar, and tell and write what came of it, each whatever happens to the other."""
     folder = telling.out or plan.out
     prepare(folder)
     bar = SectionBar(Console(stderr=True), visible=not telling.as_json and sys.stderr.isatty())
@@ -645,16 +675,18 @@ def _ct(plan: CtPlan, telling: Telling, pictures: bool) -> int:
             on_start=lambda sections: steps.append(bar.round("inspected", sections)),
             on_section=lambda _: steps[0](),
         )
-    if telling.as_json:
-        _print_json(stack.facts())
-    else:
-        print_stack(Console(highlight=False, soft_wrap=not sys.stdout.isatty()), stack)
-    if folder is not None:
-        with bar.shown():
-            done = bar.round("written", len(stack.sections))
-            write_stack(folder, stack, plan.tolerance.zone, plan.part.name, pictures=pictures, on_section=done)
-        if not telling.as_json:
-            typer.echo(f"results in {folder}: result.json, sections.csv, a folder for each section{', stack.png' if pictures else ''}")
+    try:
+        if folder is not None:
+            with bar.shown():
+                done = bar.round("written", len(stack.sections))
+                write_stack(folder, stack, plan.tolerance.zone, plan.part.name, pictures=pictures, on_section=done)
+    finally:
+        if telling.as_json:
+            _print_json(stack.facts())
+        else:
+            print_stack(Console(highlight=False, soft_wrap=not sys.stdout.isatty()), stack)
+    if folder is not None and not telling.as_json:
+        typer.echo(f"results in {folder}: result.json, sections.csv, a folder for each section{', stack.png' if pictures else ''}")
     return _EXIT[stack.verdict]
 
 

@@ -71,22 +71,30 @@ class SectionOutcome:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StackOutcome:
-    """All sections of a surface; `notes` are what holds for all of them."""
+    """The sections of a surface that were inspected, of `asked` ones; `notes` are what holds for all of them."""
 
     mesh: SurfaceMesh
     sections: tuple[SectionOutcome, ...]
+    asked: int
     notes: tuple[str, ...]
 
     @property
+    def complete(self) -> bool:
+        """Whether no section that was asked for is missing."""
+        return len(self.sections) == self.asked
+
+    @property
     def verdict(self) -> Verdict:
-        """That of the worst section."""
-        return max(section.verdict for section in self.sections)
+        """That of the worst section; not better than uncertain when the stack was cut short."""
+        worst = max(section.verdict for section in self.sections)
+        return worst if self.complete else max(worst, Verdict.UNCERTAIN)
 
     def facts(self) -> dict[str, Any]:
         """The stack as JSON holds it."""
         slices = [section.facts() for section in self.sections]
         return {
             "verdict": self.verdict.word,
+            "complete": self.complete,
             "mesh": self.mesh.source,
             "mesh_kind": self.mesh.kind,
             "triangles": self.mesh.triangles,
@@ -125,7 +133,7 @@ def inspect_stack(
                 break
     if all(section.run.result is None for section in sections) and sections[0].run.refusal is not None:
         raise sections[0].run.refusal
-    return StackOutcome(mesh, tuple(sections), tuple(notes))
+    return StackOutcome(mesh, tuple(sections), len(heights), tuple(notes))
 
 
 class _Open3D:

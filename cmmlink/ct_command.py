@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+import typer
 from pydantic import ValidationError
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -63,6 +64,12 @@ def own_nominals(texts: Sequence[str]) -> list[dict[str, object]]:
     return own
 
 
+def given(context: typer.Context) -> list[str]:
+    """Names of the parameters that stand on the command line."""
+    sources = {name: context.get_parameter_source(name) for name in context.params}
+    return [name for name, source in sources.items() if source is not None and source.name == "COMMANDLINE"]
+
+
 class SectionBar:
     """A progress bar with the remaining time, one step a section, for as many rounds as there are things to do with each."""
 
@@ -89,7 +96,8 @@ def print_stack(console: Console, stack: StackOutcome) -> None:
     """Print the verdict, a line for each section, and what was not as it should be."""
     facts = stack.facts()
     cutters = ", ".join(sorted({section.slice.cutter for section in stack.sections}))
-    console.print(f"[{STYLES[stack.verdict]}]{WORDS[stack.verdict]}[/]  {len(stack.sections)} sections of {stack.mesh.source}")
+    missing = "" if stack.complete else f" of {stack.asked}"
+    console.print(f"[{STYLES[stack.verdict]}]{WORDS[stack.verdict]}[/]  {len(stack.sections)}{missing} sections of {stack.mesh.source}")
     console.print(f"{stack.mesh.triangles} triangles ({stack.mesh.kind}), cut by {cutters}")
     console.print(f"received {facts['received']} = judged {facts['judged']} + rejected {facts['rejected']}; lost {facts['lost']}")
     console.print(

@@ -5,6 +5,7 @@ a run stand together, from `run` to `end`; a run whose `end` is missing was inte
 """
 
 import os
+import re
 import shutil
 import sqlite3
 from collections.abc import Callable, Iterator, Sequence
@@ -48,6 +49,7 @@ class Store:
         self._now = now
         self._lock: StationLock | None = None
         self._head: tuple[int, bytes] = (0, GENESIS)  # number and hash of the last record
+        self._found_empty = self.path.is_file() and not self.path.stat().st_size
         try:
             if writing:
                 folder.mkdir(parents=True, exist_ok=True)
@@ -173,6 +175,8 @@ class Store:
     def _migrate(self, version: int, migrations: Sequence[str], writing: bool) -> None:
         lock = None if writing else StationLock(self.path.parent / "station.lock")
         try:
+            if self._found_empty and lock is not None and not self.path.stat().st_size:  # nobody is making it just now
+                raise StoreError(f"{self.path}: the file is empty: what was recorded in it is gone. Move it away to begin a new one")
             for target, script in enumerate(migrations[version:], start=version + 1):
                 # One transaction each: after a kill the file is of the old version or of the new one.
                 mark = f"PRAGMA application_id = {APPLICATION_ID}; PRAGMA user_version = {target};"
@@ -199,7 +203,12 @@ class Store:
 def _connected(path: Path) -> sqlite3.Connection:
     # Records on a write-protected medium can be read all the same, as long as nobody writes them.
     protected = path.is_file() and not (os.access(path, os.W_OK) and os.access(path.parent, os.W_OK))
+    left = path.with_name(path.name + "-wal")
+    if protected and left.is_file() and left.stat().st_size:
+        what = f"its last records are still in {left.name}, which cannot be read where nothing can be written"
+        raise StoreError(f"{path}: {what}; copy the whole folder to a disk that can be written, and read it there")
     address = path.resolve().as_uri() + ("?immutable=1" if protected else "")
+    address = re.sub("^file://(?=[^/])", "file:////", address)  # a network share: to SQLite, the server belongs to the path
     return sqlite3.connect(address, uri=True, timeout=_PATIENCE_S, isolation_level=None, check_same_thread=False)
 
 

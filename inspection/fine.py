@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from inspection.coarse import coarse_poses, registrable, trimmed_mean_square
 from inspection.deviations import Method
-from inspection.kernels import Fit, PoseFit, project
+from inspection.kernels import Fit, OutlierLimit, PoseFit, project
 from inspection.nominal import NominalProfile
 from inspection.profile_error import feet_on
 from inspection.projection import OPEN_END
@@ -44,6 +44,7 @@ def register(
     scheme: Scheme = "gauss-newton",
     tip_radius_mm: float = 0.0,
     robust: bool = False,
+    gross_mm: float = 0.0,
 ) -> Registration:
     """Coarse then fine registration of section points (m, 2): every coarse pose is refined on a few points, those near the best on all.
 
@@ -53,7 +54,7 @@ def register(
     points = registrable(points_mm)
     ranked = ranked_poses(points, nominal, tip_radius_mm)
     close = [pose for rms, pose in ranked if rms <= _CLOSE_RMS * ranked[0][0]]
-    refined = [register_fine(points, nominal, pose, method, scheme, tip_radius_mm, robust) for pose in close]
+    refined = [register_fine(points, nominal, pose, method, scheme, tip_radius_mm, robust, gross_mm) for pose in close]
     best = min(refined, key=lambda fit: fit.rms_mm)
     others = _distinct([(fit.rms_mm, fit.nominal_from_section) for fit in refined], points)[1:]
     return replace(best, rivals=tuple(pose for rms, pose in others if rms <= _EQUAL_RMS * best.rms_mm))
@@ -102,6 +103,7 @@ def register_fine(
     scheme: Scheme = "gauss-newton",
     tip_radius_mm: float = 0.0,
     robust: bool = False,
+    gross_mm: float = 0.0,
 ) -> Registration:
     """Fine registration of section points (m, 2) from a coarse pose. Points beyond open ends take no part.
 
@@ -109,6 +111,7 @@ def register_fine(
              Gauss-Newton takes "inversion" for "exact"
     robust : detect points farther than 6 median absolute deviations by Tukey weights, then fit the others by least squares
              (weights alone would bias the pose where form error is systematic); `outliers` of the result says which
+    gross_mm : nearer points are no outliers, however small the deviations of the others are
     """
     points = registrable(points_mm)
     pose = start.nominal_from_section if isinstance(start, Registration) else start
@@ -118,7 +121,7 @@ def register_fine(
         raise ValueError(f"scheme must be gauss-newton or icp, not {scheme!r}")
     fit, outliers = _pose_fit(points, nominal, method, tip_radius_mm), np.zeros(len(points), dtype=bool)
     if robust:
-        outliers = fit.outliers(_start(pose), _OUTLIER_MADS, _ROBUST_STEPS, _SETTLED_WEIGHTS_MM)
+        outliers = fit.outliers(_start(pose), OutlierLimit(_OUTLIER_MADS, float(gross_mm), _SETTLED_WEIGHTS_MM), _ROBUST_STEPS)
         fit = _pose_fit(points[~outliers], nominal, method, tip_radius_mm)
     found = fit.settle(_start(pose), _MOST_STEPS)
     return _registration(found, found.steps, found.settled, outliers)

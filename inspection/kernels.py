@@ -54,14 +54,17 @@ _HELPERS = ThreadPoolExecutor(max(1, (os.cpu_count() or 1) - 1), "projection")  
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
-def _compiled(function: _Function) -> _Function:
-    """Compile on the first call and keep the result on disk."""
-    return cast(_Function, njit(cache=True, nogil=True, error_model="numpy")(function))
+def _compiled(function: _Function, **options: bool) -> _Function:
+    """Compile on the first call and keep the result on disk; where nothing can be written, compile in every process."""
+    try:
+        return cast(_Function, njit(cache=True, nogil=True, error_model="numpy", **options)(function))
+    except RuntimeError:
+        return cast(_Function, njit(nogil=True, error_model="numpy", **options)(function))
 
 
 def _inlined(function: _Function) -> _Function:
     """Likewise, and always as part of the caller, so that loops over it vectorise."""
-    return cast(_Function, njit(cache=True, nogil=True, error_model="numpy", forceinline=True)(function))
+    return _compiled(function, forceinline=True)
 
 
 def _generated(function: Callable[..., Any]) -> Any:
@@ -1022,6 +1025,19 @@ class Fit(NamedTuple):
     covariance: Array
 
 
+class OutlierLimit(NamedTuple):
+    """From where on a point is an outlier.
+
+    mads       : farther than so many median absolute deviations
+    least_mm   : and farther than this, however small the deviations of the others are
+    settled_mm : the fit by Tukey's weights has settled when it moves no point further
+    """
+
+    mads: float
+    least_mm: float
+    settled_mm: float
+
+
 class PoseFit:
     """Gauss-Newton on the pose of points (m, 2), and the memory it works in.
 
@@ -1042,10 +1058,10 @@ class PoseFit:
         angle, x, y, mean_square, _, _ = state.tolist()
         return Fit((angle, x, y), steps, settled, mean_square, state[4:], covariance)
 
-    def outliers(self, pose: tuple[float, float, float], mads: float, most_steps: int, settled_mm: float) -> NDArray[np.bool_]:
-        """Points (m,) farther than so many median absolute deviations, once the fit by Tukey's weights moves no point further."""
+    def outliers(self, pose: tuple[float, float, float], limit: OutlierLimit, most_steps: int) -> NDArray[np.bool_]:
+        """Points (m,) beyond the limit once the fit by Tukey's weights has settled."""
         found = np.zeros(len(self.weights), dtype=np.bool_)
-        _find_outliers(self._problem, self._samples, self._memory, pose, mads, most_steps, settled_mm, found)
+        _find_outliers(self._problem, self._samples, self._memory, pose, limit, most_steps, found)
         return found
 
 
@@ -1087,7 +1103,7 @@ def _settle_pose(problem: Any, samples: Any, memory: Any, state: Any, covariance
 
 
 @_compiled
-def _find_outliers(problem: Any, samples: Any, memory: Any, pose: Any, mads: float, most_steps: int, settled_mm: float, found: Any) -> None:
+def _find_outliers(problem: Any, samples: Any, memory: Any, pose: Any, wanted: Any, most_steps: int, found: Any) -> None:
     """Weighted steps; the weights follow from the deviations at every pose."""
     points, weights, _, _, outward, tip = problem
     moved, takes_part, off, feet = memory
@@ -1098,15 +1114,17 @@ def _find_outliers(problem: Any, samples: Any, memory: Any, pose: Any, mads: flo
         _evaluate(problem, samples, pose, span, moved, takes_part, takes_part, feet, sums)
         for i in range(m):
             off[i] = abs(outward * feet.distance_mm[i] - tip)
-        limit = mads * np.median(off[takes_part > 0.0]) if sums[_COUNT] > 0.0 else np.inf
+        limit = np.inf
+        if sums[_COUNT] > 0.0:
+            limit = max(wanted.mads * np.median(off[takes_part > 0.0]), wanted.least_mm, _STANDSTILL_MM)
         for i in range(m):
-            share = off[i] / max(limit, _STANDSTILL_MM)
+            share = off[i] / limit
             weights[i] = (1.0 - share * share) ** 2 if off[i] < limit else 0.0
             found[i] = off[i] >= limit and takes_part[i] > 0.0
         _add_up(weights, takes_part, takes_part, outward, tip, pose, span, moved, feet, sums)
         step = _newton_step(sums, span[2])
         pose = _moved_pose(pose, span, step, 1.0)
-        if step[3] <= settled_mm:
+        if step[3] <= wanted.settled_mm:
             break
 
 

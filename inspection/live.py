@@ -76,8 +76,9 @@ class LiveInspection:
     tip_radius_mm   : points are centres of a ball of this radius
     section         : plane for points in space (m, 3); off_section_max_mm rejects points farther from it
     coverage_min    : share of the nominal's length below which conformity is not proven
-    reject_outliers : find gross outliers in the final registration and reject them. What was rejected was not judged, and from
-                      far off a defect looks like dust: conformity is then not proven
+    reject_outliers : find gross outliers in the final registration, farther off than six median deviations and half the zone, and
+                      reject them. What was rejected was not judged, and from far off a defect looks like dust: conformity is
+                      then not proven
     provisional     : False seeks no pose before `finish`, for points that are all there from the start; the result is the same
     """
 
@@ -237,7 +238,8 @@ class LiveInspection:
         )
 
     def _registered(self, points: Array) -> Registration:
-        registration = register(points, self._nominal, tip_radius_mm=self._tip, robust=self._reject_outliers)
+        gross_mm = (self._zone.upper_mm - self._zone.lower_mm) / 2  # nearer points are form, however exact the others are
+        registration = register(points, self._nominal, tip_radius_mm=self._tip, robust=self._reject_outliers, gross_mm=gross_mm)
         self._check_fit(points, registration)
         if self._fit == "minimum-zone":
             kept = points[~registration.outliers]

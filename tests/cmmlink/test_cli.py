@@ -1,7 +1,10 @@
 """Every command as its user meets it: what it prints, its exit code, and one clear message for every wrong input."""
 
 import json
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -111,6 +114,38 @@ def test_many_stretches_are_summed_up(nominal: Path) -> None:
     assert len(lines) == 11
     assert lines[-1] == "  out of tolerance: 8 more stretches, none of them worse"
     assert f"{station_mm(340):.2f} mm, worst +0.1340 mm" in lines[-2]
+
+
+AS_PROCESS = (sys.executable, "-m", "cmmlink")
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def inspection(nominal: Path, out: Path, name: str = "points.csv") -> list[str]:
+    points = write_points(nominal.parent / name, oval_points(0.01))
+    return [*AS_PROCESS, *map(str, ("inspect", points, "--nominal", nominal, *TOLERANCE, "--fit", "none", "--out", out))]
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no full device on this system")
+def test_an_answer_that_cannot_be_written_is_not_taken_for_nonconform_and_loses_no_result(nominal: Path, tmp_path: Path) -> None:
+    with open("/dev/full", "w", encoding="utf-8") as full:
+        ended = subprocess.run(inspection(nominal, tmp_path / "a"), cwd=ROOT, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert ended.returncode == 2
+    assert ended.stderr.splitlines()[-1].startswith("cmmlink: the answer could not be written: ")
+    assert "Traceback" not in ended.stderr
+    reading, writing = os.pipe()
+    os.close(reading)  # a pipe that nobody reads
+    unread = subprocess.run(inspection(nominal, tmp_path / "b"), cwd=ROOT, stdout=writing, stderr=subprocess.PIPE, text=True, check=False)
+    os.close(writing)
+    assert (unread.returncode, "Traceback" in unread.stderr) == (2, False)
+    for folder in ("a", "b"):
+        assert json.loads((tmp_path / folder / "result.json").read_text())["verdict"] == "conform"
+
+
+def test_a_name_that_the_terminal_has_no_letters_for_costs_no_verdict(nominal: Path, tmp_path: Path) -> None:
+    latin = os.environ | {"PYTHONUTF8": "0", "PYTHONIOENCODING": "cp1252:strict"}
+    ended = subprocess.run(inspection(nominal, tmp_path / "a", "叶片.csv"), cwd=ROOT, env=latin, capture_output=True, check=False)
+    assert ended.returncode == 0
+    assert ended.stdout.startswith(b"CONFORM   ??, file ??.csv")
 
 
 def test_json_is_one_object_with_the_stable_keys(nominal: Path) -> None:

@@ -353,6 +353,27 @@ def test_a_plan_says_the_same_as_options(cmmlink: Command, blade: tuple[Path, Pa
     assert json.loads(by_plan.out)["slices"] == json.loads(by_options.out)["slices"]
 
 
+def test_an_option_beside_a_plan_is_refused_and_not_ignored(cmmlink: Command, blade: tuple[Path, Path], tmp_path: Path) -> None:
+    text = "part: {name: blade}\nmesh: {file: blade.stl}\nnominal: {file: blade.yaml}\ntolerance: {lower_mm: -0.05, upper_mm: 0.05}\n"
+    plan = write(tmp_path / "plan.yaml", text + "sections: {heights_mm: [5]}\ncut: {cutter: numpy}\n")
+    for option in (("--tolerance", -1e-7, 1e-7), ("--heights", 3, 4), ("--reject-outliers",), ("--coverage-min", 0.95)):
+        ran = cmmlink("ct", plan, *option)
+        assert (ran.code, ran.out) == (2, "")
+        assert f"{option[0]} stands beside a plan" in ran.err
+    assert cmmlink("ct", plan, "--no-pictures", "--json").code == 0
+
+
+def test_a_stack_cut_short_proves_nothing(blade: tuple[Path, Path]) -> None:
+    stop = threading.Event()
+    plan = plan_of(*blade, {"heights_mm": (5.0, 10.0, 15.0)})
+    stack = inspect_stack(plan, clock=time.monotonic, stop=stop, on_section=lambda _: stop.set())
+    assert [section.verdict for section in stack.sections] == [Verdict.CONFORM]
+    assert stack.verdict is Verdict.UNCERTAIN
+    assert (stack.facts()["verdict"], stack.facts()["complete"]) == ("uncertain", False)
+    assert stack.notes[-1] == "aborted by the operator after 1 of 3 sections"
+    assert inspect(plan).facts()["complete"] is True
+
+
 @pytest.mark.parametrize(
     ("line", "message"),
     [

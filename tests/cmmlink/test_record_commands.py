@@ -20,6 +20,7 @@ import pytest
 from cmmlink.demo import plan_file
 from cmmlink.errors import StoreError
 from cmmlink.records import default_folder
+from cmmlink.store import FILE_NAME
 from drivers.source import WireBytes
 from tests.cmmlink.command import cmmlink
 from tests.cmmlink.recorded import Script, record, scan_arrivals
@@ -182,6 +183,25 @@ def test_records_on_a_write_protected_medium_can_be_read(tmp_path: Path, monkeyp
     assert {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == before
     with pytest.raises(StoreError, match="--records DIR"):
         record(tmp_path, Script(*scan_arrivals(count=120)))
+
+
+def test_records_that_cannot_be_read_whole_are_not_said_to_be_sound(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    record(tmp_path, Script(*scan_arrivals(count=120)))
+    file = tmp_path / FILE_NAME
+    with monkeypatch.context() as patch:
+        patch.setattr("cmmlink.store.os.access", lambda _, mode: mode != os.W_OK)
+        left = tmp_path / f"{FILE_NAME}-wal"
+        left.write_bytes(b"what a killed recorder left behind")
+        for command in ("runs", "verify"):
+            ended = cmmlink(command, "--records", tmp_path)
+            assert ended.code == 5
+            assert "copy the whole folder to a disk that can be written" in ended.err
+        left.unlink()
+    file.write_bytes(b"")
+    for command in ("runs", "verify"):
+        ended = cmmlink(command, "--records", tmp_path)
+        assert ended.code == 5
+        assert "the file is empty: what was recorded in it is gone" in ended.err
 
 
 def test_runs_are_kept_in_the_users_data_folder_unless_told_otherwise(station: Station, tmp_path: Path) -> None:

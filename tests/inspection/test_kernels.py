@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numba import njit
 from scipy.spatial import cKDTree
 
-from inspection import NominalProfile, NurbsCurve, discretize
+from inspection import NominalProfile, NurbsCurve, discretize, kernels
 from inspection.foot_grid import FootGrid, build_foot_grid
 from inspection.kernels import SAMPLE_METHODS, Feet, project, project_on_samples
 from tests.inspection import profiles
@@ -225,6 +226,16 @@ def test_moving_curve_and_points_together_moves_the_feet(name: str, angle: float
     assert np.abs(a.distance_mm - b.distance_mm).max() < 2e-12
     assert np.abs(profiles.rotated(a.foot_mm, angle, shift) - b.foot_mm).max() < 1e-10
     assert np.abs(profiles.rotated(a.gradient, angle) - b.gradient).max() < 1e-10
+
+
+def test_where_no_cache_can_be_kept_loops_are_compiled_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    def without_cache(**options: bool) -> Callable[[Callable[[], int]], Callable[[], int]]:
+        if options.pop("cache", False):
+            raise RuntimeError("cannot cache function: no locator available")
+        return njit(**options)  # type: ignore[no-any-return]
+
+    monkeypatch.setattr(kernels, "njit", without_cache)
+    assert kernels._compiled(lambda: 7)() == 7
 
 
 FORKED = """

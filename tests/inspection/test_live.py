@@ -251,6 +251,18 @@ def test_a_tenth_of_gross_outliers_is_found_and_moves_nothing() -> None:
         assert unspoiled.verdict is Verdict.CONFORM, name
 
 
+def test_points_within_the_zone_are_no_outliers_however_exact_the_others_are() -> None:
+    curve = curve_of("P3")
+    u = profiles.even_in_arc_length(curve, 2000)
+    for noise_mm, bump_mm in ((0.0, 0.0), (1e-6, 0.03), (0.001, 0.03)):
+        form = np.random.default_rng(8).normal(0, noise_mm, 2000)
+        form[300:400] += bump_mm
+        form[[700, 1500]] += (0.8, -0.8)
+        _, result = inspected(nominal_of("P3"), profiles.offset_points(curve, u, form), 250, reject_outliers=True)
+        assert np.flatnonzero(result.rejection).tolist() == [700, 1500]
+        assert result.verdict is Verdict.UNCERTAIN
+
+
 def test_a_local_defect_is_one_stretch_where_it_lies() -> None:
     curve = curve_of("P3")
     u = profiles.even_in_arc_length(curve, 2000)
