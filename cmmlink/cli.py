@@ -27,7 +27,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from numba.core.event import Event, Listener, install_listener
 from platformdirs import user_data_path
 from rich.console import Console
 
@@ -65,6 +64,7 @@ from drivers.point_file import PointFileSource
 from drivers.serial_scanner import SerialScanner, ports
 from drivers.source import Decoder, ScanSource
 from inspection import InspectionError, LiveInspection, NominalProfile, ToleranceZone, Verdict, rehearse
+from inspection.kernels import while_compiling
 
 if TYPE_CHECKING:
     from cmmlink.console.server import ConsoleServer
@@ -154,7 +154,7 @@ def main() -> None:
     """Run the command line; every error a user can cause ends as one message and an exit code."""
     _speak_somehow()
     try:
-        with install_listener("numba:compile", _Compiling()):
+        with while_compiling(_say_that_it_compiles):
             code = app(prog_name="cmmlink", standalone_mode=False)
         sys.stdout.flush()
         if code == _STOPPED:
@@ -193,19 +193,8 @@ def _hush() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-class _Compiling(Listener):  # type: ignore[misc]  # numba has no types
-    """Say once why nothing happens while loops are compiled; what comes from the cache is not compiled."""
-
-    def __init__(self) -> None:
-        self._said = False
-
-    def on_start(self, event: Event) -> None:
-        if not self._said:
-            self._said = True
-            sys.stderr.write("cmmlink: compiling the inspection, once after an installation, up to half a minute\n")
-
-    def on_end(self, event: Event) -> None:
-        """Nothing more to say."""
+def _say_that_it_compiles() -> None:
+    sys.stderr.write("cmmlink: compiling the inspection, once after an installation, up to half a minute\n")
 
 
 def _usage(error: typer.TyperException) -> str:
@@ -389,7 +378,8 @@ def _run(plan: Plan, profile: NominalProfile, device: Connected, telling: Tellin
 def _run_on_page(plan_file: Path, profile: NominalProfile, connect: Connect, telling: Telling) -> int:
     """Carry out a plan on the console's page, and stay for the next part while the page is open."""
     past = _past_runs(telling.records)
-    means = Means(lambda: {plan_file.name: plan_file}, connect, ports, past, time.monotonic, _today)
+    write = _writing(past, telling.out)
+    means = Means(lambda: {plan_file.name: plan_file}, connect, ports, past, time.monotonic, _today, write=write)
     with _stopped_by_ctrl_c() as stop, served(means, __version__) as server:
         station = server.station
         _show(server, telling.no_browser)
@@ -515,9 +505,24 @@ def _carry_out(source: ScanSource, live: LiveInspection, started: RunStarted, si
         return run_inspection(source, live, sinks, started, buffer_points=buffer_points, clock=time.monotonic, stop=stop)
 
 
+def _facts(outcome: RunOutcome, started: RunStarted, evidence: Evidence | None) -> dict[str, Any]:
+    return summary(outcome.result, outcome.counts) | identity(started) | (asdict(evidence) if evidence else {})
+
+
+def _writing(past: PastRuns, out: Path | None = None) -> Callable[[Plan, NominalProfile, RunOutcome, RunStarted], None]:
+    """What writes the results of every run on a page into a folder, or into that of its plan."""
+
+    def write(plan: Plan, profile: NominalProfile, outcome: RunOutcome, started: RunStarted) -> None:
+        folder = out or plan.out
+        if folder is not None:
+            write_results(folder, _facts(outcome, started, past.evidence), outcome.result, profile, _title(started))
+
+    return write
+
+
 def _tell(outcome: RunOutcome, profile: NominalProfile, telling: Telling, started: RunStarted, evidence: Evidence | None = None) -> int:
     """Write and print the outcome, each whatever happens to the other; the exit code."""
-    facts = summary(outcome.result, outcome.counts) | identity(started) | (asdict(evidence) if evidence else {})
+    facts = _facts(outcome, started, evidence)
     message = str(outcome.failure or outcome.refusal or "")
     if outcome.ending == "aborted":
         message = message or "stopped by the operator: the scan is not complete"
@@ -753,7 +758,7 @@ def serve_console(
         raise PlanError(f"{folder}: there is no such folder; give the folder that holds the plans")
     past = _past_runs(records)
     scans, surfaces = (lambda: _plans_in(folder, surfaces=False)), (lambda: _plans_in(folder, surfaces=True))
-    means = Means(scans, _connected, ports, past, time.monotonic, _today, surfaces, _inspect_surface)
+    means = Means(scans, _connected, ports, past, time.monotonic, _today, surfaces, _inspect_surface, _writing(past))
     token = kept_token(user_data_path("cmmlink", appauthor=False))
     with _stopped_by_ctrl_c() as stop, served(means, __version__, host, port, token) as server:
         _show(server, no_browser)

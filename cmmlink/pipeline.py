@@ -15,7 +15,7 @@ from cmmlink.buffer import HandOver
 from cmmlink.events import Arrived, Counts, Ending, Event, Judged, RunFinished, RunStarted, Sink
 from drivers.errors import DeviceError
 from drivers.source import Arrival, Damaged, Lost, PointBatch, Rejected, ScanSource
-from inspection import InspectionError, InspectionResult, LiveInspection
+from inspection import InspectionError, InspectionResult, LiveInspection, Rejection
 
 _LOOK_S = 0.05  # how often the run looks whether it was asked to stop
 _MOST_AT_ONCE = 4096  # points judged in one go when many wait, so that the sinks hear of them
@@ -98,9 +98,7 @@ def run_inspection(
     failure = failures[0] if failures else None
     ending: Ending = "interrupted" if failure else "aborted" if stop.is_set() else "complete"
     result, refusal = _finish(live, ending)
-    judged, reasons = (
-        (result.judged, result.rejected_by_reason) if result else (0, {"not registered": live.received} if live.received else {})
-    )
+    judged, reasons = (result.judged, result.rejected_by_reason) if result else (0, _unregistered(live))
     counts = tally.counts(judged, reasons, buffer)
     _tell(sinks, RunFinished(ending, result, counts, str(failure or refusal or "")))
     return RunOutcome(ending, result, counts, failure, refusal)
@@ -168,6 +166,13 @@ def _judge(
     now = clock()
     counts = tally.counts(live.judged, live.rejected_by_reason, buffer)
     _tell(sinks, Judged(now, now - batches[-1][0], update, counts))
+
+
+def _unregistered(live: LiveInspection) -> dict[str, int]:
+    """Why points have no verdict where there is no registration; beyond which end a point lies, nobody knows then."""
+    reasons = {reason: count for reason, count in live.rejected_by_reason.items() if reason != Rejection.BEYOND_END.words}
+    left = live.received - sum(reasons.values())
+    return reasons | ({"not registered": left} if left else {})
 
 
 def _finish(live: LiveInspection, ending: Ending) -> tuple[InspectionResult | None, InspectionError | None]:

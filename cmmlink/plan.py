@@ -27,7 +27,7 @@ A plan needs four keys; everything else has the default shown. Relative paths ar
     # device:
     #   type: modbus                # registers over TCP (host:port) or RTU (a port name)
     #   address: 192.168.1.10:502
-    #   map: gocator                # or generic-ring, generic-fifo, riftek-rf60x, or a yaml file of yours
+    #   map: gocator                # or generic-ring, generic-fifo, riftek-rf60x; anything else is a yaml file of yours
     #   device_id: 1
     #   points: null                # the scan ends after so many, for devices that tell no end
     #   timeout_s: 1.0              # longer than the slowest answer
@@ -52,6 +52,7 @@ A plan needs four keys; everything else has the default shown. Relative paths ar
 A further device is a further model with its own `type`, added to the union `Device`.
 """
 
+from collections.abc import Callable
 from math import hypot
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -63,6 +64,7 @@ from cmmlink.errors import PlanError, YamlError
 from cmmlink.yaml_model import line_of, read_model
 from drivers.errors import PointFileError
 from drivers.point_file import read_text
+from drivers.register_map import shipped_maps
 from inspection.tolerance import ToleranceZone
 
 Vector = tuple[float, float, float]
@@ -177,7 +179,7 @@ class ModbusDevice(_Settings):
     @property
     def own_map(self) -> Path | None:
         """The file of a map that is not shipped; None also where the plan holds the map itself, as that of a record does."""
-        return Path(self.map) if isinstance(self.map, str) and Path(self.map).suffix else None
+        return Path(self.map) if isinstance(self.map, str) and self.map not in shipped_maps() else None
 
 
 class FileDevice(_Settings):
@@ -309,13 +311,23 @@ def place_of(path: Path, key: str) -> str:
     return f"{path}: line {line_of(read_text(path), key)}: {key}"
 
 
+def with_own_maps(device: Device, replaced: Callable[[Path], str | dict[str, Any]]) -> Device:
+    """Give the same device with the register maps of the user's own replaced: its own, and those of what its axis follows."""
+    if isinstance(device, FileDevice):
+        return device
+    update: dict[str, Any] = {}
+    if isinstance(device, ModbusDevice) and device.own_map is not None:
+        update["map"] = replaced(device.own_map)
+    if device.axis is not None and device.axis.follow is not None:
+        update["axis"] = device.axis.model_copy(update={"follow": with_own_maps(device.axis.follow, replaced)})
+    return device.model_copy(update=update)
+
+
 def _with_paths_from(folder: Path, plan: Plan) -> Plan:
     """Make the paths of a plan absolute, seen from its folder."""
-    device = plan.device
+    device = with_own_maps(plan.device, lambda own: str(folder / own))
     if isinstance(device, FileDevice):
         device = device.model_copy(update={"file": folder / device.file})
-    elif isinstance(device, ModbusDevice) and device.own_map is not None:
-        device = device.model_copy(update={"map": str(folder / device.own_map)})
     return plan.model_copy(
         update={
             "nominal": plan.nominal.model_copy(update={"file": folder / plan.nominal.file}),

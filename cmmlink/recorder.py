@@ -14,17 +14,16 @@ from datetime import datetime
 from importlib import metadata
 from typing import Any
 
-import yaml
-
 from cmmlink import __version__
 from cmmlink.buffer import HandOver
 from cmmlink.chain import Draft, Kind
 from cmmlink.chunks import Moment, pack_document, pack_judged, pack_moments, pack_points, pack_reads
-from cmmlink.errors import StoreError
+from cmmlink.errors import PlanError, StoreError
 from cmmlink.events import Arrived, Event, Judged, RunFinished, RunStarted
-from cmmlink.plan import ModbusDevice, Plan
+from cmmlink.plan import Plan, with_own_maps
 from cmmlink.report.summary import number, summary
 from cmmlink.store import Store
+from drivers.register_map import load_map
 from drivers.source import PointBatch, Rejected, WireBytes
 from inspection import InspectionResult
 
@@ -46,11 +45,15 @@ class Basis:
 
     @classmethod
     def of(cls, plan: Plan) -> "Basis":
-        """What a plan rests on at this moment. A register map of the user's own becomes part of the plan."""
-        device = plan.device
-        if isinstance(device, ModbusDevice) and device.own_map is not None:
-            own = yaml.safe_load(device.own_map.read_text(encoding="utf-8"))
-            plan = plan.model_copy(update={"device": device.model_copy(update={"map": own})})
+        """What a plan rests on at this moment. Register maps of the user's own become part of the plan. Raises PlanError.
+
+        A map is kept as it was understood, every default filled in: how its file spells it may read otherwise another day.
+        """
+        try:
+            device = with_own_maps(plan.device, lambda own: load_map(own).model_dump(mode="json"))
+        except ValueError as error:
+            raise PlanError(f"device: {error}") from None
+        plan = plan.model_copy(update={"device": device})
         return cls(plan.effective_yaml(), plan.nominal.file.name, plan.nominal.file.read_bytes(), software())
 
 

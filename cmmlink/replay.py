@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pydantic import ValidationError
+
 from cmmlink.chunks import Moment
 from cmmlink.errors import PlanError, StoreError, YamlError
 from cmmlink.events import RunStarted, Sink
@@ -78,7 +80,8 @@ def replay(
     changed = _with_changes(plan, tolerance, method)
     profile = recorded_profile(changed, recorded)
     stop = stop or threading.Event()
-    source = Capture(_arrivals(store, recorded, decoder := decoder_of(plan.device), stop), decoder, _failure(recorded))
+    decoder = _recorded_decoder(plan.device, recorded, decoder_of)
+    source = Capture(_arrivals(store, recorded, decoder, stop), decoder, _failure(recorded))
     started = RunStarted(*(recorded.header[key] for key in ("part", "serial_number", "operator", "device", "simulated")))
     live = planned_inspection(changed, profile)
     outcome = run_inspection(source, live, sinks, started, buffer_points=plan.buffer_points, clock=clock, stop=stop)
@@ -98,6 +101,13 @@ def recorded_plan(recorded: RecordedRun) -> Plan:
         raise StoreError(f"the plan of run {recorded.run} cannot be read by this version of cmmlink: {error}") from None
 
 
+def _recorded_decoder(device: Device, recorded: RecordedRun, decoder_of: Callable[[Device], Decoder | None]) -> Decoder | None:
+    try:
+        return decoder_of(device)
+    except ValueError as error:  # a format, an option or a register map that was valid on that day, or is gone
+        raise StoreError(f"the device in the plan of run {recorded.run} cannot be read by this version of cmmlink: {error}") from None
+
+
 def _with_changes(plan: Plan, tolerance: tuple[float, float] | None, method: str | None) -> Plan:
     document = plan.model_dump()
     if tolerance is not None:
@@ -106,8 +116,10 @@ def _with_changes(plan: Plan, tolerance: tuple[float, float] | None, method: str
         document["registration"]["method"] = method
     try:
         return Plan.model_validate(document)
-    except ValueError as error:
-        raise PlanError(f"the recorded plan cannot be changed so: {error}") from None
+    except ValidationError as error:
+        first = error.errors()[0]
+        key, told = ".".join(map(str, first["loc"])), first["msg"].removeprefix("Value error, ")
+        raise PlanError(f"the recorded plan cannot be changed so: {key} is {first['input']!r}; expected {told}") from None
 
 
 def recorded_profile(plan: Plan, recorded: RecordedRun) -> NominalProfile:

@@ -33,7 +33,7 @@ class RegisterDecoder:
         self._out: list[Arrival] = []
         self._opened = False
         self._heartbeat: int | None = None
-        self._overflow = 0
+        self._overflow: dict[str, bool] = {}  # of each block: what one says is not taken back by another
         self.idle = False
         self._begin()
 
@@ -49,6 +49,8 @@ class RegisterDecoder:
         self._finished = self._closed = self._ran = False
         self._backward = self._rereads = 0
         self._sent: int | None = None
+        self._first_place: int | None = None  # of a ring: the first place whose point was received, and the one after the last
+        self._next_place = 0
         self._step = "status" if self._map.status else ("pop" if self._map.pop else "points")
         self._popped: dict[str, NDArray[np.generic]] = {}
 
@@ -107,7 +109,8 @@ class RegisterDecoder:
         if not self._opened:
             self._opened = True
             self._out.append(ScanOpened(self._map.device, "", values.get("announced") or None))
-        self._hear(values)
+        self._hear_heartbeat(values)
+        self._hear_overflow("status", read)
         self._sent = values.get("sent")
         state = block.fields.get("state")
         over = state is not None and state.finished is not None and values["state"] == state.finished
@@ -129,16 +132,20 @@ class RegisterDecoder:
                 f"{self._map.device}: register {block.at + field.at} holds {values[name]:#x}, not {field.equals:#x}: another device"
             )
 
-    def _hear(self, values: dict[str, int]) -> None:
-        """Take note of signs of life and of the device's own losses."""
+    def _hear_heartbeat(self, values: dict[str, int]) -> None:
         if "heartbeat" in values and values["heartbeat"] != self._heartbeat:
             if self._heartbeat is not None:
                 self._out.append(Heartbeat())
             self._heartbeat = values["heartbeat"]
-        overflow = values.get("overflow", self._overflow)
-        if overflow and not self._overflow:
-            self._out.append(Lost(0, "the device says that its buffer overflowed; its counter shows how many"))
-        self._overflow = overflow
+
+    def _hear_overflow(self, where: str, read: Columns) -> None:
+        """Take note of the device's own losses, told in a block once or with every point of it."""
+        if "overflow" not in read.values:
+            return
+        for overflow in (read.values["overflow"][read.sound] != 0).tolist():
+            if overflow and not self._overflow.get(where):
+                self._out.append(Lost(0, "the device says that its buffer overflowed; its counter shows how many"))
+            self._overflow[where] = overflow
 
     def _plan_ring(self, written: int, modulus: int) -> None:
         ahead = (written - self._written + modulus // 2) % modulus - modulus // 2
@@ -151,7 +158,15 @@ class RegisterDecoder:
             self._step, self.idle = "points", False
         else:
             self.idle = True
-            self._end_if_finished(self._finished)
+            self._end_ring_if_finished()
+
+    def _end_ring_if_finished(self) -> None:
+        """A device that does not tell how many points it sent has sent those it wrote; the sequence shows only gaps between two."""
+        if self._finished and not self._closed and self._sent is None:
+            before, last = (self._written, self._written) if self._first_place is None else (self._first_place, self._next_place)
+            if lost := before + self._written - last:
+                self._out.append(Lost(lost, "written by the device, never received soundly"))
+        self._end_if_finished(self._finished)
 
     def _contradicts(self, backward: bool) -> bool:
         """Tell whether an answer goes back behind an earlier one; several in a row mean that the device began anew."""
@@ -166,8 +181,9 @@ class RegisterDecoder:
 
     def _take_pop(self, registers: bytes) -> None:
         assert self._map.pop is not None
-        self._popped = columns(self._map.pop, self._map.word_order, registers).values
-        self._hear({"overflow": int(self._popped["overflow"][0])} if "overflow" in self._popped else {})
+        popped = columns(self._map.pop, self._map.word_order, registers)
+        self._popped = popped.values
+        self._hear_overflow("pop", popped)
         sequence = self._map.pop.fields.get("sequence")
         counter = int(self._popped["sequence"][0]) if sequence else None
         if sequence is not None and counter is not None and (counter == sequence.invalid or not self._is_new(counter)):
@@ -196,21 +212,30 @@ class RegisterDecoder:
             self._turn_ends()
             return
         read = columns(block, self._map.word_order, registers[:whole])
-        values = {**self._popped, **read.values}
-        if pattern == "latest" and "sequence" in values and not self._is_new(int(values["sequence"][0])):
-            self._turn_ends()
-            return
         damaged = int((~read.sound).sum())
+        place = self._read
         if pattern == "ring":
             taken = self._worth_taking(read.sound)
             self._read += taken
             read = Columns({name: column[:taken] for name, column in read.values.items()}, read.sound[:taken])
-            values = read.values
+        self._hear_overflow("points", read)
+        values = {**self._popped, **read.values}
+        if pattern == "latest" and "sequence" in values and not self._is_new(int(values["sequence"][0])):
+            self._turn_ends()
+            return
         if damaged:
             self._out.append(Damaged(2 * block.size * damaged, "point with a wrong checksum"))
-        self._points({name: column[read.sound] for name, column in values.items()}, int(read.sound.sum()))
+        numbers = self._points({name: column[read.sound] for name, column in values.items()}, int(read.sound.sum()))
+        if pattern == "ring":
+            self._note_places(place + np.flatnonzero(read.sound)[numbers >= 0])
         self.idle = pattern == "latest"
         self._step = "points" if pattern == "ring" and self._read < self._written else self._next_turn()
+
+    def _note_places(self, places: NDArray[np.int64]) -> None:
+        """Note the places of a ring whose points were received: neither damaged nor repeated."""
+        if len(places):
+            self._first_place = int(places[0]) if self._first_place is None else self._first_place
+            self._next_place = int(places[-1]) + 1
 
     def _worth_taking(self, sound: NDArray[np.bool_]) -> int:
         """Return how many points of a ring to take: up to a damaged one, which is read again, but not for ever."""
@@ -225,17 +250,19 @@ class RegisterDecoder:
             return "pop"  # the status again only when the queue is empty
         return "points" if self._map.pattern == "fifo" or not self._map.status else "status"
 
-    def _points(self, values: dict[str, NDArray[np.generic]], count: int) -> None:
+    def _points(self, values: dict[str, NDArray[np.generic]], count: int) -> NDArray[np.int64]:
+        """Hand over sound points; return their numbers, -1 for repetitions."""
         numbers = self._numbers(values, count)
         usable = numbers >= 0
         if count and not usable.any() and self._map.pattern != "ring" and self._contradicts(backward=True):
-            return
+            return numbers
         self._backward = 0 if self._map.pattern != "ring" else self._backward
         usable[usable] = ~self._invalid({name: column[usable] for name, column in values.items()}, int(usable.sum()))
         if usable.any():
             self._out.append(PointBatch(numbers[usable], self._seconds(values, usable), self._points_mm(values, usable)))
         if self._count is not None and self._first is not None and self._counter.expected - self._first >= self._count:
             self._end_if_finished(finished=True)
+        return numbers
 
     def _numbers(self, values: dict[str, NDArray[np.generic]], count: int) -> NDArray[np.int64]:
         """Return the unwrapped numbers of the points, -1 for repetitions."""

@@ -30,9 +30,14 @@ queue   reading the block `pop` takes the oldest message out of the device's que
         belongs to that message. `pop` may hold sequence, time, overflow, x, y, z as well.
 fifo    function 24 at the address of the points block hands over up to 31 registers, and forgets them.
 
-Coordinates that are not named are 0; a distance sensor's distance is z.
+`overflow` may stand in every block: it is heard wherever it is read. Without `sent` the scan of a ring that tells its end
+runs from 0 to `written`: what of it was never read soundly is lost.
+
+Coordinates that are not named are 0; a distance sensor's distance is z. Every scale is finite and not 0; true and false are
+no numbers.
 """
 
+import math
 from binascii import crc_hqx
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -42,31 +47,49 @@ from typing import Annotated, Any, Literal
 import numpy as np
 import yaml
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 MAPS = Path(__file__).parent / "maps"
 MOST_REGISTERS = 125  # that one answer can carry
 MOST_FIFO = 31
+DEEPEST = 20  # collections within each other; a map needs four
 NUMPY_TYPES = {
     "uint16": ">u2", "int16": ">i2", "uint32": ">u4", "int32": ">i4", "uint64": ">u8", "int64": ">i8", "float32": ">f4", "float64": ">f8"
 }  # fmt: skip
 
 
+def _no_truth_value(given: object) -> object:
+    if isinstance(given, bool):  # pydantic takes true for 1, YAML takes yes and on for true
+        raise ValueError("true or false where a number belongs")
+    return given
+
+
+Whole = Annotated[int, BeforeValidator(_no_truth_value)]
+Number = Annotated[float, BeforeValidator(_no_truth_value)]
+
+
 class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class RegisterField(_Part):
     """One number: where it lies in its block, and what it means."""
 
-    at: Annotated[int, Field(ge=0, le=65535)]
+    at: Annotated[Whole, Field(ge=0, le=65535)]
     type: Literal["uint16", "int16", "uint32", "int32", "uint64", "int64", "float32", "float64"]
-    scale: float = 1.0
-    offset: float = 0.0
-    invalid: int | None = None
-    invalid_bits: int = 0
-    equals: int | None = None
-    finished: int | None = None
+    scale: Number = 1.0
+    offset: Number = 0.0
+    invalid: Whole | None = None
+    invalid_bits: Whole = 0
+    equals: Whole | None = None
+    finished: Whole | None = None
+
+    @field_validator("scale")
+    @classmethod
+    def _divides(cls, scale: float) -> float:
+        if scale == 0.0 or not math.isfinite(1.0 / scale):  # ticks per second are 1 / scale
+            raise ValueError("a scale of 0, or too close to it, makes every value the same")
+        return scale
 
     @property
     def registers(self) -> int:
@@ -83,10 +106,10 @@ class RegisterField(_Part):
 class Block(_Part):
     """Registers read together."""
 
-    at: Annotated[int, Field(ge=0, le=65535)]
+    at: Annotated[Whole, Field(ge=0, le=65535)]
     fields: Annotated[dict[str, RegisterField], Field(min_length=1)]
-    entries: Annotated[int, Field(ge=1)] = 1
-    registers: Annotated[int, Field(ge=0, le=MOST_REGISTERS)] = 0
+    entries: Annotated[Whole, Field(ge=1)] = 1
+    registers: Annotated[Whole, Field(ge=0, le=MOST_REGISTERS)] = 0
 
     @property
     def size(self) -> int:
@@ -139,23 +162,55 @@ def _only(block: Block | None, names: set[str], where: str) -> None:
         raise ValueError(f"{where}: field {unknown[0]!r} is none of {', '.join(sorted(names))}")
 
 
+def shipped_maps() -> dict[str, Path]:
+    """Files of the maps that are shipped, by their names."""
+    return {file.stem: file for file in sorted(MAPS.glob("*.yaml"))}
+
+
 def load_map(name: str | Path | Mapping[str, Any]) -> RegisterMap:
-    """Read a map: a YAML file, the name of one that is shipped, or its content; raise `ValueError` naming file, line and key."""
+    """Read a map: the name of one that is shipped, any other YAML file, or its content; raise `ValueError` naming file, line and key.
+
+    A shipped name as text is always the shipped map, whatever else bears that name; a `Path` is always a file.
+    """
     if isinstance(name, Mapping):
         return _checked(name, "map", lambda _: "")
-    path = Path(name)
-    if not path.suffix and not path.exists():
-        path = MAPS / f"{name}.yaml"
+    path = shipped_maps().get(name, Path(name)) if isinstance(name, str) else name
+    text = _text_of(path)
     try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        shipped = ", ".join(sorted(file.stem for file in MAPS.glob("*.yaml")))
-        raise ValueError(f"{path}: {error.strerror or error}; give a YAML file or one of {shipped}") from error
-    try:
-        tree = yaml.safe_load(text)
+        _refuse_what_no_map_needs(text, path)
     except yaml.YAMLError as error:
         raise ValueError(f"{path}: no YAML: {error}") from error
+    try:
+        tree = yaml.safe_load(text)
+    except (yaml.YAMLError, ValueError) as error:  # what looks like a date and is none is a ValueError of the reader's
+        raise ValueError(f"{path}: no YAML: {error}") from error
     return _checked(tree, str(path), lambda keys: f", line {_line_of(text, keys)}")
+
+
+def _text_of(path: Path) -> str:
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise ValueError(f"{path}: {error.strerror or error}; give a YAML file or one of {', '.join(shipped_maps())}") from error
+    try:
+        text = data.decode("utf-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path}: byte {error.start + 1} is not UTF-8; save the map as UTF-8") from error
+    if "\0" in text:  # every other byte of UTF-16 without its mark
+        raise ValueError(f"{path}: not a text in UTF-8; save the map as UTF-8")
+    return text
+
+
+def _refuse_what_no_map_needs(text: str, path: Path) -> None:
+    """Refuse deep nesting, which would exhaust the stack of the reader proper, and tags, at which it may fail in any way."""
+    depth = 0
+    for event in yaml.parse(text, Loader=yaml.SafeLoader):
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        where = f"{path}, line {event.start_mark.line + 1 if event.start_mark else 1}"
+        if depth > DEEPEST:
+            raise ValueError(f"{where}: nested more than {DEEPEST} deep")
+        if getattr(event, "tag", None) not in (None, "!"):
+            raise ValueError(f"{where}: the tag {getattr(event, 'tag', '')} is not supported; write the plain value")
 
 
 def _checked(tree: object, file: str, line_of: Callable[[list[str]], str]) -> RegisterMap:

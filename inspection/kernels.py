@@ -6,14 +6,16 @@ vectorised and scalar code. Nothing is compiled when this file is imported; the 
 """
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 from llvmlite import ir
 from numba import carray, njit, types
 from numba.core import cgutils
+from numba.core.event import Event, Listener, install_listener
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
@@ -206,6 +208,26 @@ def _share(work: Callable[[NDArray[np.int64]], None], m: int, threads: int | Non
     for help_given in helping:
         if not help_given.cancel():  # one that has not begun, as in a forked process, has nothing left to do
             help_given.result()
+
+
+@contextmanager
+def while_compiling(tell: Callable[[], None]) -> Iterator[None]:
+    """Within it, call `tell` at the first loop that has to be compiled; what comes from the cache has not."""
+    with install_listener("numba:compile", _FirstOne(tell)):
+        yield
+
+
+class _FirstOne(Listener):  # type: ignore[misc]  # numba has no types
+    def __init__(self, tell: Callable[[], None]) -> None:
+        self._tell: Callable[[], None] | None = tell
+
+    def on_start(self, event: Event) -> None:
+        if self._tell is not None:
+            self._tell()
+            self._tell = None
+
+    def on_end(self, event: Event) -> None:
+        """Nothing to tell."""
 
 
 def compile_kernels() -> None:
@@ -527,9 +549,20 @@ def _advance(w: Any, q: Any, reals: Any, integers: Any, feet: Any, j: int, waiti
 
 @_compiled
 def _offer(best: Any, feet: Any, point: int) -> None:
-    """Keep the closest foot of a point; of two equally close ones that of the smaller parameter, whatever their order."""
-    distance, least = abs(best[3]), abs(feet.distance_mm[point])
-    if distance < least or (distance == least and best[0] < feet.parameter[point]):
+    """Keep the closest foot of a point, whatever their order: of equally close ones that of the smaller parameter, and so on."""
+    order = abs(best[3]) - abs(feet.distance_mm[point])
+    if order == 0.0:
+        order = best[0] - feet.parameter[point]
+    if order == 0.0:  # one foot, worked out on two pieces or by the search as well: the last bits may differ
+        order = best[8] - feet.station_mm[point]
+    if order == 0.0:
+        order = best[6] - feet.curvature[point]
+    for axis in range(2):
+        if order == 0.0:
+            order = best[1 + axis] - feet.foot_mm[point, axis]
+        if order == 0.0:
+            order = best[4 + axis] - feet.gradient[point, axis]
+    if order < 0.0:
         _store(best, feet, point)
 
 
@@ -805,7 +838,8 @@ def _in_cell(x: float, y: float, site: int, samples: Any, links: Any) -> bool:
     """Whether a point between the bisectors with both neighbours is surely in the Voronoi cell of a sample.
 
     The cell is convex and holds the edges that it shares with the neighbours, so it holds what lies between their ends. False
-    also where there is no neighbour or no such edge (NaN), and within a thousandth of the cell's border.
+    also where there is no neighbour or no such edge (NaN), where an edge does not reach to both sides of the sample, and within a
+    thousandth of the cell's border.
     """
     row, before = SAMPLE_WIDTH * site, links[LINK_WIDTH * site + 1]
     if before < 0 or links[LINK_WIDTH * site] < 0:
@@ -816,8 +850,10 @@ def _in_cell(x: float, y: float, site: int, samples: Any, links: Any) -> bool:
     for end in (16, 18):
         ax, ay = _WITHIN * (samples[earlier + end] - samples[row]), _WITHIN * (samples[earlier + end + 1] - samples[row + 1])
         bx, by = _WITHIN * (samples[row + end] - samples[row]), _WITHIN * (samples[row + end + 1] - samples[row + 1])
+        above = min(ax * samples[row + 4] + ay * samples[row + 5], bx * samples[row + 4] + by * samples[row + 5])
+        below = max(ax * samples[row + 4] + ay * samples[row + 5], bx * samples[row + 4] + by * samples[row + 5])
         side = (bx - ax) * (dy - ay) - (by - ay) * (dx - ax)
-        inside = inside and (side < 0.0 if end == 16 else side > 0.0)
+        inside = inside and (side < 0.0 and above > 0.0 if end == 16 else side > 0.0 and below < 0.0)
     return inside
 
 
@@ -930,8 +966,11 @@ def _between_pole_circles(x: float, y: float, site: int, samples: Any, links: An
         return left, gx, gy
     share = at_other / total
     left_other, gx_other, gy_other = _on_pole_circle(x, y, other, samples)
+    first_x, first_y = gx, gy
     gx, gy = share * gx + (1.0 - share) * gx_other, share * gy + (1.0 - share) * gy_other
     length = np.hypot(gx, gy)
+    if length == 0.0:  # at a Voronoi vertex the two directions may be opposite: either is as near
+        return left, first_x, first_y
     return share * left + (1.0 - share) * left_other, gx / length, gy / length
 
 
@@ -1078,7 +1117,8 @@ def _settle_pose(problem: Any, samples: Any, memory: Any, state: Any, covariance
         step, next_pose, share, lower = _newton_step(here, span[2]), pose, 1.0, False
         for _ in range(_HALVINGS):
             next_pose = _moved_pose(pose, span, step, share)
-            settled = share * step[3] <= _STANDSTILL_MM  # it changes no deviation by more: nothing to project again
+            # It changes no deviation by more, so there is nothing to project again; without any point nothing was fitted.
+            settled = share * step[3] <= _STANDSTILL_MM and here[_COUNT] > 0.0
             if settled:
                 break
             _evaluate(problem, samples, next_pose, span, moved, takes_part, new_part, feet, trial)

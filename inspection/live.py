@@ -15,6 +15,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inspection.coarse import FEWEST_POINTS
 from inspection.deviations import Method
 from inspection.errors import RegistrationError
 from inspection.fine import ranked_poses, register, register_fine
@@ -110,7 +111,7 @@ class LiveInspection:
         self._reject_outliers, self._provisional = reject_outliers, provisional
         self._datum = RigidTransform.identity() if datum is None and fit == "none" else datum
         self._rows = _Rows()
-        self._next_search = _BLOCK
+        self._next_fit = _BLOCK  # received points at which the pose is sought, or fitted anew
         self._track: _PoseTrack | None = None
 
     @property
@@ -167,6 +168,12 @@ class LiveInspection:
         """
         rows, count = self._rows, self._rows.count
         usable = np.flatnonzero(np.isin(rows.rejection[:count], _USABLE))
+        off = int(np.count_nonzero(rows.rejection[:count] == Rejection.OFF_SECTION))
+        if self._datum is None and len(usable) < FEWEST_POINTS <= off:
+            raise RegistrationError(
+                f"{off} of {count} points lie farther than {self._off_section_max:g} mm from the plane of the section: "
+                "are its origin and its normal right?"
+            )
         registration = given_pose(self._datum, len(usable)) if self._datum is not None else self._registered(rows.points[usable])
         if self._datum is None:  # so that a replay on another processor judges at the very same pose
             registration = replace(registration, nominal_from_section=registration.nominal_from_section.rounded())
@@ -190,17 +197,16 @@ class LiveInspection:
     def _advance(self) -> bool:
         """Move the state at a block's end; True when every verdict given so far is replaced."""
         rows, count = self._rows, self._rows.count
-        if self._track is None and count < self._next_search:
-            return False
-        if self._track is not None and count < _REFIT_GROWTH * self._track.fitted:
-            self._track.refine(rows, count - _BLOCK, count)
+        if count < self._next_fit:
+            if self._track is not None:
+                self._track.refine(rows, count - _BLOCK, count)
             return False
         points = rows.points[:count][np.isin(rows.rejection[:count], _USABLE)]
         if self._track is None:
-            self._next_search = int(count * _SEEK_GROWTH)
             self._track = self._sought(points)
         else:
             self._track = self._fresh_track(register_fine(points, self._nominal, self._track.pose, tip_radius_mm=self._tip), points)
+        self._next_fit = int(count * (_SEEK_GROWTH if self._track is None else _REFIT_GROWTH))
         if self._track is not None:
             self._judge(0, count)
         return self._track is not None
@@ -285,7 +291,7 @@ class LiveInspection:
             registration,
             "none" if self._datum is not None else self._fit,
             self._method,
-            stretches(station, deviation, verdicts, self._zone, self._nominal.curve.closed),
+            stretches(station, deviation, verdicts, self._zone, self._nominal),
         )
 
 
@@ -345,7 +351,6 @@ class _PoseTrack:
         self, registration: Registration, points: Array, nominal: NominalProfile, tip_radius_mm: float, expected_form_mm: float
     ) -> None:
         self.registration = registration
-        self.fitted = len(points)
         self._start, self._centre, self._expected_form_mm = self.pose, registration.centre_mm, expected_form_mm
         self._places, self._normals = nominal.points_mm[::_PLACES], nominal.outward * nominal.normal[::_PLACES]
         reach = float(np.hypot(*(self._places - self._centre).T).max())

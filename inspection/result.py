@@ -148,23 +148,33 @@ def coverage(station_mm: Array, nominal: NominalProfile) -> float:
     """
     if not len(station_mm):
         return 0.0
+    gaps, limit = _gaps(np.sort(station_mm), nominal)
+    return float(np.where(gaps <= limit, gaps, 0.0).sum() / nominal.length_mm)
+
+
+def _gaps(sorted_mm: Array, nominal: NominalProfile) -> tuple[Array, float]:
+    """Distances between neighbouring stations, the seam or both ends included, and from which on one was not measured."""
     length = nominal.length_mm
-    s = np.sort(station_mm)
-    gaps = np.diff(np.append(s, s[0] + length)) if nominal.curve.closed else np.diff(np.concatenate([[0.0], s, [length]]))
-    limit = float(np.clip(_GAP * np.median(gaps), _FINEST_GAP * length, _WIDEST_GAP * length))
-    return float(np.where(gaps <= limit, gaps, 0.0).sum() / length)
+    closed = nominal.curve.closed
+    gaps = np.diff(np.append(sorted_mm, sorted_mm[0] + length)) if closed else np.diff(np.concatenate([[0.0], sorted_mm, [length]]))
+    return gaps, float(np.clip(_GAP * np.median(gaps), _FINEST_GAP * length, _WIDEST_GAP * length))
 
 
-def stretches(station_mm: Array, deviation_mm: Array, verdicts: NDArray[np.int8], zone: ToleranceZone, closed: bool) -> tuple[Stretch, ...]:
-    """Contiguous out-of-tolerance stretches in station order: broken by any point inside, joined across the seam."""
+def stretches(
+    station_mm: Array, deviation_mm: Array, verdicts: NDArray[np.int8], zone: ToleranceZone, nominal: NominalProfile
+) -> tuple[Stretch, ...]:
+    """Contiguous out-of-tolerance stretches in station order: broken by any point inside and any gap, joined across the seam."""
     order = np.argsort(station_mm, kind="stable")
     out = verdicts[order] == Verdict.NONCONFORM
     if not out.any():
         return ()
-    starts = np.flatnonzero(out & ~np.concatenate([[False], out[:-1]]))
-    ends = np.flatnonzero(out & ~np.concatenate([out[1:], [False]]))
+    closed = nominal.curve.closed
+    gaps, limit = _gaps(station_mm[order], nominal)
+    joined = (gaps if closed else gaps[1:]) <= limit  # each with the next; the last of a closed profile with the first
+    starts = np.flatnonzero(out & ~np.concatenate([[False], out[:-1] & joined[: len(out) - 1]]))
+    ends = np.flatnonzero(out & ~np.concatenate([out[1:] & joined[: len(out) - 1], [False]]))
     runs = [order[first : last + 1] for first, last in zip(starts, ends, strict=True)]
-    if closed and len(runs) > 1 and out[0] and out[-1]:
+    if closed and len(runs) > 1 and out[0] and out[-1] and joined[-1]:
         runs = [np.concatenate([runs[-1], runs[0]]), *runs[1:-1]]
     return tuple(_stretch(run, station_mm, deviation_mm, zone) for run in runs)
 

@@ -94,7 +94,8 @@ class PastRuns:
             recorded = recorded_run(store, find_run(store, run))
             bodies = [record.body for record in store.records(recorded.run, "deviations")]
         end = recorded.end or {"state": "interrupted", "message": "the run is being recorded", "received": 0}
-        facts = recorded.facts or summary(None, Counts(received=end["received"] or 0))
+        received = end["received"] or 0
+        facts = recorded.facts or summary(None, Counts(received=received, rejected=received, rejected_by_reason={"not judged": received}))
         return Recorded(
             recorded.run,
             plan := recorded_plan(recorded),

@@ -299,6 +299,8 @@ def _why(ended: Ended, verdict: Verdict, coverage_min: float) -> str:
     """One line under the verdict."""
     facts = ended.facts
     if facts["registration"] is None:
+        if ended.ending == "interrupted" and facts["received"]:
+            return "cut short; Replay judges what was received"
         return "no part found" if facts["received"] else "no point was received"
     if verdict is Verdict.NONCONFORM:
         places = f", {len(facts['stretches'])} places" if len(facts["stretches"]) > 1 else ""

@@ -77,6 +77,7 @@ class Means:
     devices : addresses of devices that can be seen now, with a description each
     records : None where nothing is recorded
     ct_plans, inspect_surface : plans of CT surfaces, and what inspects one; None where that is not possible
+    write   : writes the results of a run where its plan wants them
     """
 
     plans: Callable[[], Mapping[str, Path]]
@@ -87,6 +88,7 @@ class Means:
     now: Callable[[], datetime]
     ct_plans: Callable[[], Mapping[str, Path]] = dict
     inspect_surface: InspectSurface | None = None
+    write: Callable[[Plan, NominalProfile, RunOutcome, RunStarted], None] = lambda *_: None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -402,6 +404,10 @@ class Station:
             self.outcome = run_inspection(
                 connected.source, live, sinks, started, buffer_points=plan.buffer_points, clock=self._means.clock, stop=self._stop
             )
+        try:
+            self._means.write(plan, profile, self.outcome, started)
+        except PlanError as error:
+            self.alarms.raise_alarm("fault", "The results could not be written", str(error))
         self._next_part(self.outcome)
 
     def _shown_in(self, view: RunView) -> Sink:

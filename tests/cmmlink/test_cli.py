@@ -254,6 +254,16 @@ def test_run_carries_out_a_plan(nominal: Path, deviation_mm: float, code: int, v
     assert facts["max_deviation_mm"] == pytest.approx(deviation_mm, abs=1e-8)
 
 
+def test_points_off_the_plane_are_the_reason_that_is_given(nominal: Path) -> None:
+    plan = planned(nominal, 0.0, PLAN.replace("registration: {datum: {}}", "section: {off_plane_max_mm: 0.5}"))
+    points = np.column_stack([oval_points(0.0), np.full(360, 60.0)])
+    np.savetxt(nominal.parent / "points.csv", points, fmt="%.9f", delimiter=",", header="x_mm,y_mm,z_mm", comments="")
+    ended = cmmlink("run", plan, "--json")
+    assert ended.code == 2
+    assert "360 of 360 points lie farther than 0.5 mm from the plane of the section" in ended.err
+    assert ended.json()["rejected_by_reason"] == {"off section": 360}
+
+
 def test_run_without_a_terminal_prints_the_summary_alone(nominal: Path) -> None:
     ended = cmmlink("run", planned(nominal, 0.01))
     assert (ended.code, ended.err) == (0, "")

@@ -3,12 +3,16 @@
 from pathlib import Path
 
 import pytest
+import yaml
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from cmmlink.errors import PlanError
 from cmmlink.plan import FileDevice, ModbusDevice, Plan, SerialDevice, load_plan
+from cmmlink.recorder import Basis
+from cmmlink.yaml_model import read_model
+from drivers.register_map import load_map
 from inspection.tolerance import ToleranceZone
 
 SHORT = """\
@@ -249,3 +253,73 @@ def test_devices_behind_registers_and_distance_sensors(tmp_path: Path) -> None:
     assert (sensor.format, sensor.options, sensor.axis.feed_mm_s) == ("riftek", {"range_mm": 50, "rate_hz": 1000}, 10.0)
     with pytest.raises(PlanError, match="either feed_mm_s or follow"):
         load_plan(written(tmp_path, SHORT.replace("{type: serial, address: COM3}", fed.replace("feed_mm_s: 10", ""))))
+
+
+OWN_MAP = """\
+device: "mine: ü"
+pattern: latest
+status: {at: 0, fields: {state: {at: 0, type: uint16, finished: 0}}}
+points: {at: 4, fields: {x: {at: 0, type: int32, scale: 1e-5, offset: -0.0, invalid: 0x80000000}}}
+"""
+
+
+def with_device(folder: Path, device: str) -> Plan:
+    return load_plan(written(folder, SHORT.replace("{type: serial, address: COM3}", device)))
+
+
+@pytest.mark.parametrize("name", ["mymap", "mine.yaml", "maps/mymap", "generic-ring.yaml", "./generic-ring"])
+def test_any_name_but_a_shipped_one_is_a_map_beside_the_plan(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    device = with_device(tmp_path, f"{{type: modbus, address: 'h:502', map: {name}}}").device
+    assert isinstance(device, ModbusDevice)
+    assert device.own_map == tmp_path / name
+    assert device.map == str(tmp_path / name)
+
+
+def test_a_shipped_name_stays_one(tmp_path: Path) -> None:
+    (tmp_path / "generic-ring").mkdir()
+    device = with_device(tmp_path, "{type: modbus, address: 'h:502', map: generic-ring}").device
+    assert isinstance(device, ModbusDevice)
+    assert (device.map, device.own_map) == ("generic-ring", None)
+
+
+def test_an_unknown_map_lists_what_is_shipped(tmp_path: Path) -> None:
+    device = with_device(tmp_path, "{type: modbus, address: 'h:502', map: generic-rng}").device
+    assert isinstance(device, ModbusDevice)
+    with pytest.raises(ValueError, match=r"generic-rng: .*; give a YAML file or one of generic-fifo, generic-ring, gocator, riftek-rf60x"):
+        load_map(device.map)
+
+
+FOLLOWING = "{type: serial, address: COM3, format: riftek, axis: {follow: {type: modbus, address: 'h:502', map: mymap}}}"
+
+
+@pytest.mark.parametrize("device", ["{type: modbus, address: 'h:502', map: mymap}", FOLLOWING], ids=["device", "followed axis"])
+def test_a_map_of_ones_own_is_kept_as_it_was_understood(tmp_path: Path, device: str) -> None:
+    (tmp_path / "blade.dat").write_text("0 0", encoding="utf-8")
+    (tmp_path / "mymap").write_text(OWN_MAP, encoding="utf-8")
+    plan = with_device(tmp_path, device)
+    kept = read_model(Basis.of(plan).plan, Plan).device
+    if isinstance(kept, SerialDevice):
+        assert kept.axis is not None
+        kept = kept.axis.follow  # type: ignore[assignment]
+    assert isinstance(kept, ModbusDevice)
+    assert isinstance(kept.map, dict)
+    assert load_map(kept.map) == load_map(tmp_path / "mymap")
+    assert str(load_map(kept.map).points.fields["x"].offset) == "-0.0"
+
+
+@pytest.mark.parametrize("name", ["generic-fifo", "generic-ring", "gocator", "riftek-rf60x"])
+def test_every_shipped_map_taken_over_as_ones_own_is_kept_exactly(tmp_path: Path, name: str) -> None:
+    (tmp_path / "blade.dat").write_text("0 0", encoding="utf-8")
+    (tmp_path / "mymap").write_text(yaml.safe_dump(load_map(name).model_dump(mode="json")), encoding="utf-8")
+    kept = read_model(Basis.of(with_device(tmp_path, "{type: modbus, address: 'h:502', map: mymap}")).plan, Plan).device
+    assert isinstance(kept, ModbusDevice)
+    assert load_map(kept.map) == load_map(name)
+
+
+def test_a_map_that_cannot_be_kept_is_a_mistake_in_the_plan(tmp_path: Path) -> None:
+    (tmp_path / "blade.dat").write_text("0 0", encoding="utf-8")
+    (tmp_path / "mymap").write_text(OWN_MAP.replace("finished: 0", "finished: true"), encoding="utf-8")
+    with pytest.raises(PlanError, match=r"device: .*mymap, line 3: status\.fields\.state\.finished: .*true or false"):
+        Basis.of(with_device(tmp_path, "{type: modbus, address: 'h:502', map: mymap}"))

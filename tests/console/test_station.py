@@ -1,5 +1,6 @@
 """The station without a page: what it does with commands, runs and records."""
 
+import dataclasses
 import json
 import zipfile
 from datetime import datetime
@@ -12,10 +13,13 @@ import pytest
 from cmmlink.console.past_runs import PastRuns
 from cmmlink.console.run_view import RunView
 from cmmlink.console.station import Refused, Station, checked, next_serial_number
-from cmmlink.events import Event
+from cmmlink.errors import PlanError
+from cmmlink.events import Event, RunStarted
 from cmmlink.parts import planned_profile
-from cmmlink.plan import load_plan
+from cmmlink.pipeline import RunOutcome
+from cmmlink.plan import Plan, load_plan
 from drivers.errors import LinkError
+from inspection import NominalProfile
 
 from .played import CLOSED, PLAN, Device, batches, means, measured, opened, write_plan
 
@@ -61,6 +65,24 @@ def test_runs_are_recorded_listed_and_opened_as_they_were(bench: Bench) -> None:
     seen, recorded = live.points_since(0, -1)[0], bench.station.opened(second.run).points_since(0, -1)[0]
     np.testing.assert_array_equal(seen.bins, recorded.bins)
     np.testing.assert_array_equal(seen.extremes, recorded.extremes)
+
+
+def test_the_results_of_every_run_are_written_and_a_full_disk_is_an_alarm(bench: Bench, tmp_path: Path) -> None:
+    written: list[str] = []
+
+    def write(plan: Plan, profile: NominalProfile, outcome: RunOutcome, started: RunStarted) -> None:
+        assert outcome.result is not None
+        written.append(started.serial_number)
+        if len(written) == 2:
+            raise PlanError("results: no space left on device")
+
+    known = means({"blade.yaml": tmp_path / "blade.yaml"}, bench.device.connect, bench.past)
+    bench.station = Station(dataclasses.replace(known, write=write))
+    bench.run()
+    bench.run()
+    assert written == ["B-0041", "B-0042"]
+    assert any("no space left" in str(alarm) for alarm in bench.station.alarms.newest_first()), "told, and the run is kept all the same"
+    assert bench.station.history[0].state == "complete"
 
 
 def test_replay_of_a_recorded_run_is_identical_and_says_so(bench: Bench) -> None:

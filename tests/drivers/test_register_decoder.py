@@ -405,3 +405,94 @@ def test_a_fifo_hands_over_whole_points() -> None:
     assert book.sequence == [0, 1, 2, 3, 5]
     assert book.lost == 1 + 3
     assert book.others == [ScanOpened("generic fifo", "", None), ScanClosed(9)]
+
+
+def without_sent() -> RegisterMap:
+    """The generic ring of a device that does not tell how many points it sent."""
+    document = RING.model_dump()
+    del document["status"]["fields"]["sent"]
+    return RegisterMap.model_validate(document)
+
+
+@pytest.mark.parametrize("bad", [{3}, {2, 3}, {0}, {1}, {0, 3}, {0, 1, 2}])
+def test_what_a_ring_wrote_and_never_came_soundly_is_lost_at_the_end(bad: set[int]) -> None:
+    ring, decoder = Ring(), RegisterDecoder(without_sent())
+    ring.write(4)
+    for place in bad:
+        ring.registers[100 + 11 * place + 5] ^= 1
+    arrivals = turns(decoder, ring)
+    ring.status(state=2)
+    book = account(arrivals + turns(decoder, ring))
+    assert book.sequence == sorted({0, 1, 2, 3} - bad)
+    assert book.lost == len(bad)
+    assert book.others == [ScanOpened("generic ring", "", 1000), ScanClosed(None)]
+
+
+def test_a_ring_of_which_nothing_came_soundly_is_lost_as_a_whole() -> None:
+    ring, decoder = Ring(), RegisterDecoder(without_sent())
+    arrivals = turns(decoder, ring)
+    ring.write(2)
+    for place in range(2):
+        ring.registers[100 + 11 * place + 5] ^= 1
+    ring.status(state=2)
+    book = account(arrivals + turns(decoder, ring))
+    assert (book.sequence, book.lost) == ([], 2)
+
+
+def test_the_end_of_a_ring_counts_what_the_device_dropped_and_what_was_overrun_once() -> None:
+    ring, decoder = Ring(), RegisterDecoder(without_sent())
+    ring.write(510)  # ten are overrun before the first reading
+    arrivals = turns(decoder, ring)
+    ring.write(5, skip=3)
+    ring.registers[100 + 11 * 14 + 5] ^= 1
+    ring.status(state=2)
+    book = account(arrivals + turns(decoder, ring))
+    assert book.sequence == [*range(10, 510), *range(513, 517)]
+    assert book.lost == 10 + 3 + 1
+
+
+def test_old_points_read_once_more_at_the_end_do_not_stand_for_the_last_ones() -> None:
+    ring, decoder = Ring(), RegisterDecoder(without_sent())
+    ring.write(4)
+    arrivals = turns(decoder, ring)
+    old = ring.answer(bytes.fromhex("03 0064 000B"))[5:]
+    ring.write(1)
+    ring.status(state=2)
+    arrivals += decoder.feed(ring.answer(decoder.request()))
+    arrivals += decoder.feed(decoder.request() + old)
+    book = account(arrivals + turns(decoder, ring))
+    assert (book.sequence, book.counts["Rejected", "point repeated"], book.lost) == ([0, 1, 2, 3], 1, 1)
+
+
+def overflows(arrivals: list[Arrival]) -> int:
+    return sum(isinstance(arrival, Lost) and "overflowed" in arrival.reason for arrival in arrivals)
+
+
+def test_an_overflow_told_with_the_latest_point_is_heard_even_when_the_point_is_not_new() -> None:
+    document = LATEST.model_dump()
+    document["points"]["fields"]["overflow"] = {"at": 2, "type": "uint16"}
+    table, decoder = Table(), RegisterDecoder(RegisterMap.model_validate(document))
+    heard = []
+    for sequence, overflow in ((5, 0), (5, 1), (6, 1), (7, 0), (8, 2)):
+        table.registers[10:13] = sequence, 0, overflow
+        heard.append(overflows(decoder.feed(table.answer(decoder.request()))))
+    assert heard == [0, 1, 0, 0, 1]
+
+
+def test_an_overflow_told_with_the_points_of_a_ring_is_heard_once_each_time_and_only_where_it_is_sound() -> None:
+    document = RING.model_dump()
+    document["points"]["fields"]["overflow"] = document["points"]["fields"].pop("flags")
+    document["points"]["fields"]["overflow"]["invalid_bits"] = 0
+    ring, decoder = Ring(), RegisterDecoder(RegisterMap.model_validate(document))
+    ring.write(9)
+    for place in (1, 2, 5, 7):
+        ring.registers[100 + 11 * place + 9] = 1
+        if place != 7:
+            ring.seal(100 + 11 * place)
+    arrivals = turns(decoder, ring)
+    assert overflows(arrivals) == 2  # points 1 and 2 tell of one, and of point 7 the checksum is wrong
+    ring.status(state=1, overflow=1)
+    arrivals = turns(decoder, ring)
+    ring.write(1)
+    ring.status(state=1, overflow=1)
+    assert overflows(arrivals + turns(decoder, ring)) == 1  # the points' own register does not take back what the status says

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import yaml
 
-from drivers.register_map import MAPS, Block, RegisterField, columns, load_map
+from drivers.register_map import MAPS, Block, RegisterField, columns, load_map, shipped_maps
 
 README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
 MINE = "device: my controller\n" + README.partition("\ndevice: my controller\n")[2].partition("```")[0]
@@ -45,6 +45,19 @@ def test_a_map_of_a_user(tmp_path: Path) -> None:
         ("pattern: latest", "pattern: ring", r"a ring needs the field written in status"),
         ("pattern: latest", "pattern: queue", r"needs a block pop"),
         ("device: my", "device: [my", r"no YAML"),
+        ("at: 40", "at: true", r"line 4: points\.at: .*true or false where a number belongs; found True"),
+        ("y: {at: 3, ", "y: {at: 3, invalid: yes, ", r"points\.fields\.y\.invalid: .*true or false"),
+        ("y: {at: 3, ", "y: {at: 3, scale: on, ", r"points\.fields\.y\.scale: .*true or false"),
+        ("y: {at: 3, ", "y: {at: 3, scale: 0, ", r"points\.fields\.y\.scale: .*a scale of 0.*; found 0"),
+        ("y: {at: 3, ", "y: {at: 3, scale: -0.0, ", r"a scale of 0"),
+        ("y: {at: 3, ", "y: {at: 3, scale: 1.0e-320, ", r"a scale of 0, or too close to it"),
+        ("y: {at: 3, ", "y: {at: 3, scale: .inf, ", r"scale: .*finite number; found inf"),
+        ("y: {at: 3, ", "y: {at: 3, scale: .nan, ", r"scale: .*finite number; found nan"),
+        ("y: {at: 3, ", "y: {at: 3, offset: -.inf, ", r"offset: .*finite number; found -inf"),
+        ("at: 40", "at: " + "[" * 3000, r"mine\.yaml, line 4: nested more than 20 deep"),
+        ("at: 40", "at: " + "{a: " * 3000, r"mine\.yaml, line 4: nested more than 20 deep"),
+        ("at: 40", "at: 2001-99-99", r"mine\.yaml: no YAML: month"),
+        ("at: 40", "at: !!timestamp x", r"mine\.yaml, line 4: the tag .*timestamp is not supported"),
     ],
 )
 def test_mistakes_are_named_with_file_line_and_key(tmp_path: Path, old: str, new: str, complaint: str) -> None:
@@ -62,6 +75,45 @@ def test_a_map_without_coordinates_is_refused(tmp_path: Path) -> None:
 def test_an_unknown_name_lists_what_is_shipped() -> None:
     with pytest.raises(ValueError, match="give a YAML file or one of generic-fifo, generic-ring, gocator, riftek-rf60x"):
         load_map("no-such-map")
+
+
+@pytest.mark.parametrize("name", ["generic-fifo", "generic-ring", "gocator", "riftek-rf60x"])
+def test_what_a_map_says_reads_back_as_the_same_map(name: str) -> None:
+    shipped = load_map(name)
+    kept = yaml.safe_load(yaml.safe_dump(shipped.model_dump(mode="json")))
+    assert load_map(kept) == shipped
+    assert load_map(kept).model_dump() == shipped.model_dump()
+
+
+def test_a_shipped_name_is_the_shipped_map_whatever_lies_in_the_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "generic-ring").mkdir()
+    (tmp_path / "gocator").write_text(MINE, encoding="utf-8")
+    assert load_map("generic-ring").device == "generic ring"
+    assert load_map("gocator").device == "LMI Gocator"
+    assert load_map(Path("gocator")).device == "my controller"
+    assert shipped_maps().keys() == {"generic-fifo", "generic-ring", "gocator", "riftek-rf60x"}
+
+
+def test_a_map_needs_no_suffix(tmp_path: Path) -> None:
+    path = tmp_path / "mymap"
+    path.write_text(MINE, encoding="utf-8")
+    assert load_map(str(path)) == load_map(path) == load_map(written(tmp_path, MINE))
+
+
+@pytest.mark.parametrize("encoding", ["latin-1", "utf-16-le", "utf-16-be"])
+def test_another_encoding_is_named_with_the_way_out(tmp_path: Path, encoding: str) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_bytes(MINE.replace("my controller", "mein Gerät").encode(encoding))
+    with pytest.raises(ValueError, match=r"mine\.yaml: .*save the map as UTF-8"):
+        load_map(path)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_a_mark_tells_the_encoding(tmp_path: Path, encoding: str) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_bytes(MINE.replace("my controller", "mein Gerät").encode(encoding))
+    assert load_map(path).device == "mein Gerät"
 
 
 @pytest.mark.parametrize(("order", "words"), [("high-first", 1), ("low-first", -1)])

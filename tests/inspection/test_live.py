@@ -21,6 +21,7 @@ from inspection import (
     discretize,
     fit_minimum_zone,
     register,
+    register_fine,
 )
 from tests.inspection import profiles
 from tests.inspection.oracle import closest_point
@@ -251,6 +252,23 @@ def test_a_tenth_of_gross_outliers_is_found_and_moves_nothing() -> None:
         assert unspoiled.verdict is Verdict.CONFORM, name
 
 
+def test_a_scan_that_is_mostly_unusable_is_not_fitted_anew_at_every_block(monkeypatch: pytest.MonkeyPatch) -> None:
+    fits = []
+
+    def counted(*arguments: Any, **options: Any) -> Any:
+        fits.append(1)
+        return register_fine(*arguments, **options)
+
+    monkeypatch.setattr("inspection.live.register_fine", counted)
+    points, _ = surface("P3", 20_000, 2)
+    points[np.random.default_rng(5).random(20_000) < 0.55] = np.nan
+    live = LiveInspection(nominal_of("P3"), ToleranceZone(-0.1, 0.1))
+    for k in range(0, len(points), 512):
+        live.add(points[k : k + 512])
+    assert live.state == "provisional"
+    assert len(fits) <= 10
+
+
 def test_points_within_the_zone_are_no_outliers_however_exact_the_others_are() -> None:
     curve = curve_of("P3")
     u = profiles.even_in_arc_length(curve, 2000)
@@ -261,6 +279,16 @@ def test_points_within_the_zone_are_no_outliers_however_exact_the_others_are() -
         _, result = inspected(nominal_of("P3"), profiles.offset_points(curve, u, form), 250, reject_outliers=True)
         assert np.flatnonzero(result.rejection).tolist() == [700, 1500]
         assert result.verdict is Verdict.UNCERTAIN
+
+
+def test_a_stretch_ends_where_nothing_was_measured() -> None:
+    curve = curve_of("P3")
+    u = profiles.even_in_arc_length(curve, 2000)
+    s = curve.station_mm(u)
+    form = np.where((s > 58) & (s < 72), 0.2, 0.0)
+    points = profiles.offset_points(curve, u, -form)[(s < 60) | (s > 70)]
+    _, result = inspected(nominal_of("P3"), points, 250, fit="none")
+    assert [(round(stretch.from_mm), round(stretch.to_mm)) for stretch in result.stretches] == [(58, 60), (70, 72)]
 
 
 def test_a_local_defect_is_one_stretch_where_it_lies() -> None:

@@ -398,6 +398,23 @@ def test_points_that_cannot_be_registered_are_refused(registered: object, points
         registered(points, nominal_of("P1"))  # type: ignore[operator]
 
 
+def test_points_all_beyond_an_open_end_settle_nothing() -> None:
+    line = discretize(profiles.clamped(1, np.array([[0.0, 0.0], [100.0, 0.0]])), samples=200)
+    points = np.column_stack([np.linspace(101, 120, 40), np.zeros(40)])
+    for robust in (False, True):
+        found = register_fine(points, line, RigidTransform.identity(), robust=robust)
+        assert not found.converged
+        assert found.rms_mm == np.inf
+
+
+@pytest.mark.parametrize("name", ["P3", "square"])
+def test_a_part_without_any_error_has_no_outliers(name: str) -> None:
+    points = profiles.rotated(measured(name, 400, 0, noise_mm=0.0), 20.0)
+    found = register(points, nominal_of(name), robust=True, gross_mm=1e-6)
+    assert not found.outliers.any()
+    assert found.rms_mm < 1e-10
+
+
 def test_points_that_are_not_numbers_are_refused() -> None:
     points = measured("P1", 50, 17)
     points[7, 1] = np.nan

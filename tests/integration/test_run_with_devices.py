@@ -1,5 +1,6 @@
 """`cmmlink run` with simulated devices from plan to exit code: every point is accounted for."""
 
+import dataclasses
 import json
 import subprocess
 import sys
@@ -9,7 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
+from cmmlink.cli import decoder_of
+from cmmlink.errors import StoreError
+from cmmlink.records import reading, recorded_run
+from cmmlink.replay import replay
+from tests.cmmlink.recorded import Script, record, scan_arrivals, today
 from tests.integration.simulated import Simulated, simulated
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -94,6 +101,31 @@ def test_a_replay_reads_registers_as_the_map_of_that_day_told(tmp_path: Path) ->
         again = command("replay", facts["run"], "--records", str(tmp_path), "--json")
         assert again.returncode == 0, again.stderr
         assert json.loads(again.stdout)["identical"] is True
+
+
+def test_a_map_without_a_suffix_lies_beside_the_plan_and_is_replayed_without_it(tmp_path: Path) -> None:
+    own = tmp_path / "mymap"
+    own.write_text((ROOT / "drivers" / "maps" / "generic-ring.yaml").read_text(encoding="utf-8"), encoding="utf-8")
+    with scanned_oval(tmp_path, "--unpaced") as device:
+        code, facts, errors = run(tmp_path, f"{{type: modbus, map: mymap, address: '{device.address}'}}", "--records", str(tmp_path))
+    assert (code, facts["received"]) == (0, COUNT), errors
+    own.unlink()
+    again = command("replay", facts["run"], "--records", str(tmp_path), "--json")
+    assert again.returncode == 0, again.stderr
+    assert json.loads(again.stdout)["identical"] is True
+
+
+def test_a_map_in_a_record_that_cannot_be_read_is_named_with_its_run(tmp_path: Path) -> None:
+    """Records of earlier versions hold the map as its file spelt it, and a plan may name a file that is gone."""
+    _, recorder = record(tmp_path, Script(*scan_arrivals()))
+    with reading(tmp_path, today) as store:
+        recorded = recorded_run(store, recorder.run)
+        tree = yaml.safe_load(recorded.plan)
+        points = {"at": 0, "fields": {"x": {"at": 0, "type": "int16", "scale": "true"}}}
+        for register_map in ({"device": "d", "pattern": "latest", "points": points}, str(tmp_path / "gone")):
+            tree["device"] = {"type": "modbus", "address": "h:502", "map": register_map}
+            with pytest.raises(StoreError, match=f"the device in the plan of run {recorder.run} cannot be read"):
+                replay(store, dataclasses.replace(recorded, plan=yaml.safe_dump(tree)), decoder_of)
 
 
 def test_a_map_with_a_mistake_is_named_with_its_file(tmp_path: Path) -> None:

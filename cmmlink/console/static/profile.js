@@ -191,7 +191,7 @@ export class Profile {
       pen.lineWidth = 2; // no gaps between neighbours: the deviations read as one shape
       pen.stroke(paths[kind]);
     }
-    for (const [kind, x, y, size, dx, dy] of flags.values()) this.flag(pen, kind, x, y, size, dx, dy);
+    for (const [kind, x, y, size] of flags.values()) mark(pen, kind, x, y, size);
     if (this.worst) this.drawWorst(pen, m);
   }
 
@@ -207,17 +207,7 @@ export class Profile {
     path.lineTo(tx, ty);
     if (verdict < 1) return;
     const place = `${Math.round(tx / MARK_EVERY_PX)} ${Math.round(ty / MARK_EVERY_PX)}`;
-    if (!flags.has(place)) flags.set(place, [kind, tx, ty, 4.5, side[NX][bin], -side[NY][bin]]);
-  }
-
-  // A triangle that points out of the material where there is too much of it, into it where there is too little.
-  flag(pen, kind, x, y, size, dx, dy) {
-    if (kind === "unsure") return mark(pen, kind, x, y, size);
-    pen.save();
-    pen.translate(x, y);
-    pen.rotate(Math.atan2(dx, -dy));
-    mark(pen, kind, 0, 0, size);
-    pen.restore();
+    if (!flags.has(place)) flags.set(place, [kind, tx, ty, 4.5]);
   }
 
   tip(point) {
