@@ -143,7 +143,7 @@ def test_an_answer_that_cannot_be_written_is_not_taken_for_nonconform_and_loses_
 
 def test_a_name_that_the_terminal_has_no_letters_for_costs_no_verdict(nominal: Path, tmp_path: Path) -> None:
     latin = os.environ | {"PYTHONUTF8": "0", "PYTHONIOENCODING": "cp1252:strict"}
-    ended = subprocess.run(inspection(nominal, tmp_path / "a", "叶片.csv"), cwd=ROOT, env=latin, capture_output=True, check=False)
+    ended = subprocess.run(inspection(nominal, tmp_path / "a", "\u53f6\u7247.csv"), cwd=ROOT, env=latin, capture_output=True, check=False)
     assert ended.returncode == 0
     assert ended.stdout.startswith(b"CONFORM   ??, file ??.csv")
 

@@ -24,6 +24,7 @@ export const count = (value) => COUNT.format(value);
 export function showRun(run, ready) {
   put("part", run?.part || ready.part || "No part");
   put("serial-number", run ? run.serial_number : ready.serial_number);
+  byId("serial-number").title = byId("serial-number").textContent;  // a long one is cut
   put("plan-operator", [run ? run.plan : ready.plan, run ? run.operator : ready.operator].filter(Boolean).join("  \u00b7  "));
   showVerdict(run, ready);
   showWorst(run);

@@ -235,7 +235,7 @@ export class Profile {
     pen.arc(x, y, 9, 0, 7);
     pen.stroke();
     const ink = worst.verdict === "nonconform" ? INK[classOf(worst.deviation_mm, 2, zone)] : INK.limit;
-    label(pen, this.sheet, `${signed(worst.deviation_mm, digitsFor(zone))} mm at ${worst.station_mm.toFixed(2)}`, x, y, ink, true);
+    label(pen, this.sheet, `${signed(worst.deviation_mm, digitsFor(zone))} mm at ${worst.station_mm.toFixed(2)} mm`, x, y, ink, true);
   }
 
   drawCursor(cursor) {
