@@ -47,7 +47,7 @@ A plan needs four keys; everything else has the default shown. Relative paths ar
     discretisation: {samples: 10000, pole_angle_min_deg: 178.0, step_min: 1e-4}
     buffer_points: 500000
     out: null                       # folder for the results; null: none written
-    records: null                   # folder of the run records; null: the user's
+    records: null                   # folder of the run records; null: the user's. A console keeps all runs in its own
 
 A further device is a further model with its own `type`, added to the union `Device`.
 """
