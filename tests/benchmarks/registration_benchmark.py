@@ -27,6 +27,7 @@ from inspection import (
     register,
     register_coarse,
     register_fine,
+    rehearse,
 )
 from inspection.kernels import compile_kernels
 from inspection.synthetic import even_stations
@@ -278,6 +279,7 @@ def streaming(every: Profiles, points: int) -> Iterator[str]:
     for name in ("P3", "NACA 2412 sharp"):
         nominal = every[name]
         assert not isinstance(nominal, Missing)
+        rehearse(nominal)
         rng = np.random.default_rng(3)
         part = cross_section(nominal, even_stations(nominal, points), random_pose(rng), rng)
         for kind, datum in (("sought while scanning", None), ("datum", part.nominal_from_section)):
