@@ -396,7 +396,11 @@ def _run_on_page(plan_file: Path, profile: NominalProfile, connect: Connect, tel
             raise station.failure
         assert station.outcome is not None
         assert station.started is not None
-        code = _tell(station.outcome, profile, telling, station.started, past.evidence)
+        code = _tell(station.outcome, profile, replace(telling, out=None), station.started, past.evidence)
+        if station.unwritten is not None:
+            raise station.unwritten
+        if telling.out is not None:
+            typer.echo(f"results in {telling.out}")
         if server.pages and not stop.is_set():
             sys.stderr.write("the page stays for the next part until it is closed, or Ctrl-C\n")
             stay_while_seen(server, stop)

@@ -126,6 +126,7 @@ class Station:
         self.outcome: RunOutcome | None = None
         self.started: RunStarted | None = None
         self.failure: Exception | None = None
+        self.unwritten: PlanError | None = None  # why the results of a run are not where its plan wants them
         self._work = _Work()
         self._lock = threading.RLock()
         self._stop = threading.Event()
@@ -364,7 +365,7 @@ class Station:
 
     def _begin(self, work: Callable[[], None], view: RunView) -> None:
         self._stop = threading.Event()
-        self._source, self.outcome, self.failure, self.view = None, None, None, view
+        self._source, self.outcome, self.failure, self.unwritten, self.view = None, None, None, None, view
         self._thread = threading.Thread(target=self._carried_out, args=(work, view), name="run", daemon=True)
         self._thread.start()
 
@@ -407,6 +408,7 @@ class Station:
         try:
             self._means.write(plan, profile, self.outcome, started)
         except PlanError as error:
+            self.unwritten = error
             self.alarms.raise_alarm("fault", "The results could not be written", str(error))
         self._next_part(self.outcome)
 

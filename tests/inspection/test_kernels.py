@@ -238,11 +238,9 @@ def test_veaw_is_finite_where_its_two_directions_cancel() -> None:
 
 def test_equally_close_feet_are_chosen_alike_in_any_order() -> None:
     # near the medial axis of a thin edge one foot is worked out on two pieces, with other last bits
-    curve, rng = curve_of("NACA 2412 sharp"), np.random.default_rng(21)
-    grid, base = grid_of("NACA 2412 sharp"), curve.point(np.linspace(*curve.domain, 400))
-    size = np.hypot(*np.ptp(base, axis=0))
-    for _ in range(8):
-        points = base[rng.integers(0, 400, 50_000)] + rng.normal(0, 1, (50_000, 2)) * 10.0 ** rng.uniform(-6, 0, (50_000, 1)) * size
+    rng, grid = np.random.default_rng(1), grid_of("NACA 2412 sharp")
+    for _ in range(8):  # of these 400,000 points some twenty depended on their order before ties were settled
+        points = np.column_stack([rng.uniform(97.0, 100.0, 50_000), rng.normal(0, 2.0, 50_000)])
         order = rng.permutation(len(points))
         here, there = project(points, grid, threads=1), project(points[order], grid, threads=1)
         for field in FIELDS:
