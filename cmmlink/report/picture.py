@@ -72,7 +72,8 @@ def _draw_strip(axes: Axes, result: InspectionResult, nominal: NominalProfile) -
     index = result.worst
     if index is not None:
         text = f"worst {result.deviation_mm[index]:+.4f} mm at station {result.station_mm[index]:.2f} mm"
-        axes.annotate(text, (result.station_mm[index], result.deviation_mm[index]), (0, 8), textcoords="offset points", ha="center")
+        place, outside = (result.station_mm[index], result.deviation_mm[index]), 8 if result.deviation_mm[index] >= 0 else -16
+        axes.annotate(text, place, (0, outside), textcoords="offset points", ha="center")  # not on the points beside it
     axes.margins(y=0.2)
     axes.set(xlim=(0, nominal.length_mm), xlabel="station (mm)", ylabel="deviation (mm)")
     facts = f"coverage {result.coverage:.1%}   fit {result.fit}   method {result.method}   out of tolerance {result.out_of_tolerance}"
