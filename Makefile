@@ -33,7 +33,7 @@ paper: .venv/bench-installed
 
 .venv/installed: pyproject.toml | .venv/bin/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
-	@$(BIN)/python -m cmmlink.open3d_doctor
+	@$(BIN)/python -m cmmlink.commands.open3d_doctor
 	touch $@
 
 .venv/bench-installed: pyproject.toml | .venv/bin/python
@@ -42,5 +42,5 @@ paper: .venv/bench-installed
 
 .venv/test-installed: pyproject.toml | .venv/bin/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
-	@$(BIN)/python -m cmmlink.open3d_doctor
+	@$(BIN)/python -m cmmlink.commands.open3d_doctor
 	touch $@ .venv/installed

@@ -1,5 +1,5 @@
 """`python -m cmmlink` is the command `cmmlink`."""
 
-from cmmlink.cli import main
+from cmmlink.commands import main
 
 main()

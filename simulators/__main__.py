@@ -2,7 +2,7 @@
 
 import sys
 
-from .settings import devices, say, settings_from
+from simulators.settings import devices, say, settings_from
 
 
 def main(arguments: list[str]) -> None:

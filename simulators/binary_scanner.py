@@ -5,8 +5,8 @@ import sys
 from binascii import crc32, crc_hqx
 from collections.abc import Sequence
 
-from .serial_scanner import Device, Sample, stream
-from .settings import Announce, SimulatorSettings, say, settings_from
+from simulators.serial_scanner import Device, Sample, stream
+from simulators.settings import Announce, SimulatorSettings, say, settings_from
 
 SERIAL_NUMBER = 4711
 

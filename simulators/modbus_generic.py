@@ -9,10 +9,10 @@ from binascii import crc_hqx
 
 import numpy as np
 
-from .faults import Injector
-from .modbus_scanner import READ_FIFO, RegisterDevice, Words, serve_registers
-from .motion import Walk
-from .settings import Announce, SimulatorSettings
+from simulators.faults import Injector
+from simulators.modbus_scanner import READ_FIFO, RegisterDevice, Words, serve_registers
+from simulators.motion import Walk
+from simulators.settings import Announce, SimulatorSettings
 
 RING_AT, ENTRIES = 100, 500
 FIFO_AT, FIFO_DEPTH, FIFO_MOST = 100, 300, 31

@@ -24,10 +24,10 @@ from pymodbus.server import ModbusSerialServer, ModbusTcpServer
 from pymodbus.server.base import ModbusBaseServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
-from .faults import Injector
-from .line import PtyLine
-from .motion import Walk, walk
-from .settings import Announce, SimulatorSettings
+from simulators.faults import Injector
+from simulators.line import PtyLine
+from simulators.motion import Walk, walk
+from simulators.settings import Announce, SimulatorSettings
 
 if sys.platform != "win32":
     import tty

@@ -7,9 +7,9 @@ words, and adds the values asked for with OUTADD_RS422 to every distance.
 import sys
 from collections.abc import Sequence
 
-from .motion import fed
-from .serial_scanner import Device, Sample, stream
-from .settings import Announce, SimulatorSettings, say, settings_from
+from simulators.motion import fed
+from simulators.serial_scanner import Device, Sample, stream
+from simulators.settings import Announce, SimulatorSettings, say, settings_from
 
 RANGE_MM = 50.0
 FIRST_COUNT = 262_000  # so that the 18-bit counter soon wraps

@@ -5,10 +5,10 @@
 
 import numpy as np
 
-from .faults import Injector
-from .modbus_scanner import RegisterDevice, Words, serve_registers
-from .motion import Walk, fed
-from .settings import Announce, SimulatorSettings
+from simulators.faults import Injector
+from simulators.modbus_scanner import RegisterDevice, Words, serve_registers
+from simulators.motion import Walk, fed
+from simulators.settings import Announce, SimulatorSettings
 
 RANGE_MM = 50
 IDENTITY = (603, 90, 17185, 80, RANGE_MM)

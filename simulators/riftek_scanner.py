@@ -7,9 +7,9 @@ request 8; request 1 identifies, request 6 gives one result. The ASCII sensor an
 import sys
 from collections.abc import Sequence
 
-from .motion import fed
-from .serial_scanner import Device, Sample, stream
-from .settings import Announce, SimulatorSettings, say, settings_from
+from simulators.motion import fed
+from simulators.serial_scanner import Device, Sample, stream
+from simulators.settings import Announce, SimulatorSettings, say, settings_from
 
 RANGE_MM = 50.0
 IDENTITY = bytes([63, 0x90, 0x21, 0x43, 80, 0, 50, 0])  # device type, firmware, serial number, base distance, range

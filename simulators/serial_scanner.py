@@ -16,10 +16,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .faults import CATALOGUE, Injector
-from .line import Line, open_line
-from .motion import Walk, walk
-from .settings import Announce, SimulatorSettings, say, settings_from
+from simulators.faults import CATALOGUE, Injector
+from simulators.line import Line, open_line
+from simulators.motion import Walk, walk
+from simulators.settings import Announce, SimulatorSettings, say, settings_from
 
 HEARTBEAT_S = 0.5
 IMPATIENCE_S = 2.0  # a client that says nothing for so long gets the scan all the same

@@ -13,8 +13,8 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from .faults import CATALOGUE, Fault
-from .motion import Motion, read_path
+from simulators.faults import CATALOGUE, Fault
+from simulators.motion import Motion, read_path
 
 
 @dataclass(frozen=True, slots=True)

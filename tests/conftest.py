@@ -14,7 +14,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--points", type=int, default=100, help="points to read (default 100)")
     group.addoption("--baud-rate", type=int, default=115_200)
     group.addoption("--parity", default="N", choices=["N", "E", "O"])
-    group = parser.getgroup("browser", "tests/console in Chromium")
+    group = parser.getgroup("browser", "tests/cmmlink/console in Chromium")
     group.addoption("--require-browser", action="store_true", help="fail where the tests in a browser would be skipped")
     group.addoption("--screenshots", metavar="DIR", help="keep pictures of the console's pages in this folder")
 

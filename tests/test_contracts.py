@@ -14,7 +14,7 @@ import pytest
 
 import cmmlink
 import inspection
-from cmmlink.plan import load_plan
+from cmmlink.plan.scan import load_plan
 from tests.cmmlink.command import cmmlink as cmmlink_command
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -38,7 +38,7 @@ PROMISED_NAMES = [
     "fit_minimum_zone",
 ]
 GRAB_BAGS = {"utils", "util", "helpers", "helper", "common", "base", "manager", "types", "misc", "core"}
-LIBRARIES_IN_ONE_FILE = {"serial": {"drivers/serial_scanner.py"}, "numba": {"inspection/kernels.py"}}
+LIBRARIES_IN_ONE_FILE = {"serial": {"drivers/links/serial_scanner.py"}, "numba": {"inspection/kernels.py"}}
 
 
 def tracked() -> list[Path]:
@@ -74,7 +74,7 @@ def test_the_three_libraries_import_none_of_ours() -> None:
 
 def test_only_the_command_line_knows_simulators() -> None:
     assert [relative(path) for path in SOURCES if path.parts[-2] != "simulators" and "simulators" in imported_by(path)] == [
-        "cmmlink/cli.py"
+        "cmmlink/commands/__init__.py"
     ]
 
 
@@ -101,7 +101,8 @@ def test_names_of_test_files_are_unique() -> None:
 
 def test_the_top_level_holds_what_the_layout_says_and_nothing_else() -> None:
     top = {path.parts[0] for path in tracked() if not path.parts[0].startswith(".")}
-    assert top <= {"pyproject.toml", "README.md", "Makefile", "LICENSE", *PACKAGES, "tests"}
+    documents = {"README.md", "CONTRIBUTING.md", "CHANGELOG.md", "LICENSE"}
+    assert top <= {"pyproject.toml", "constraints.txt", "Makefile", *documents, *PACKAGES, "tests", "docs"}
     assert top >= {"pyproject.toml", "Makefile", "LICENSE", *PACKAGES, "tests"}
 
 
@@ -124,7 +125,7 @@ def test_the_version_stands_in_one_place() -> None:
     assert project["dynamic"] == ["version"]
     assert settings["tool"]["hatch"]["version"]["path"] == "cmmlink/__init__.py"
     assert re.fullmatch(r"\d+\.\d+\.\d+", cmmlink.__version__)
-    assert project["scripts"] == {"cmmlink": "cmmlink.cli:main"}
+    assert project["scripts"] == {"cmmlink": "cmmlink.commands:main"}
 
 
 def test_every_library_that_is_imported_is_declared() -> None:

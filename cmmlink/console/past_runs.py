@@ -10,17 +10,17 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from cmmlink.chunks import unpack_document, unpack_judged
 from cmmlink.console.run_view import Ended
 from cmmlink.errors import StoreError
 from cmmlink.events import Counts, RunStarted, Sink
-from cmmlink.export import export_run
-from cmmlink.plan import Device, Plan
-from cmmlink.recorder import Basis, Evidence, Recorder
-from cmmlink.records import find_run, list_runs, reading, recorded_run, recording
-from cmmlink.replay import Replay, recorded_plan, recorded_profile, replay
-from cmmlink.report.summary import summary
-from cmmlink.store import Store
+from cmmlink.plan.scan import Device, Plan
+from cmmlink.record.bodies import unpack_document, unpack_judged
+from cmmlink.record.export import export_run
+from cmmlink.record.reader import find_run, list_runs, reading, recorded_run, recording
+from cmmlink.record.recorder import Basis, Evidence, Recorder
+from cmmlink.record.replay import Replay, recorded_plan, recorded_profile, replay
+from cmmlink.record.store import Store
+from cmmlink.result_json import summary
 from drivers.source import Decoder
 from inspection import NominalProfile
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from cmmlink.console.extremes import DEVIATION, FOOT_X, NORMAL_X, STATION, VERDICT, ChangedBins, Extremes
 from cmmlink.events import Arrived, Counts, Event, Judged, RunStarted
-from cmmlink.report.summary import number, summary
+from cmmlink.result_json import number, summary
 from drivers.source import Heartbeat, LinkDown, PointBatch, ScanClosed, ScanOpened
 from inspection import LiveUpdate, NominalProfile, ToleranceZone, Verdict
 from inspection.result import coverage

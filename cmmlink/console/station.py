@@ -20,9 +20,9 @@ from cmmlink.console.past_runs import PastRun, Recorded
 from cmmlink.console.run_view import RunFacts, RunView
 from cmmlink.errors import PlanError, RunError, StoreError
 from cmmlink.events import Event, RunStarted, Sink
-from cmmlink.parts import planned_inspection, planned_profile
+from cmmlink.from_plan import planned_inspection, planned_profile
 from cmmlink.pipeline import RunOutcome, run_inspection
-from cmmlink.plan import FileDevice, Plan, load_plan
+from cmmlink.plan.scan import FileDevice, Plan, load_plan
 from drivers.errors import DeviceError, PointFileError
 from drivers.source import PointBatch, ScanOpened, ScanSource
 from inspection import InspectionError, NominalProfile, rehearse

@@ -18,7 +18,7 @@ import numpy as np
 
 from cmmlink.errors import YamlError
 from drivers.errors import PointFileError
-from drivers.point_file import read_text
+from drivers.files.point_file import read_text
 from inspection.curve import NurbsCurve
 from inspection.errors import NominalError
 

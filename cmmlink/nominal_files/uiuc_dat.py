@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from cmmlink.nominal_files import NominalFile
 from cmmlink.nominal_files.through_points import through_points
-from drivers.point_file import checked_mm, parse_columns
+from drivers.files.point_file import checked_mm, parse_columns
 from inspection.errors import NominalError
 
 SUFFIXES = (".dat",)

@@ -4,7 +4,7 @@ import csv
 import math
 from pathlib import Path
 
-from cmmlink.chunks import JudgedRows
+from cmmlink.record.bodies import JudgedRows
 from inspection import InspectionResult, Rejection, Verdict
 from inspection.result import NOT_JUDGED
 

@@ -5,10 +5,10 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
-from cmmlink.ct import SectionOutcome, StackOutcome
 from cmmlink.errors import PlanError
 from cmmlink.report.deviations_csv import write_deviations
-from drivers.contour_source import Slice
+from cmmlink.stack import SectionOutcome, StackOutcome
+from drivers.surface.contour_source import Slice
 from inspection import ToleranceZone
 
 CONTOUR_HEADER = ("contour", "closed", "hole", "x_mm", "y_mm", "z_mm", "section_x_mm", "section_y_mm")

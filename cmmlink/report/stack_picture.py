@@ -12,8 +12,8 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from cmmlink.ct import SectionOutcome, StackOutcome
 from cmmlink.report.picture import WORDS
+from cmmlink.stack import SectionOutcome, StackOutcome
 from inspection import ToleranceZone
 
 Array = NDArray[np.float64]

@@ -14,10 +14,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from drivers.ascii_frames import AsciiDecoder
-from drivers.binary_frames import FRAME, BinaryDecoder
-from drivers.optoncdt_frames import OptoncdtDecoder
-from drivers.riftek_frames import RiftekDecoder
+from drivers.codecs.ascii_frames import AsciiDecoder
+from drivers.codecs.binary_frames import FRAME, BinaryDecoder
+from drivers.codecs.optoncdt_frames import OptoncdtDecoder
+from drivers.codecs.riftek_frames import RiftekDecoder
 from drivers.source import Decoder, PointBatch
 from simulators.binary_scanner import BlockDevice
 from simulators.optoncdt_scanner import OptoncdtDevice

@@ -31,12 +31,12 @@ from cmmlink.console.run_view import RunFacts, RunView
 from cmmlink.console.server import ConsoleServer
 from cmmlink.console.station import Connected, Station
 from cmmlink.events import Counts, Judged, RunStarted
-from cmmlink.parts import planned_inspection, planned_profile
-from cmmlink.plan import Plan, load_plan
+from cmmlink.from_plan import planned_inspection, planned_profile
+from cmmlink.plan.scan import Plan, load_plan
 from drivers.source import Arrival, PointBatch
 from inspection import LiveUpdate, NominalProfile
-from tests.console.conftest import FLAGS
-from tests.console.played import PLAN, means, measured, opened, write_plan
+from tests.cmmlink.console.conftest import FLAGS
+from tests.cmmlink.console.played import PLAN, means, measured, opened, write_plan
 
 BATCH_S = 0.01
 ROUNDS = 10

@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.ct_slice import NumpyCutter, cut_surface, height_range_mm
-from drivers.open3d_process import Open3DProcess, _load
-from drivers.stl_file import RECORD, read_stl
+from drivers.surface.cut import NumpyCutter, cut_surface, height_range_mm
+from drivers.surface.open3d_process import Open3DProcess, _load
+from drivers.surface.stl_file import RECORD, read_stl
 
 ROOT = Path(__file__).resolve().parents[2]
 BLADE_PLANES = [20.0, 50.0, 80.0]
@@ -109,8 +109,8 @@ def role_truth(path: Path, voxel_mm: float) -> dict[str, object]:
     """Three sections of the phantom, registered and judged, against what is known of it."""
     import threading
 
-    from cmmlink.ct import inspect_stack
-    from cmmlink.ct_plan import CtPlan
+    from cmmlink.plan.surface import CtPlan
+    from cmmlink.stack import inspect_stack
     from tests.ct_phantom import Defect, make_phantom, noise_mm, write_nominal, write_stl
 
     defect = Defect(0.1, 40.0, 5.0)

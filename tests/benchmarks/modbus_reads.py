@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from drivers.modbus_scanner import ModbusScanner
-from drivers.register_map import load_map
+from drivers.codecs.register_map import load_map
+from drivers.links.modbus_scanner import ModbusScanner
 from drivers.source import PointBatch, WireBytes
 from tests.integration.simulated import simulated
 

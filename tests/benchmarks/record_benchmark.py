@@ -16,11 +16,11 @@ from pathlib import Path
 
 import numpy as np
 
-from cmmlink.chain import Draft, Record
 from cmmlink.events import Arrived, Counts, Event, RunFinished, RunStarted
-from cmmlink.recorder import Basis, Recorder
-from cmmlink.records import recording
-from cmmlink.store import Store
+from cmmlink.record.chain import Draft, Record
+from cmmlink.record.reader import recording
+from cmmlink.record.recorder import Basis, Recorder
+from cmmlink.record.store import Store
 from drivers.source import PointBatch, WireBytes
 from tests.cmmlink.recorded import today
 

@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 
 from cmmlink.events import Event, Judged, RunStarted
 from cmmlink.pipeline import run_inspection
-from drivers.binary_frames import BinaryDecoder
-from drivers.serial_scanner import SerialScanner
+from drivers.codecs.binary_frames import BinaryDecoder
+from drivers.links.serial_scanner import SerialScanner
 from inspection import LiveInspection, NurbsCurve, RigidTransform, ToleranceZone, discretize
 
 SECONDS = 4.0

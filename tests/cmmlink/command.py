@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-from cmmlink.cli import main
+from cmmlink.commands import main
 
 _COMPILING = re.compile("cmmlink: compiling the inspection, .*\n")  # said by whichever test is the first after an installation
 
@@ -49,7 +49,7 @@ def cmmlink(*arguments: object) -> Ended:
     words = ["cmmlink", *map(str, arguments)]
     with (
         tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as records,
-        patch("cmmlink.cli.default_folder", lambda: Path(records)),
+        patch("cmmlink.commands.default_folder", lambda: Path(records)),
         patch.object(sys, "argv", words),
         redirect_stdout(io.StringIO()) as out,
         redirect_stderr(io.StringIO()) as err,

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from cmmlink.demo import plan_file
 from cmmlink.events import RunStarted, Sink
-from cmmlink.parts import planned_inspection, planned_profile
+from cmmlink.from_plan import planned_inspection, planned_profile
 from cmmlink.pipeline import RunOutcome, run_inspection
-from cmmlink.plan import Datum, Plan, Registration, load_plan
-from cmmlink.recorder import Acknowledged, Basis, Recorder
-from cmmlink.records import recording
-from drivers.ascii_frames import AsciiDecoder
+from cmmlink.plan.scan import Datum, Plan, Registration, load_plan
+from cmmlink.record.reader import recording
+from cmmlink.record.recorder import Acknowledged, Basis, Recorder
+from drivers.codecs.ascii_frames import AsciiDecoder
 from drivers.source import Arrival, Damaged, Lost, PointBatch, Rejected, ScanClosed, ScanOpened, ScanSource
 from inspection import NominalProfile
 

@@ -532,9 +532,9 @@ def test_help_of_a_command_says_how_to_call_it(command: str) -> None:
 
 
 def test_ports_lists_what_the_system_has(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cmmlink.cli.ports", lambda: [("COM3", "USB serial"), ("COM4", "a probe")])
+    monkeypatch.setattr("cmmlink.commands.ports", lambda: [("COM3", "USB serial"), ("COM4", "a probe")])
     assert cmmlink("ports") == Ended(0, "COM3\tUSB serial\nCOM4\ta probe\n", "")
-    monkeypatch.setattr("cmmlink.cli.ports", list)
+    monkeypatch.setattr("cmmlink.commands.ports", list)
     assert cmmlink("ports") == Ended(0, "no serial port was found\n", "")
 
 

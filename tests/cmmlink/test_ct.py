@@ -13,13 +13,13 @@ import pytest
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
-from cmmlink import ct
-from cmmlink.cli import main
-from cmmlink.ct import SectionOutcome, StackOutcome, inspect_stack
-from cmmlink.ct_plan import CtPlan, load_ct_plan
+from cmmlink import stack as ct
+from cmmlink.commands import main
 from cmmlink.errors import PlanError
+from cmmlink.plan.surface import CtPlan, load_ct_plan
+from cmmlink.stack import SectionOutcome, StackOutcome, inspect_stack
 from drivers.errors import MeshError
-from drivers.open3d_process import Open3DMissing
+from drivers.surface.open3d_process import Open3DMissing
 from inspection import RegistrationError, Verdict
 from tests.ct_phantom import GOE404, Defect, Phantom, airfoil, make_phantom, noise_mm, write_nominal, write_spline, write_stl
 from tests.drivers.meshes import Triangles, ascii_stl, binary_stl, box, tube, write

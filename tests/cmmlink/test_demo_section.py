@@ -10,8 +10,8 @@ from scipy.spatial import cKDTree
 from cmmlink.demo import part_path, plan_file, write_part_path
 from cmmlink.demo.section import CAP_START, nominal_csv, nominal_points, outline
 from cmmlink.nominal_files import load_nominal, material_side
-from cmmlink.plan import load_plan
-from drivers.point_file import read_points
+from cmmlink.plan.scan import load_plan
+from drivers.files.point_file import read_points
 from inspection.curve import NurbsCurve
 from inspection.nominal import discretize
 from inspection.profile_error import deviations

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import pytest
 
-from cmmlink import cli
-from cmmlink.open3d_doctor import look_after_open3d
-from drivers.open3d_process import Open3DStatus
+from cmmlink import commands as cli
+from cmmlink.commands.open3d_doctor import look_after_open3d
+from drivers.surface.open3d_process import Open3DStatus
 
 GOOD = Open3DStatus("0.20.0")
 LACKING = Open3DStatus(None, ("libGL.so.1", "libEGL.so.1"), ("apt-get", "install", "--yes", "libgl1", "libegl1"), "libGL.so.1: cannot open")

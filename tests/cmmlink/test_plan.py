@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from cmmlink.errors import PlanError
-from cmmlink.plan import FileDevice, ModbusDevice, Plan, SerialDevice, load_plan
-from cmmlink.recorder import Basis
-from cmmlink.yaml_model import read_model
-from drivers.register_map import load_map
+from cmmlink.plan.scan import FileDevice, ModbusDevice, Plan, SerialDevice, load_plan
+from cmmlink.plan.yaml_model import read_model
+from cmmlink.record.recorder import Basis
+from drivers.codecs.register_map import load_map
 from inspection.tolerance import ToleranceZone
 
 SHORT = """\
@@ -204,7 +204,7 @@ def test_missing_plan_and_folder_are_refused(tmp_path: Path) -> None:
 
 
 def test_every_key_of_the_model_is_documented() -> None:
-    import cmmlink.plan
+    import cmmlink.plan.scan
 
     def names(schema: object) -> set[str]:
         if isinstance(schema, dict):
@@ -213,7 +213,7 @@ def test_every_key_of_the_model_is_documented() -> None:
 
     keys = names(Plan.model_json_schema())
     assert {"coverage_min", "silence_s", "off_plane_max_mm"} <= keys
-    assert {key for key in keys if f"{key}:" not in (cmmlink.plan.__doc__ or "")} == set()
+    assert {key for key in keys if f"{key}:" not in (cmmlink.plan.scan.__doc__ or "")} == set()
 
 
 PLAN_PIECES = st.lists(

@@ -19,8 +19,8 @@ import pytest
 
 from cmmlink.demo import plan_file
 from cmmlink.errors import StoreError
-from cmmlink.records import default_folder
-from cmmlink.store import FILE_NAME
+from cmmlink.record.reader import default_folder
+from cmmlink.record.store import FILE_NAME
 from drivers.source import WireBytes
 from tests.cmmlink.command import cmmlink
 from tests.cmmlink.recorded import Script, record, scan_arrivals
@@ -177,7 +177,7 @@ def test_a_run_whose_record_cannot_be_kept_does_not_begin(station: Station, tmp_
 def test_records_on_a_write_protected_medium_can_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     record(tmp_path, Script(*scan_arrivals(count=120)))
     before = {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
-    monkeypatch.setattr("cmmlink.store.os.access", lambda _, mode: mode != os.W_OK)  # what the system says of such a medium
+    monkeypatch.setattr("cmmlink.record.store.os.access", lambda _, mode: mode != os.W_OK)  # what the system says of such a medium
     assert told("runs", "--records", tmp_path)["runs"][0]["state"] == "complete"
     assert told("verify", "--records", tmp_path)["altered"] is False
     assert {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == before
@@ -189,7 +189,7 @@ def test_records_that_cannot_be_read_whole_are_not_said_to_be_sound(tmp_path: Pa
     record(tmp_path, Script(*scan_arrivals(count=120)))
     file = tmp_path / FILE_NAME
     with monkeypatch.context() as patch:
-        patch.setattr("cmmlink.store.os.access", lambda _, mode: mode != os.W_OK)
+        patch.setattr("cmmlink.record.store.os.access", lambda _, mode: mode != os.W_OK)
         left = tmp_path / f"{FILE_NAME}-wal"
         left.write_bytes(b"what a killed recorder left behind")
         for command in ("runs", "verify"):

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmmlink.chunks import POINT_BYTES, unpack_judged
 from cmmlink.errors import StoreError
 from cmmlink.events import Arrived, Event, Judged, RunFinished, RunStarted
-from cmmlink.recorder import Acknowledged, Basis, Recorder
-from cmmlink.records import describe, list_runs, moments_of, points_of, reading, reads_of, registrations_of
-from cmmlink.store import FILE_NAME, Store
+from cmmlink.record.bodies import POINT_BYTES, unpack_judged
+from cmmlink.record.reader import describe, list_runs, moments_of, points_of, reading, reads_of, registrations_of
+from cmmlink.record.recorder import Acknowledged, Basis, Recorder
+from cmmlink.record.store import FILE_NAME, Store
 from drivers.source import Arrival, Heartbeat, PointBatch, WireBytes
 from tests.cmmlink.recorded import Script, record, scan_arrivals, today
 

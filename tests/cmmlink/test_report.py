@@ -15,7 +15,7 @@ from cmmlink.events import Counts, RunStarted
 from cmmlink.report.deviations_csv import HEADER, write_deviations
 from cmmlink.report.folder import prepare, write_results
 from cmmlink.report.picture import magnification, write_picture
-from cmmlink.report.summary import identity, summary
+from cmmlink.result_json import identity, summary
 from inspection import InspectionResult, LiveInspection, NominalProfile, RigidTransform, ToleranceZone
 from tests.cmmlink.oval_part import LENGTH_MM, oval_feet, oval_points, oval_profile, station_mm
 

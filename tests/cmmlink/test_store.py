@@ -13,10 +13,10 @@ from typing import Any
 
 import pytest
 
-from cmmlink.chain import GENESIS, Alteration, Draft
 from cmmlink.errors import StoreError
-from cmmlink.records import check_chain, list_runs, reading
-from cmmlink.store import FILE_NAME, MIGRATIONS, Store
+from cmmlink.record.chain import GENESIS, Alteration, Draft
+from cmmlink.record.reader import check_chain, list_runs, reading
+from cmmlink.record.store import FILE_NAME, MIGRATIONS, Store
 from tests.cmmlink.recorded import TODAY, Script, record, scan_arrivals, today
 
 ADD = "INSERT INTO record SELECT * FROM t"
@@ -198,7 +198,7 @@ def test_a_damaged_record_is_not_read_as_if_it_were_sound(records_copy: Path) ->
 
 def test_a_second_writer_is_told_who_writes(tmp_path: Path) -> None:
     program = (
-        "import sys; from pathlib import Path; from cmmlink.store import Store\n"
+        "import sys; from pathlib import Path; from cmmlink.record.store import Store\n"
         f"store = Store(Path({str(tmp_path)!r}), writing=True, now=lambda: 0.0)\n"
         "print('open', flush=True); sys.stdin.readline()"
     )

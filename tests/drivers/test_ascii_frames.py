@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.ascii_frames import LONGEST_LINE, AsciiDecoder
+from drivers.codecs.ascii_frames import LONGEST_LINE, AsciiDecoder
 from drivers.errors import ProtocolError
 from drivers.source import Damaged, Heartbeat, ScanClosed, ScanOpened
 from simulators.serial_scanner import AsciiDevice, Sample

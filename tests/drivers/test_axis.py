@@ -6,8 +6,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from drivers.axis import Beam, ConstantFeed, FollowedAxis
 from drivers.errors import LinkError, ProtocolError
+from drivers.links.axis import Beam, ConstantFeed, FollowedAxis
 from drivers.source import Arrival, Damaged, Lost, PointBatch, ScanClosed, WireBytes
 from tests.drivers.streams import account
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.binary_frames import BLOCK_POINT, FRAME, HEAD, BinaryDecoder
+from drivers.codecs.binary_frames import BLOCK_POINT, FRAME, HEAD, BinaryDecoder
 from drivers.source import Heartbeat, ScanClosed, ScanOpened
 from simulators.binary_scanner import BinaryDevice, BlockDevice
 from simulators.serial_scanner import Sample

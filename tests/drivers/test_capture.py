@@ -6,9 +6,9 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 import pytest
 
-from drivers.ascii_frames import AsciiDecoder
-from drivers.capture import Capture
+from drivers.codecs.ascii_frames import AsciiDecoder
 from drivers.errors import DeviceError, ProtocolError
+from drivers.links.capture import Capture
 from drivers.source import Arrival, Damaged, LinkDown, LinkUp, PointBatch, WireBytes
 from simulators.faults import Fault, Injector
 from simulators.serial_scanner import AsciiDevice, Sample

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from drivers.contours import ChainedSection, chain_sections
+from drivers.surface.contours import ChainedSection, chain_sections
 
 Array = NDArray[np.float64]
 

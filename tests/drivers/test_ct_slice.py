@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from drivers.contour_source import ContourSource, Slice, with_points_between
-from drivers.ct_slice import Cutter, NumpyCutter, cut_surface, height_range_mm
 from drivers.errors import MeshError
-from drivers.open3d_process import Open3DProcess
 from drivers.source import PointBatch, ScanClosed, ScanOpened
-from drivers.stl_file import SurfaceMesh, read_stl, surface_of
+from drivers.surface.contour_source import ContourSource, Slice, with_points_between
+from drivers.surface.cut import Cutter, NumpyCutter, cut_surface, height_range_mm
+from drivers.surface.open3d_process import Open3DProcess
+from drivers.surface.stl_file import SurfaceMesh, read_stl, surface_of
 from tests.ct_phantom import make_phantom
 from tests.drivers.meshes import Triangles, ascii_stl, binary_stl, box, rotation, tube, write
 
@@ -200,9 +200,9 @@ def test_open3d_and_numpy_agree_on_loose_triangles(open3d: Open3DProcess, seed: 
 def test_open3d_is_never_loaded_into_this_process() -> None:
     program = (
         "import sys\n"
-        "from drivers.ct_slice import cut_surface\n"
-        "from drivers.open3d_process import Open3DProcess\n"
-        "from drivers.stl_file import surface_of\n"
+        "from drivers.surface.cut import cut_surface\n"
+        "from drivers.surface.open3d_process import Open3DProcess\n"
+        "from drivers.surface.stl_file import surface_of\n"
         "from tests.drivers.meshes import box\n"
         "with Open3DProcess() as child:\n"
         "    (found,) = cut_surface(surface_of(box((0, 0, 0), (1, 1, 1)), '', ''), (0, 0, 1), [0.5], cutter=child)\n"

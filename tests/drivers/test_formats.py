@@ -1,8 +1,8 @@
 import pytest
 
-from drivers.ascii_frames import AsciiDecoder
-from drivers.formats import decoder, decoders
-from drivers.riftek_frames import RiftekDecoder
+from drivers.codecs import decoder, decoders
+from drivers.codecs.ascii_frames import AsciiDecoder
+from drivers.codecs.riftek_frames import RiftekDecoder
 from simulators.settings import devices
 
 

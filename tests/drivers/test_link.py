@@ -7,7 +7,7 @@ from contextlib import nullcontext
 import pytest
 
 from drivers.errors import LinkError, ProtocolError
-from drivers.link import kept_up
+from drivers.links.reconnect import kept_up
 from drivers.source import Arrival, LinkDown, LinkUp, ScanClosed, WireBytes
 
 

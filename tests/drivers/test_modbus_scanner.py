@@ -11,9 +11,9 @@ from pymodbus.exceptions import ConnectionException, ModbusIOException
 from pymodbus.pdu import ExceptionResponse, ModbusPDU
 from pymodbus.pdu.register_message import ReadInputRegistersResponse
 
+from drivers.codecs.register_map import load_map
 from drivers.errors import DeviceRefused, LinkError
-from drivers.modbus_scanner import FifoAnswer, ModbusScanner
-from drivers.register_map import load_map
+from drivers.links.modbus_scanner import FifoAnswer, ModbusScanner
 from drivers.source import PointBatch, ScanClosed
 from tests.drivers.streams import account
 

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from drivers.codecs.optoncdt_frames import ERRORS, OptoncdtDecoder
 from drivers.errors import DeviceRefused, ProtocolError
-from drivers.optoncdt_frames import ERRORS, OptoncdtDecoder
 from drivers.source import ScanClosed, ScanOpened
 from simulators.optoncdt_scanner import FIRST_COUNT, OptoncdtDevice
 from simulators.serial_scanner import Sample

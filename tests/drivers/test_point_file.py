@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from drivers.errors import PointFileError
-from drivers.point_file import PointFileSource, parse_columns, points_of, read_points, read_text
+from drivers.files.point_file import PointFileSource, parse_columns, points_of, read_points, read_text
 from drivers.source import PointBatch, ScanClosed, ScanOpened
 
 Array = NDArray[np.float64]

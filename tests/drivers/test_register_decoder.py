@@ -8,9 +8,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from drivers.codecs.register_decoder import RegisterDecoder
+from drivers.codecs.register_map import RegisterMap, load_map
 from drivers.errors import DeviceRefused, ProtocolError
-from drivers.register_decoder import RegisterDecoder
-from drivers.register_map import RegisterMap, load_map
 from drivers.source import Arrival, Heartbeat, Lost, ScanClosed, ScanOpened
 from tests.drivers.streams import account
 from tests.drivers.test_ascii_frames import crc_bitwise

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import yaml
 
-from drivers.register_map import MAPS, Block, RegisterField, columns, load_map, shipped_maps
+from drivers.codecs.register_map import MAPS, Block, RegisterField, columns, load_map, shipped_maps
 
 README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
 MINE = "device: my controller\n" + README.partition("\ndevice: my controller\n")[2].partition("```")[0]

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from drivers.codecs.riftek_frames import RiftekAsciiDecoder, RiftekDecoder
 from drivers.errors import ProtocolError
-from drivers.riftek_frames import RiftekAsciiDecoder, RiftekDecoder
 from drivers.source import Arrival, ScanClosed
 from simulators.riftek_scanner import RiftekDevice
 from simulators.serial_scanner import Sample

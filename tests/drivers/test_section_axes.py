@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from drivers.section_axes import axes_of
+from drivers.surface.section_axes import axes_of
 
 
 def test_the_normal_z_leaves_x_and_y_unchanged() -> None:

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.sequence import Place, SequenceCounter
+from drivers.codecs.sequence import Place, SequenceCounter
 
 
 def test_in_order_nothing_is_lost() -> None:

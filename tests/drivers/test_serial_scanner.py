@@ -5,9 +5,9 @@ from collections.abc import Iterator
 import pytest
 import serial
 
-from drivers.ascii_frames import AsciiDecoder
+from drivers.codecs.ascii_frames import AsciiDecoder
 from drivers.errors import DeviceError, LinkError, ProtocolError
-from drivers.serial_scanner import SerialScanner, serial_address
+from drivers.links.serial_scanner import SerialScanner, serial_address
 from drivers.source import Arrival, Damaged, WireBytes
 
 

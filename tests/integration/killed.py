@@ -13,10 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
-from cmmlink.recorder import Acknowledged
-from cmmlink.records import check_chain, list_runs, points_of, reading, reads_of
-from drivers.ascii_frames import AsciiDecoder
-from drivers.serial_scanner import SerialScanner
+from cmmlink.record.reader import check_chain, list_runs, points_of, reading, reads_of
+from cmmlink.record.recorder import Acknowledged
+from drivers.codecs.ascii_frames import AsciiDecoder
+from drivers.links.serial_scanner import SerialScanner
 from drivers.source import PointBatch
 from tests.cmmlink.recorded import plan_with_known_pose, record, today
 from tests.integration.simulated import Simulated, simulated

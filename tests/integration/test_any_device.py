@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers.formats import decoder
-from drivers.modbus_scanner import ModbusScanner
-from drivers.register_map import load_map
-from drivers.serial_scanner import SerialScanner
+from drivers.codecs import decoder
+from drivers.codecs.register_map import load_map
+from drivers.links.modbus_scanner import ModbusScanner
+from drivers.links.serial_scanner import SerialScanner
 from drivers.source import Arrival, PointBatch, ScanClosed, ScanSource, WireBytes
 from tests.drivers.streams import Account, account
 from tests.integration.simulated import simulated

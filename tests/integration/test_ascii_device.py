@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers.ascii_frames import AsciiDecoder
+from drivers.codecs.ascii_frames import AsciiDecoder
 from drivers.errors import LinkError, ProtocolError
-from drivers.serial_scanner import SerialScanner
+from drivers.links.serial_scanner import SerialScanner
 from drivers.source import Arrival, LinkDown, LinkUp, PointBatch, ScanClosed, ScanOpened
 from tests.drivers.streams import Account, account, only_sent_points
 from tests.integration.simulated import Simulated, simulated

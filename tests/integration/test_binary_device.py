@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from drivers.binary_frames import BinaryDecoder
-from drivers.serial_scanner import SerialScanner
+from drivers.codecs.binary_frames import BinaryDecoder
+from drivers.links.serial_scanner import SerialScanner
 from drivers.source import LinkDown, LinkUp, ScanClosed, ScanOpened
 from tests.drivers.streams import account, only_sent_points
 from tests.integration.simulated import simulated

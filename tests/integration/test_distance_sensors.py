@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers.axis import Beam, ConstantFeed
-from drivers.optoncdt_frames import OptoncdtDecoder
-from drivers.riftek_frames import RiftekAsciiDecoder, RiftekDecoder
-from drivers.serial_scanner import SerialScanner
+from drivers.codecs.optoncdt_frames import OptoncdtDecoder
+from drivers.codecs.riftek_frames import RiftekAsciiDecoder, RiftekDecoder
+from drivers.links.axis import Beam, ConstantFeed
+from drivers.links.serial_scanner import SerialScanner
 from drivers.source import Decoder, ScanClosed
 from simulators.motion import Motion, fed
 from tests.drivers.streams import account

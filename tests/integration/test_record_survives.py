@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from cmmlink.demo import plan_file
-from cmmlink.records import list_runs, points_of, reading
+from cmmlink.record.reader import list_runs, points_of, reading
 from tests.cmmlink.recorded import Script, record, scan_arrivals, today
 from tests.integration.killed import ROOT, kill_one
 from tests.integration.simulated import simulated

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from cmmlink.demo import part_path, plan_file
 from cmmlink.events import Event, Judged, RunStarted
-from cmmlink.parts import planned_inspection, planned_profile
+from cmmlink.from_plan import planned_inspection, planned_profile
 from cmmlink.pipeline import RunOutcome, run_inspection
-from cmmlink.plan import Datum, Plan, Registration, load_plan
+from cmmlink.plan.scan import Datum, Plan, Registration, load_plan
 from drivers.source import Arrival, PointBatch, ScanClosed, ScanOpened
 from inspection import InspectionResult, NominalProfile, register
 from simulators.motion import Motion, walk

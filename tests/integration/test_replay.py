@@ -13,10 +13,10 @@ import pytest
 
 from cmmlink.demo import part_path
 from cmmlink.events import Arrived, Event, RunFinished
-from cmmlink.records import list_runs, reading, recorded_run
-from cmmlink.replay import Replay, replay
-from drivers.ascii_frames import AsciiDecoder
-from drivers.serial_scanner import SerialScanner
+from cmmlink.record.reader import list_runs, reading, recorded_run
+from cmmlink.record.replay import Replay, replay
+from drivers.codecs.ascii_frames import AsciiDecoder
+from drivers.links.serial_scanner import SerialScanner
 from drivers.source import PointBatch
 from inspection import Verdict
 from tests.cmmlink.recorded import Script, decoder_of, no_decoder, record, scan_arrivals, small_profile, today

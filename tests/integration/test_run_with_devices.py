@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 import yaml
 
-from cmmlink.cli import decoder_of
+from cmmlink.commands import decoder_of
 from cmmlink.errors import StoreError
-from cmmlink.records import reading, recorded_run
-from cmmlink.replay import replay
+from cmmlink.record.reader import reading, recorded_run
+from cmmlink.record.replay import replay
 from tests.cmmlink.recorded import Script, record, scan_arrivals, today
 from tests.integration.simulated import Simulated, simulated
 

@@ -1,0 +1,35 @@
+"""Looks whether Open3D can be loaded, mends what can be mended, and says the rest. Run by make after installing, and by `doctor`."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+
+from drivers.surface.open3d_process import Open3DStatus, mend_open3d, open3d_status
+
+
+def look_after_open3d(
+    say: Callable[[str], None],
+    *,
+    status: Callable[[], Open3DStatus] = open3d_status,
+    run: Callable[[Sequence[str]], int] | None = None,
+    is_root: bool | None = None,
+) -> bool:
+    """Return whether Open3D can be loaded, after installing missing system libraries where apt and root allow it."""
+    found = status()
+    root = is_root if is_root is not None else hasattr(os, "geteuid") and os.geteuid() == 0
+    if found.version is None and found.mend is not None and mend_open3d(found, run or _run, root):
+        say(f"installed for Open3D: {' '.join(found.mend[3:])}")
+        found = status()
+    say(found.sentence())
+    if found.version is None:
+        say("surfaces are cut by numpy meanwhile, with the same points; PLY and OBJ files need Open3D")
+    return found.version is not None
+
+
+def _run(command: Sequence[str]) -> int:
+    return subprocess.run(command, check=False, stdout=subprocess.DEVNULL).returncode
+
+
+if __name__ == "__main__":
+    look_after_open3d(lambda text: print(text, file=sys.stderr))  # noqa: T201 - a program of its own, for make

@@ -1,0 +1,77 @@
+"""A recorded run as files that any program reads."""
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cmmlink.errors import PlanError
+from cmmlink.record.bodies import unpack_judged
+from cmmlink.record.reader import describe, event_document, moments_of, points_of, reads_of, recorded_run
+from cmmlink.record.store import Store
+from cmmlink.report.deviations_csv import write_deviations
+
+_POINT_COLUMNS = ("sequence", "time_s", "x_mm", "y_mm", "z_mm")
+
+
+def export_run(store: Store, run: str, folder: Path) -> list[Path]:
+    """Write a run to a folder and return the files written; raises PlanError where that cannot be.
+
+    run.json: all but the points; events.json; points.csv and points.npy (m, 5): sequence, time_s, x, y, z in mm;
+    wire.bin, the bytes as they arrived, and wire.csv, when; plan.yaml; the nominal's file; of a run with a result
+    deviations.csv and result.json.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        return [*_documents(store, run, folder), *_points(store, run, folder), *_wire(store, run, folder), *_result(store, run, folder)]
+    except OSError as error:
+        raise PlanError(f"{folder}: the run cannot be written there ({error.strerror}); choose another folder with --out") from None
+
+
+def _documents(store: Store, run: str, folder: Path) -> list[Path]:
+    recorded = recorded_run(store, run)
+    nominal = folder / f"nominal-{Path(str(recorded.header['nominal'])).name}"
+    nominal.write_bytes(recorded.nominal)
+    plan = folder / "plan.yaml"
+    plan.write_bytes(recorded.plan.encode())
+    events = [event_document(moment) for moment in moments_of(store, run)]
+    return [nominal, plan, _json(folder / "run.json", describe(store, run)), _json(folder / "events.json", events)]
+
+
+def _points(store: Store, run: str, folder: Path) -> list[Path]:
+    batches = list(points_of(store, run))
+    rows = np.vstack([np.empty((0, 5)), *(np.column_stack([batch.sequence, batch.time_s, batch.points_mm]) for batch in batches)])
+    np.save(folder / "points.npy", rows)
+    with (folder / "points.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(_POINT_COLUMNS)
+        writer.writerows((int(row[0]), *row[1:]) for row in rows.tolist())
+    return [folder / "points.npy", folder / "points.csv"]
+
+
+def _wire(store: Store, run: str, folder: Path) -> list[Path]:
+    offset = 0
+    with (folder / "wire.bin").open("wb") as raw, (folder / "wire.csv").open("w", newline="", encoding="utf-8") as index:
+        writer = csv.writer(index)
+        writer.writerow(("time_s", "offset", "bytes"))
+        for read in reads_of(store, run):
+            raw.write(read.data)
+            writer.writerow((read.time_s, offset, len(read.data)))
+            offset += len(read.data)
+    return [folder / "wire.bin", folder / "wire.csv"]
+
+
+def _result(store: Store, run: str, folder: Path) -> list[Path]:
+    facts = recorded_run(store, run).facts
+    if facts is None:
+        return []
+    rows = unpack_judged(record.body for record in store.records(run, "deviations"))
+    write_deviations(rows, folder / "deviations.csv")
+    return [folder / "deviations.csv", _json(folder / "result.json", facts)]
+
+
+def _json(path: Path, document: Any) -> Path:
+    path.write_text(json.dumps(document, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    return path

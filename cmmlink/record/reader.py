@@ -1,0 +1,194 @@
+"""What the records of a station tell: the list of runs, one run in full, and whether anything was altered.
+
+A run whose end is missing is closed as interrupted by whoever opens the records next, unless it is being recorded just now.
+"""
+
+import dataclasses
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from platformdirs import user_data_path
+
+from cmmlink.errors import RunError, StoreError
+from cmmlink.record.bodies import Moment, unpack_document, unpack_moments, unpack_points, unpack_reads
+from cmmlink.record.chain import Record, is_damaged
+from cmmlink.record.recorder import end_draft
+from cmmlink.record.store import FILE_NAME, Store
+from drivers.source import Arrival, PointBatch, Rejected, WireBytes
+
+_CUT_OFF = "the program ended before the run did: power failure, crash or kill"
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedRun:
+    """One run as it is kept. `end` is None while it is being recorded, `facts` where no result was reached."""
+
+    header: dict[str, Any]
+    plan: str
+    nominal: bytes
+    end: dict[str, Any] | None
+    facts: dict[str, Any] | None
+    chain_sha256: str
+
+    @property
+    def run(self) -> str:
+        """The run's id."""
+        return str(self.header["run"])
+
+
+def default_folder() -> Path:
+    """Folder of the records when neither command nor plan says otherwise: in the user's data folder."""
+    return user_data_path("cmmlink", appauthor=False) / "records"
+
+
+@contextmanager
+def recording(folder: Path, today: Callable[[], datetime]) -> Iterator[Store]:
+    """Open the records to add a run. Raises StoreError when another process does so."""
+    with Store(folder, writing=True, now=lambda: today().timestamp()) as store:
+        _close_interrupted(store, today)
+        yield store
+
+
+@contextmanager
+def reading(folder: Path, today: Callable[[], datetime], *, close_interrupted: bool = True) -> Iterator[Store]:
+    """Open the records to read them. Raises RunError where there are none."""
+    if not (folder / FILE_NAME).is_file():
+        raise RunError(f"{folder}: there are no records here; --records DIR says where they are")
+    with Store(folder, writing=False, now=lambda: today().timestamp()) as store:
+        unfinished = any(end is None for _, end in store.begins_and_ends())
+    if unfinished and close_interrupted:
+        try:
+            with recording(folder, today):
+                pass
+        except StoreError:  # it is being recorded just now, or the medium is write-protected: the run stays open
+            pass
+    with Store(folder, writing=False, now=lambda: today().timestamp()) as store:
+        yield store
+
+
+def list_runs(folder: Path, today: Callable[[], datetime]) -> list[dict[str, Any]]:
+    """Every run, oldest first: run, started, part, serial_number, state, received, verdict; none where nothing was recorded yet.
+
+    The state of a run that another process records just now is "running".
+    """
+    if not (folder / FILE_NAME).is_file():
+        return []
+    with reading(folder, today) as store:
+        return [_entry(begin, end) for begin, end in store.begins_and_ends()]
+
+
+def find_run(store: Store, name: str) -> str:
+    """Give the id of the run that is called so: an id, the beginning of one, or `last`. Raises RunError."""
+    runs = [str(begin.run) for begin, _ in store.begins_and_ends()]
+    found = runs[-1:] if name == "last" else [run for run in runs if run == name] or [run for run in runs if run.startswith(name)]
+    if len(found) == 1:
+        return found[0]
+    what = f"{len(found)} runs begin with {name!r}: {', '.join(found[:5])}" if found else f"there is no run {name!r}"
+    raise RunError(f"{store.path}: {what}; `cmmlink runs` lists them")
+
+
+def recorded_run(store: Store, run: str) -> RecordedRun:
+    """Read all but the bulk of a run. Raises StoreError where a record is missing or damaged."""
+    found: dict[str, Record] = {}
+    for kind in ("run", "plan", "nominal", "result", "end"):
+        found.update((kind, record) for record in store.records(run, kind))
+    for kind in ("run", "plan", "nominal"):
+        if kind not in found:
+            raise StoreError(f"{store.path}: the {kind} record of run {run} is missing; `cmmlink verify` says more")
+    documents = {kind: unpack_document(found[kind].body) for kind in ("run", "result", "end") if kind in found}
+    sha256 = found["end"].sha256.hex() if "end" in found else ""
+    plan = found["plan"].body.decode()
+    return RecordedRun(documents["run"], plan, found["nominal"].body, documents.get("end"), documents.get("result"), sha256)
+
+
+def reads_of(store: Store, run: str) -> Iterator[WireBytes]:
+    """Every read of raw bytes, in order."""
+    for record in store.records(run, "wire"):
+        yield from unpack_reads(record.body)
+
+
+def points_of(store: Store, run: str) -> Iterator[PointBatch]:
+    """Every point, in order, as many at once as a record holds."""
+    for record in store.records(run, "points"):
+        yield unpack_points(record.body)
+
+
+def moments_of(store: Store, run: str) -> Iterator[Moment]:
+    """Every other arrival, in order."""
+    for record in store.records(run, "events"):
+        yield from unpack_moments(record.body)
+
+
+def registrations_of(store: Store, run: str) -> list[dict[str, Any]]:
+    """Give the registration's history."""
+    return [pose for record in store.records(run, "registration") for pose in unpack_document(record.body)]
+
+
+def describe(store: Store, run: str) -> dict[str, Any]:
+    """Give all there is to know of a run but its points, as plain values."""
+    recorded = recorded_run(store, run)
+    end = recorded.end or {"state": "running", "message": "", "received": None, "verdict": None}
+    moments = list(moments_of(store, run))
+    totals = store.totals(run)
+    return {
+        **recorded.header,
+        **{key: end.get(key) for key in ("state", "ended", "message", "received", "verdict")},
+        "result": recorded.facts,
+        "chain_sha256": recorded.chain_sha256,
+        "recorded": {
+            "wire_bytes": sum(len(read.data) for read in reads_of(store, run)),
+            "reads": totals.get("wire", (0, 0))[1],
+            "points": totals.get("points", (0, 0))[1],
+            "events": dict(Counter(type(moment.arrival).__name__ for moment in moments)),
+            "records": sum(records for records, _ in totals.values()),
+        },
+        "events": [event_document(moment) for moment in moments if _is_telling(moment.arrival)],
+        "registrations": registrations_of(store, run),
+        "plan": recorded.plan,
+    }
+
+
+def event_document(moment: Moment) -> dict[str, Any]:
+    """Spell an arrival with its place as plain values."""
+    place = {"event": type(moment.arrival).__name__, "time_s": moment.time_s, "after_points": moment.points}
+    return place | dataclasses.asdict(moment.arrival)
+
+
+def check_chain(store: Store, run: str | None) -> dict[str, Any]:
+    """Recompute the chain of a run, or of all: altered, records (sound ones), chain_sha256, and the first altered record."""
+    found, sound, last = store.first_alteration(run)
+    first = None if found is None else {**dataclasses.asdict(found), "message": str(found)}
+    return {"altered": found is not None, "run": run, "records": sound, "chain_sha256": last.hex(), "first": first}
+
+
+def _is_telling(arrival: Arrival) -> bool:
+    return type(arrival).__name__ not in ("Damaged", "Heartbeat")  # there may be thousands; they are counted, and exported
+
+
+def _entry(begin: Record, end: Record | None) -> dict[str, Any]:
+    if is_damaged(begin) or (end is not None and is_damaged(end)):
+        return {"run": begin.run, "state": "damaged"} | dict.fromkeys(("started", "part", "serial_number", "received", "verdict"))
+    header = unpack_document(begin.body)
+    closing = unpack_document(end.body) if end else {"state": "running", "received": None, "verdict": None}
+    entry = {key: header.get(key) for key in ("run", "started", "part", "serial_number")}
+    return entry | {key: closing.get(key) for key in ("state", "received", "verdict")}
+
+
+def _close_interrupted(store: Store, today: Callable[[], datetime]) -> None:
+    for begin, end in store.begins_and_ends():
+        if end is None:
+            store.append([end_draft(begin.run, "interrupted", _CUT_OFF, today(), {"received": _received(store, begin.run)})])
+
+
+def _received(store: Store, run: str) -> int | None:
+    """Points of a run that was cut off, None where a damaged record hides their number."""
+    try:
+        rejected = sum(moment.arrival.count for moment in moments_of(store, run) if isinstance(moment.arrival, Rejected))
+        return rejected + sum(len(batch) for batch in points_of(store, run))
+    except StoreError:
+        return None

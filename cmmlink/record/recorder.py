@@ -1,0 +1,298 @@
+"""The recorder: a sink that keeps a run while it goes on.
+
+The run's thread only hands over; one thread of the recorder packs and commits every tenth of a second. Acknowledged means
+committed. Nothing is dropped: a full queue makes the run wait, and when the disk fails the next event raises StoreError
+in the run's thread, which stops the scan.
+"""
+
+import hashlib
+import platform
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from datetime import datetime
+from importlib import metadata
+from typing import Any
+
+from cmmlink import __version__
+from cmmlink.buffer import HandOver
+from cmmlink.errors import PlanError, StoreError
+from cmmlink.events import Arrived, Event, Judged, RunFinished, RunStarted
+from cmmlink.plan.scan import Plan, with_own_maps
+from cmmlink.record.bodies import Moment, pack_document, pack_judged, pack_moments, pack_points, pack_reads
+from cmmlink.record.chain import Draft, Kind
+from cmmlink.record.store import Store
+from cmmlink.result_json import number, summary
+from drivers.codecs.register_map import load_map
+from drivers.source import PointBatch, Rejected, WireBytes
+from inspection import InspectionResult
+
+COMMIT_S = 0.1
+CHUNK_POINTS = 1000
+QUEUE_BYTES = 64 << 20
+_SMALL_BYTES = 128  # what an event without bytes or points counts for in the queue
+_POSE_S = 0.1  # the pose of a registration that still moves is noted this often at most
+
+
+@dataclass(frozen=True, slots=True)
+class Basis:
+    """What a run rests on, kept with it whole: the effective plan as YAML, the nominal's file, and the software."""
+
+    plan: str
+    nominal_name: str
+    nominal: bytes
+    software: Mapping[str, str]
+
+    @classmethod
+    def of(cls, plan: Plan) -> "Basis":
+        """What a plan rests on at this moment. Register maps of the user's own become part of the plan. Raises PlanError.
+
+        A map is kept as it was understood, every default filled in: how its file spells it may read otherwise another day.
+        """
+        try:
+            device = with_own_maps(plan.device, lambda own: load_map(own).model_dump(mode="json"))
+        except ValueError as error:
+            raise PlanError(f"device: {error}") from None
+        plan = plan.model_copy(update={"device": device})
+        return cls(plan.effective_yaml(), plan.nominal.file.name, plan.nominal.file.read_bytes(), software())
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """What ties a result file to its record."""
+
+    run: str
+    chain_sha256: str
+    plan_sha256: str
+    nominal_sha256: str
+    software: Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Acknowledged:
+    """What of a run is on the disk by now."""
+
+    wire_bytes: int
+    points: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Pose:
+    """One entry of the registration's history."""
+
+    document: Mapping[str, Any]
+
+
+def software() -> dict[str, str]:
+    """Versions of everything that a result depends on."""
+    system = {"cmmlink": __version__, "python": platform.python_version(), "machine": f"{platform.system()} {platform.machine()}"}
+    return system | {package: metadata.version(package) for package in ("numpy", "scipy", "numba")}
+
+
+def result_sha256(facts: Mapping[str, Any], result: InspectionResult | None) -> str:
+    """Hash of everything a result says, every deviation to the last bit."""
+    digest = hashlib.sha256(pack_document(facts))
+    for _, body in pack_judged(result) if result is not None else ():
+        digest.update(body)
+    return digest.hexdigest()
+
+
+class Recorder:
+    """Records one run in an open store."""
+
+    def __init__(
+        self,
+        store: Store,
+        basis: Basis,
+        *,
+        clock: Callable[[], float],
+        today: Callable[[], datetime],
+        commit_s: float = COMMIT_S,
+        queue_bytes: int = QUEUE_BYTES,
+        acknowledge: Callable[[Acknowledged], None] = lambda _: None,
+    ) -> None:
+        """`clock` is the run's; `today` gives date and time of day; the writer's thread calls `acknowledge` after every commit."""
+        self.run = ""
+        self.evidence: Evidence | None = None
+        self._store, self._basis, self._clock, self._today = store, basis, clock, today
+        self._commit_s, self._acknowledge = commit_s, acknowledge
+        self._queue: HandOver[Arrived | _Pose] = HandOver(queue_bytes)
+        self._pack = _Packing()
+        self._last_pose: tuple[str, float] = ("", float("-inf"))
+        self._closing = threading.Event()
+        self._failure: Exception | None = None
+        self._writer: threading.Thread | None = None
+
+    def __call__(self, event: Event) -> None:
+        """Take an event of the run. Raises StoreError when the record cannot be kept."""
+        if isinstance(event, Arrived):
+            self._hand(event, _size(event))
+        elif isinstance(event, Judged):
+            self._note_pose(event)
+        elif isinstance(event, RunStarted):
+            self._begin(event)
+        else:
+            self._end(event)
+
+    def __enter__(self) -> "Recorder":
+        return self
+
+    def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
+        """Close a run that did not come to its end: what was handed over is kept, and why it ended."""
+        if self._writer is None:
+            return
+        self._stop_writing()
+        if self._failure is None:
+            self._store.append([self._end_draft("interrupted", f"the program failed: {error!r}", self._pack.counts())])
+
+    def _begin(self, started: RunStarted) -> None:
+        today, basis = self._today(), self._basis
+        self.run = f"{today:%Y%m%d-%H%M%S}-{len(self._store.begins_and_ends()) + 1:04d}"
+        plan = basis.plan.encode()
+        header = {
+            "run": self.run,
+            "started": today.isoformat(timespec="milliseconds"),
+            "clock_s": self._clock(),
+            **asdict(started),
+            "software": dict(basis.software),
+            "plan_sha256": hashlib.sha256(plan).hexdigest(),
+            "nominal": basis.nominal_name,
+            "nominal_sha256": hashlib.sha256(basis.nominal).hexdigest(),
+        }
+        self._store.append([self._draft("run", pack_document(header)), self._draft("plan", plan), self._draft("nominal", basis.nominal)])
+        self._writer = threading.Thread(target=self._write, name="record", daemon=True)
+        self._writer.start()
+
+    def _hand(self, item: "Arrived | _Pose", size: int) -> None:
+        if not self._queue.give(item, size):
+            raise self._stopped()
+
+    def _note_pose(self, event: Judged) -> None:
+        """Note where the registration stands when its state changes, and now and then while it moves."""
+        update, (state, noted_s) = event.update, self._last_pose
+        if update.registration is None or (update.state == state and event.time_s < noted_s + _POSE_S):
+            return
+        self._last_pose = update.state, event.time_s
+        pose = update.registration.nominal_from_section
+        document = {
+            "time_s": event.time_s,
+            "points": update.stop,
+            "state": update.state,
+            "rotation_rad": pose.rotation_rad,
+            "translation_mm": pose.translation_mm.tolist(),
+            "rms_mm": number(update.registration.rms_mm),
+            "can_move_mm": number(update.can_move_mm),
+            "iterations": update.registration.iterations,
+            "converged": update.registration.converged,
+        }
+        self._hand(_Pose(document), _SMALL_BYTES)
+
+    def _end(self, finished: RunFinished) -> None:
+        self._stop_writing()
+        if self._failure is not None:
+            raise self._stopped()
+        facts = summary(finished.result, finished.counts)
+        sha256 = result_sha256(facts, finished.result)
+        drafts = [self._draft("deviations", body, count) for count, body in (pack_judged(finished.result) if finished.result else ())]
+        drafts.append(self._draft("result", pack_document(facts)))
+        drafts.append(self._end_draft(finished.ending, finished.message, facts, sha256))
+        try:
+            end = self._store.append(drafts)[-1]
+        except StoreError as error:
+            self._failure = error
+            raise self._stopped() from error
+        plan_sha256 = hashlib.sha256(self._basis.plan.encode()).hexdigest()
+        nominal_sha256 = hashlib.sha256(self._basis.nominal).hexdigest()
+        self.evidence = Evidence(self.run, end.sha256.hex(), plan_sha256, nominal_sha256, self._basis.software)
+
+    def _end_draft(self, state: str, message: str, facts: Mapping[str, Any], sha256: str = "") -> Draft:
+        return end_draft(self.run, state, message, self._today(), facts, sha256)
+
+    def _stop_writing(self) -> None:
+        """Let the writer commit all that waits, and end."""
+        if self._writer is not None:
+            self._closing.set()
+            self._writer.join()
+            self._writer = None
+
+    def _stopped(self) -> StoreError:
+        safe = f"{self._pack.acknowledged.points} points are safe in run {self.run}"
+        return StoreError(f"the record of this run cannot be kept, so it has no result; {safe}. {self._failure}")
+
+    def _write(self) -> None:
+        try:
+            while not self._closing.wait(self._commit_s):
+                self._commit(self._queue.take(0.0))
+            self._commit(self._queue.take(0.0))
+        except Exception as error:  # whatever it is, the run must hear of it
+            self._failure = error
+        finally:
+            self._queue.close()
+
+    def _commit(self, items: "Sequence[Arrived | _Pose]") -> None:
+        drafts = [self._draft(kind, body, count) for kind, body, count in self._pack.bodies(items)]
+        if drafts:
+            self._store.append(drafts)
+            self._pack.acknowledged = Acknowledged(self._pack.wire_bytes, self._pack.points)
+            self._acknowledge(self._pack.acknowledged)
+
+    def _draft(self, kind: Kind, body: bytes, count: int = 1) -> Draft:
+        return Draft(self.run, kind, body, count)
+
+
+@dataclass(slots=True)
+class _Packing:
+    """Turns what was handed over into bodies of records, and knows how far the run has come."""
+
+    reads: int = 0
+    wire_bytes: int = 0
+    points: int = 0
+    rejected: int = 0
+    acknowledged: Acknowledged = field(default_factory=lambda: Acknowledged(0, 0))
+
+    def bodies(self, items: "Sequence[Arrived | _Pose]") -> list[tuple[Kind, bytes, int]]:
+        reads: list[WireBytes] = []
+        batches: list[PointBatch] = []
+        moments: list[Moment] = []
+        poses: list[Mapping[str, Any]] = []
+        for item in items:
+            if isinstance(item, _Pose):
+                poses.append(item.document)
+            elif isinstance(item.arrival, WireBytes):
+                reads.append(item.arrival)
+                self.reads += 1
+                self.wire_bytes += len(item.arrival.data)
+            elif isinstance(item.arrival, PointBatch):
+                batches.append(item.arrival)
+                self.points += len(item.arrival)
+            else:
+                moments.append(Moment(item.time_s, self.reads, self.points, item.arrival))
+                self.rejected += item.arrival.count if isinstance(item.arrival, Rejected) else 0
+        found: list[tuple[Kind, bytes, int]] = [("wire", pack_reads(reads), len(reads))] if reads else []
+        found += [("points", body, count) for count, body in (pack_points(batches, CHUNK_POINTS) if batches else ())]
+        found += [("events", pack_moments(moments), len(moments))] if moments else []
+        found += [("registration", pack_document(poses), len(poses))] if poses else []
+        return found
+
+    def counts(self) -> dict[str, int]:
+        return {"received": self.points + self.rejected}
+
+
+def end_draft(run: str, state: str, message: str, today: datetime, facts: Mapping[str, Any], sha256: str = "") -> Draft:
+    """Give the record that closes a run: its state, what was received, and the verdict if there is one."""
+    document = {
+        "state": state,
+        "message": message,
+        "ended": today.isoformat(timespec="milliseconds"),
+        "received": facts.get("received", 0),
+        "verdict": facts.get("verdict"),
+        "result_sha256": sha256,
+    }
+    return Draft(run, "end", pack_document(document))
+
+
+def _size(event: Arrived) -> int:
+    arrival = event.arrival
+    if isinstance(arrival, WireBytes):
+        return len(arrival.data) + _SMALL_BYTES
+    return arrival.points_mm.nbytes + _SMALL_BYTES if isinstance(arrival, PointBatch) else _SMALL_BYTES

@@ -1,0 +1,221 @@
+"""A recorded run once more through the same driver and the same pipeline.
+
+With nothing changed the result is the recorded one, bit for bit; with another tolerance or method it is a new evaluation,
+which says what was changed and what came out differently.
+"""
+
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from cmmlink.errors import PlanError, StoreError, YamlError
+from cmmlink.events import RunStarted, Sink
+from cmmlink.from_plan import planned_inspection, planned_profile
+from cmmlink.pipeline import RunOutcome, run_inspection
+from cmmlink.plan.scan import Device, Plan
+from cmmlink.plan.yaml_model import read_model
+from cmmlink.record.bodies import Moment
+from cmmlink.record.reader import RecordedRun, moments_of, points_of, reads_of
+from cmmlink.record.recorder import result_sha256, software
+from cmmlink.record.store import Store
+from cmmlink.result_json import summary
+from drivers.links.capture import Capture
+from drivers.source import Arrival, Decoder, LinkDown, LinkUp, PointBatch
+from inspection import NominalProfile
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A value that is not as it was in the recorded run."""
+
+    key: str
+    recorded: Any
+    replayed: Any
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Replay:
+    """What a replay gave.
+
+    changed   : settings and software that are not those of the recorded run
+    differs   : what of the result is not as recorded
+    identical : to the last bit of every deviation; None where the recorded run has no result to compare with
+    """
+
+    outcome: RunOutcome
+    profile: NominalProfile
+    facts: dict[str, Any]
+    changed: tuple[Change, ...]
+    differs: tuple[Change, ...]
+    identical: bool | None
+
+
+def replay(
+    store: Store,
+    recorded: RecordedRun,
+    decoder_of: Callable[[Device], Decoder | None],
+    *,
+    tolerance: tuple[float, float] | None = None,
+    method: str | None = None,
+    clock: Callable[[], float] = time.monotonic,
+    sinks: Sequence[Sink] = (),
+    stop: threading.Event | None = None,
+) -> Replay:
+    """Evaluate a recorded run again. `decoder_of` gives the decoder of a plan's device, None for one without wire bytes.
+
+    `sinks` hear what goes on; setting `stop` breaks off.
+
+    Raises StoreError where the record is altered or cannot be read, PlanError where the changed plan cannot be used.
+    """
+    altered, _, _ = store.first_alteration(recorded.run)
+    if altered is not None:
+        raise StoreError(f"{store.path}: {altered}; what was altered is not evaluated again")
+    plan = recorded_plan(recorded)
+    changed = _with_changes(plan, tolerance, method)
+    profile = recorded_profile(changed, recorded)
+    stop = stop or threading.Event()
+    decoder = _recorded_decoder(plan.device, recorded, decoder_of)
+    source = Capture(_arrivals(store, recorded, decoder, stop), decoder, _failure(recorded))
+    started = RunStarted(*(recorded.header[key] for key in ("part", "serial_number", "operator", "device", "simulated")))
+    live = planned_inspection(changed, profile)
+    outcome = run_inspection(source, live, sinks, started, buffer_points=plan.buffer_points, clock=clock, stop=stop)
+    facts = summary(outcome.result, outcome.counts)
+    identical = None
+    if recorded.end is not None and recorded.end["result_sha256"]:
+        identical = result_sha256(facts, outcome.result) == recorded.end["result_sha256"]
+    changes = (*_settings_changed(plan, changed), *_software_changed(recorded.header["software"]))
+    return Replay(outcome, profile, facts, changes, _differences(recorded.facts, facts) if not identical else (), identical)
+
+
+def recorded_plan(recorded: RecordedRun) -> Plan:
+    """Give the effective plan of a recorded run. Raises StoreError."""
+    try:
+        return read_model(recorded.plan, Plan)
+    except YamlError as error:
+        raise StoreError(f"the plan of run {recorded.run} cannot be read by this version of cmmlink: {error}") from None
+
+
+def _recorded_decoder(device: Device, recorded: RecordedRun, decoder_of: Callable[[Device], Decoder | None]) -> Decoder | None:
+    try:
+        return decoder_of(device)
+    except ValueError as error:  # a format, an option or a register map that was valid on that day, or is gone
+        raise StoreError(f"the device in the plan of run {recorded.run} cannot be read by this version of cmmlink: {error}") from None
+
+
+def _with_changes(plan: Plan, tolerance: tuple[float, float] | None, method: str | None) -> Plan:
+    document = plan.model_dump()
+    if tolerance is not None:
+        document["tolerance"] |= {"lower_mm": tolerance[0], "upper_mm": tolerance[1]}
+    if method is not None:
+        document["registration"]["method"] = method
+    try:
+        return Plan.model_validate(document)
+    except ValidationError as error:
+        first = error.errors()[0]
+        key, told = ".".join(map(str, first["loc"])), first["msg"].removeprefix("Value error, ")
+        raise PlanError(f"the recorded plan cannot be changed so: {key} is {first['input']!r}; expected {told}") from None
+
+
+def recorded_profile(plan: Plan, recorded: RecordedRun) -> NominalProfile:
+    """Discretise the nominal from its recorded file; the one that the plan names may have changed since, or be gone."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / Path(str(recorded.header["nominal"])).name
+        file.write_bytes(recorded.nominal)
+        return planned_profile(plan.model_copy(update={"nominal": plan.nominal.model_copy(update={"file": file})}))
+
+
+def _failure(recorded: RecordedRun) -> str:
+    end = recorded.end or {"state": "interrupted", "message": ""}
+    return str(end["message"] or "the record ends here") if end["state"] == "interrupted" else ""
+
+
+def _arrivals(store: Store, recorded: RecordedRun, decoder: Decoder | None, stop: threading.Event) -> Iterator[Arrival]:
+    """Recorded arrivals in their order: reads and what befell the link, or points and everything else."""
+    moments = moments_of(store, recorded.run)
+    if decoder is not None:
+        links = (moment for moment in moments if isinstance(moment.arrival, LinkDown | LinkUp))
+        yield from _merged(reads_of(store, recorded.run), lambda _: 1, links, lambda moment: moment.reads)
+    else:
+        yield from _merged_points(points_of(store, recorded.run), moments)
+    if recorded.end is not None and recorded.end["state"] == "aborted":
+        stop.set()  # where the operator did
+
+
+def _merged(
+    items: Iterator[Arrival], size: Callable[[Arrival], int], moments: Iterator[Moment], place: Callable[[Moment], int]
+) -> Iterator[Arrival]:
+    """Merge counted arrivals with others that stand after so many of them."""
+    done, moment = 0, next(moments, None)
+    for item in items:
+        while moment is not None and place(moment) <= done:
+            yield moment.arrival
+            moment = next(moments, None)
+        yield item
+        done += size(item)
+    while moment is not None:
+        yield moment.arrival
+        moment = next(moments, None)
+
+
+def _merged_points(batches: Iterator[PointBatch], moments: Iterator[Moment]) -> Iterator[Arrival]:
+    """Merge points with the rest; what stands between two points of one record cuts it there."""
+    done, moment = 0, next(moments, None)
+    for batch in batches:
+        begin = 0
+        while moment is not None and moment.points < done + len(batch):
+            cut = moment.points - done
+            if cut > begin:
+                yield _rows(batch, begin, cut)
+            yield moment.arrival
+            begin, moment = max(begin, cut), next(moments, None)
+        yield _rows(batch, begin, len(batch))
+        done += len(batch)
+    while moment is not None:
+        yield moment.arrival
+        moment = next(moments, None)
+
+
+def _rows(batch: PointBatch, begin: int, end: int) -> PointBatch:
+    return PointBatch(batch.sequence[begin:end], batch.time_s[begin:end], batch.points_mm[begin:end])
+
+
+def _settings_changed(plan: Plan, changed: Plan) -> Iterator[Change]:
+    return _differences_of(plan.model_dump(mode="json"), changed.model_dump(mode="json"))
+
+
+def _software_changed(recorded: Mapping[str, str]) -> Iterator[Change]:
+    return _differences_of(dict(recorded), software(), "software.")
+
+
+def _differences(recorded: Mapping[str, Any] | None, replayed: Mapping[str, Any]) -> tuple[Change, ...]:
+    """Name what came out differently. Deviations alone may differ without any of the summary showing it."""
+    if recorded is None:
+        return ()
+    found = tuple(_differences_of(recorded, replayed))
+    return found or (Change("deviations", "as recorded", "differ in the last bits; nothing of the summary does"),)
+
+
+def _differences_of(recorded: Any, replayed: Any, key: str = "") -> Iterator[Change]:
+    """Name the values that are not alike, by their path."""
+    if isinstance(recorded, Mapping) and isinstance(replayed, Mapping):
+        for name in [*recorded, *(name for name in replayed if name not in recorded)]:
+            prefix = key if not key or key.endswith(".") else key + "."
+            yield from _differences_of(recorded.get(name), replayed.get(name), prefix + name)
+    elif _is_list(recorded) and _is_list(replayed):
+        if len(recorded) != len(replayed):
+            yield Change(f"{key} (how many)", len(recorded), len(replayed))
+            return
+        for index, (before, now) in enumerate(zip(recorded, replayed, strict=True)):
+            yield from _differences_of(before, now, f"{key}[{index}]")
+    elif recorded != replayed:
+        yield Change(key, recorded, replayed)
+
+
+def _is_list(value: Any) -> bool:
+    return isinstance(value, Sequence) and not isinstance(value, str)

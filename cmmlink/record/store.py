@@ -1,0 +1,245 @@
+"""The records of a station: one SQLite file to which hash-chained records are only ever added.
+
+What `append` returned from is on the disk (write-ahead log, synchronous FULL). Runs follow one another: the records of
+a run stand together, from `run` to `end`; a run whose `end` is missing was interrupted, or is going on.
+"""
+
+import os
+import re
+import shutil
+import sqlite3
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from cmmlink.errors import StoreError
+from cmmlink.record.chain import GENESIS, Alteration, Draft, Record, chained, first_alteration, is_damaged
+from cmmlink.record.station_lock import StationLock
+
+FILE_NAME = "station.sqlite"
+APPLICATION_ID = 0x434D4D4C  # "CMML", in the file's header
+MIGRATIONS: tuple[str, ...] = (
+    """
+    CREATE TABLE record (
+        number INTEGER PRIMARY KEY AUTOINCREMENT,
+        run    TEXT    NOT NULL,
+        kind   TEXT    NOT NULL,
+        time_s REAL    NOT NULL,
+        count  INTEGER NOT NULL,
+        body   BLOB    NOT NULL,
+        crc32  INTEGER NOT NULL,
+        sha256 BLOB    NOT NULL
+    );
+    CREATE INDEX record_of_run ON record (run, kind, number);
+    CREATE INDEX begin_and_end ON record (number) WHERE kind IN ('run', 'end');
+    """,
+)
+"""Scripts from one version of the schema to the next. A migration adds tables, columns and indices; it never changes a record."""
+
+_COLUMNS = "number, run, kind, time_s, count, body, crc32, sha256"
+_PATIENCE_S = 5.0  # for another connection's transaction
+
+
+class Store:
+    """An open station file. `writing` takes the station's lock for as long as the store is open."""
+
+    def __init__(self, folder: Path, *, writing: bool, now: Callable[[], float], migrations: Sequence[str] = MIGRATIONS) -> None:
+        """`now` gives seconds since 1970. Raises StoreError: locked, newer, unusable folder, not a file of records."""
+        self.path = folder / FILE_NAME
+        self._now = now
+        self._lock: StationLock | None = None
+        self._head: tuple[int, bytes] = (0, GENESIS)  # number and hash of the last record
+        self._found_empty = self.path.is_file() and not self.path.stat().st_size
+        try:
+            if writing:
+                folder.mkdir(parents=True, exist_ok=True)
+                self._lock = StationLock(folder / "station.lock")
+            self._connection = _connected(self.path)
+        except (OSError, sqlite3.Error) as error:
+            self._unlock()
+            raise StoreError(f"{self.path}: cannot be opened: {error}; choose another folder with --records DIR") from None
+        try:
+            with _translated(self.path):
+                self._prepare(writing, migrations)
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Close the file and let the next process in."""
+        self._connection.close()
+        self._unlock()
+
+    def __enter__(self) -> "Store":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def append(self, drafts: Sequence[Draft]) -> list[Record]:
+        """Add records in one transaction; they are on the disk when this returns. Raises StoreError: then none of them is."""
+        number, previous = self._head
+        records: list[Record] = []
+        time_s = self._now()
+        for draft in drafts:
+            records.append(chained(draft, number + 1, time_s, previous))
+            number, previous = number + 1, records[-1].sha256
+        rows = [(r.number, r.run, r.kind, r.time_s, r.count, r.body, r.crc32, r.sha256) for r in records]
+        with _translated(self.path), _transaction(self._connection):
+            self._connection.executemany(f"INSERT INTO record ({_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?, ?)", rows)
+        self._head = number, previous
+        return records
+
+    def records(self, run: str, kind: str | None = None) -> Iterator[Record]:
+        """Records of a run in their order, all or of one kind. Raises StoreError where one cannot be read."""
+        query = f"SELECT {_COLUMNS} FROM record WHERE run = ?" + (" AND kind = ?" if kind else "") + " ORDER BY number"
+        with _translated(self.path):
+            for row in self._connection.execute(query, (run, kind) if kind else (run,)):
+                record = Record(*row)
+                if is_damaged(record):
+                    what = f"record {record.number} ({record.kind} of run {run})"
+                    raise StoreError(f"{self.path}: {what} is damaged; `cmmlink verify` says more")
+                yield record
+
+    def totals(self, run: str) -> dict[str, tuple[int, int]]:
+        """Records and what they hold together (reads, points, ...), by kind."""
+        query = "SELECT kind, count(*), sum(count) FROM record WHERE run = ? GROUP BY kind"
+        with _translated(self.path):
+            return {kind: (records, count) for kind, records, count in self._connection.execute(query, (run,))}
+
+    def begins_and_ends(self) -> list[tuple[Record, Record | None]]:
+        """The first and, unless it is open, the last record of every run, oldest run first."""
+        query = f"SELECT {_COLUMNS} FROM record WHERE kind IN ('run', 'end') ORDER BY number"
+        found: dict[str, tuple[Record, Record | None]] = {}
+        with _translated(self.path):
+            for record in (Record(*row) for row in self._connection.execute(query)):
+                if record.kind == "run":
+                    found[record.run] = record, None
+                elif record.run in found:
+                    found[record.run] = found[record.run][0], record
+        return list(found.values())
+
+    def first_alteration(self, run: str | None = None) -> tuple[Alteration | None, int, bytes]:
+        """Recompute the chain over a run, or over all; returns the first alteration, the number of sound records and the last hash."""
+        try:
+            first, number, previous = self._where(run)
+            rows = self._connection.execute(f"SELECT {_COLUMNS} FROM record WHERE number BETWEEN ? AND ? ORDER BY number", (first, number))
+            found, stopped, last = first_alteration((Record(*row) for row in rows), first, previous)
+            if found is None and stopped <= number:
+                found = Alteration(stopped, "", "", f"is missing, as is all up to record {number}: deleted from the end")
+            if found is None and run is None:
+                found = self._unsound_file(number)
+        except sqlite3.DatabaseError as error:
+            return Alteration(0, "", "", f"cannot be read: the file is damaged ({error})"), 0, b""
+        return found, stopped - first, last
+
+    def _where(self, run: str | None) -> tuple[int, int, bytes]:
+        """First and last number of a run (or of all), and the hash before it."""
+        execute = self._connection.execute
+        if run is None:
+            known = execute("SELECT seq FROM sqlite_sequence WHERE name = 'record'").fetchone()
+            return 1, known[0] if known else 0, GENESIS
+        (first,) = execute("SELECT min(number) FROM record WHERE run = ? AND kind = 'run'", (run,)).fetchone()
+        (following,) = execute("SELECT min(number) FROM record WHERE number > ? AND kind = 'run'", (first,)).fetchone()
+        before = execute("SELECT sha256 FROM record WHERE number = ?", (first - 1,)).fetchone()
+        return first, following - 1 if following else self._where(None)[1], before[0] if before else GENESIS
+
+    def _unsound_file(self, number: int) -> Alteration | None:
+        """What the chain does not reach: records beyond its end, and the file around them."""
+        (beyond,) = self._connection.execute("SELECT max(number) FROM record").fetchone()
+        if (beyond or 0) > number:
+            return Alteration(number + 1, "", "", "was added without being counted")
+        (report,) = self._connection.execute("PRAGMA integrity_check(1)").fetchone()
+        return None if report == "ok" else Alteration(0, "", "", f"every record is sound, but the file is damaged: {report}")
+
+    def _prepare(self, writing: bool, migrations: Sequence[str]) -> None:
+        (version,) = self._connection.execute("PRAGMA user_version").fetchone()
+        (application,) = self._connection.execute("PRAGMA application_id").fetchone()
+        (tables,) = self._connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
+        if tables and application != APPLICATION_ID:
+            raise StoreError(f"{self.path}: this is no file of records of cmmlink; choose another folder with --records DIR")
+        if version > len(migrations):
+            raise StoreError(
+                f"{self.path}: written by a newer cmmlink (schema {version}; this one knows up to {len(migrations)}); "
+                "update cmmlink, or choose another folder with --records DIR"
+            )
+        if version < len(migrations):
+            self._migrate(version, migrations, writing)
+        if writing:
+            self._be_durable()
+        found = self._connection.execute("SELECT number, sha256 FROM record ORDER BY number DESC LIMIT 1").fetchone()
+        self._head = found or (0, GENESIS)
+        if writing and not isinstance(self._head[1], bytes):
+            raise StoreError(f"{self.path}: its last record was altered; keep it as it is and choose another folder with --records DIR")
+
+    def _migrate(self, version: int, migrations: Sequence[str], writing: bool) -> None:
+        lock = None if writing else StationLock(self.path.parent / "station.lock")
+        try:
+            if self._found_empty and lock is not None and not self.path.stat().st_size:  # nobody is making it just now
+                raise StoreError(f"{self.path}: the file is empty: what was recorded in it is gone. Move it away to begin a new one")
+            for target, script in enumerate(migrations[version:], start=version + 1):
+                # One transaction each: after a kill the file is of the old version or of the new one.
+                mark = f"PRAGMA application_id = {APPLICATION_ID}; PRAGMA user_version = {target};"
+                self._connection.executescript(f"BEGIN IMMEDIATE; {script}; {mark} COMMIT;")
+        finally:
+            if lock is not None:
+                lock.release()
+
+    def _be_durable(self) -> None:
+        execute = self._connection.execute
+        (mode,) = execute("PRAGMA journal_mode = WAL").fetchone()
+        if mode != "wal":
+            why = "this folder cannot keep a crash-safe record (is it on a network share?)"
+            raise StoreError(f"{self.path}: {why}; choose another with --records DIR")
+        execute("PRAGMA synchronous = FULL")
+        execute("PRAGMA fullfsync = ON")  # macOS: through the drive's own cache as well
+        execute("PRAGMA journal_size_limit = 16777216")
+
+    def _unlock(self) -> None:
+        if self._lock is not None:
+            self._lock.release()
+
+
+def _connected(path: Path) -> sqlite3.Connection:
+    # Records on a write-protected medium can be read all the same, as long as nobody writes them.
+    protected = path.is_file() and not (os.access(path, os.W_OK) and os.access(path.parent, os.W_OK))
+    left = path.with_name(path.name + "-wal")
+    if protected and left.is_file() and left.stat().st_size:
+        what = f"its last records are still in {left.name}, which cannot be read where nothing can be written"
+        raise StoreError(f"{path}: {what}; copy the whole folder to a disk that can be written, and read it there")
+    address = path.resolve().as_uri() + ("?immutable=1" if protected else "")
+    address = re.sub("^file://(?=[^/])", "file:////", address)  # a network share: to SQLite, the server belongs to the path
+    return sqlite3.connect(address, uri=True, timeout=_PATIENCE_S, isolation_level=None, check_same_thread=False)
+
+
+@contextmanager
+def _transaction(connection: sqlite3.Connection) -> Iterator[None]:
+    connection.execute("BEGIN IMMEDIATE")
+    try:
+        yield
+        connection.execute("COMMIT")
+    except BaseException:
+        if connection.in_transaction:  # SQLite has rolled back by itself after some failures
+            connection.execute("ROLLBACK")
+        raise
+
+
+@contextmanager
+def _translated(path: Path) -> Iterator[None]:
+    """Turn what SQLite says into a message that says what to do."""
+    try:
+        yield
+    except sqlite3.Error as error:
+        raise StoreError(f"{path}: {_reason(error, path)}") from error
+
+
+def _reason(error: sqlite3.Error, path: Path) -> str:
+    code = getattr(error, "sqlite_errorcode", 0) & 0xFF
+    if code in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR):
+        free = shutil.disk_usage(path.parent).free / 1e6
+        return f"{error} ({free:.1f} MB free); free some space, or keep the records elsewhere with --records DIR"
+    if code in (sqlite3.SQLITE_READONLY, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_PERM):
+        return f"{error}; is the folder writable? --records DIR chooses another"
+    if code in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB):
+        return f"{error}: the file is damaged; keep it as it is and choose another folder with --records DIR"
+    return str(error)

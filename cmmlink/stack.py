@@ -1,0 +1,323 @@
+"""Sections of a CT surface, inspected one after the other by the path that every scan takes.
+
+Surface -> slices -> a contour source each -> the pipeline -> verdicts. The outline of a section is its longest outer contour;
+where that is open, all open pieces together. What lies beside it is counted and told, never judged in silence.
+"""
+
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cmmlink.errors import PlanError
+from cmmlink.events import Counts, RunStarted
+from cmmlink.from_plan import pose_of
+from cmmlink.nominal_files import load_nominal, material_side
+from cmmlink.pipeline import RunOutcome, run_inspection
+from cmmlink.plan.surface import CtPlan
+from cmmlink.result_json import summary
+from drivers.surface.contour_source import Contour, ContourSource, Slice, with_points_between
+from drivers.surface.cut import Cutter, NumpyCutter, cut_surface, height_range_mm
+from drivers.surface.open3d_process import Open3DMissing, Open3DProcess
+from drivers.surface.stl_file import SurfaceMesh, read_stl
+from inspection import LiveInspection, NominalProfile, RegistrationError, SectionPlane, Verdict, discretize
+
+_FEW_SECTIONS = 50  # up to here Open3D costs less than half a second; numpy gives the same points, a stack of 200 twice as fast
+_MOST_SECTIONS = 100_000
+_BUFFER_POINTS = 500_000
+_SAME_HEIGHT_MM = 1e-9
+_ALMOST_CLOSED = 0.05  # of the length: a blunt trailing edge
+_LENGTHS_APART = 1.5  # the roughness of a noisy surface adds a tenth at most
+_LEAST_POINTS = 400  # on a profile's length; where a surface is coarser, points on its facets are judged, not its corners alone
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SectionOutcome:
+    """One section: where it was cut, what it was held against, what came of it, and what was not as it should be."""
+
+    slice: Slice
+    judged: tuple[Contour, ...]
+    nominal_file: Path
+    profile: NominalProfile
+    run: RunOutcome
+    warnings: tuple[str, ...]
+
+    @property
+    def verdict(self) -> Verdict:
+        """Uncertain where nothing could be judged."""
+        return self.run.result.verdict if self.run.result is not None else Verdict.UNCERTAIN
+
+    def facts(self) -> dict[str, Any]:
+        """The section as JSON holds it."""
+        cut = self.slice
+        return {
+            "height_mm": cut.height_mm,
+            "asked_height_mm": cut.asked_mm,
+            "contours": len(cut.contours),
+            "holes": sum(contour.hole for contour in cut.contours),
+            "open_contours": len(cut.gaps),
+            "set_aside": cut.set_aside,
+            "set_aside_longest_mm": float(cut.set_aside_mm[0]) if cut.set_aside else None,
+            "cutter": cut.cutter,
+            "nominal": str(self.nominal_file),
+            **summary(self.run.result, self.run.counts),
+            "warnings": list(self.warnings),
+        }
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StackOutcome:
+    """The sections of a surface that were inspected, of `asked` ones; `notes` are what holds for all of them."""
+
+    mesh: SurfaceMesh
+    sections: tuple[SectionOutcome, ...]
+    asked: int
+    notes: tuple[str, ...]
+
+    @property
+    def complete(self) -> bool:
+        """Whether no section that was asked for is missing."""
+        return len(self.sections) == self.asked
+
+    @property
+    def verdict(self) -> Verdict:
+        """That of the worst section; not better than uncertain when the stack was cut short."""
+        worst = max(section.verdict for section in self.sections)
+        return worst if self.complete else max(worst, Verdict.UNCERTAIN)
+
+    def facts(self) -> dict[str, Any]:
+        """The stack as JSON holds it."""
+        slices = [section.facts() for section in self.sections]
+        return {
+            "verdict": self.verdict.word,
+            "complete": self.complete,
+            "mesh": self.mesh.source,
+            "mesh_kind": self.mesh.kind,
+            "triangles": self.mesh.triangles,
+            **{key: sum(facts[key] for facts in slices) for key in ("received", "judged", "rejected", "lost", "out_of_tolerance")},
+            "slices": slices,
+            "notes": list(self.notes),
+        }
+
+
+def inspect_stack(
+    plan: CtPlan,
+    *,
+    clock: Callable[[], float],
+    stop: threading.Event,
+    on_start: Callable[[int], None] = lambda sections: None,
+    on_section: Callable[[SectionOutcome], None] = lambda section: None,
+) -> StackOutcome:
+    """Cut and inspect every section of the plan; `on_start` hears how many, `on_section` each as it is done. `stop` ends after one.
+
+    Raises PlanError, NominalError and MeshError for what cannot be used, RegistrationError when no section fits its nominal.
+    """
+    profiles = _Profiles(plan)
+    with ExitStack() as stack:
+        open3d = _Open3D(stack)
+        mesh = _read(plan, open3d)
+        heights = _heights(plan, mesh)
+        _check_own_nominals(plan, heights)
+        on_start(len(heights))
+        notes = [*mesh.warnings, *profiles.notes]
+        sections = []
+        for cut in _slices(plan, mesh, heights, open3d, notes):
+            sections.append(_inspect(plan, cut, profiles, clock, stop))
+            on_section(sections[-1])
+            if stop.is_set():
+                notes.append(f"aborted by the operator after {len(sections)} of {len(heights)} sections")
+                break
+    if all(section.run.result is None for section in sections) and sections[0].run.refusal is not None:
+        raise sections[0].run.refusal
+    return StackOutcome(mesh, tuple(sections), len(heights), tuple(notes))
+
+
+class _Open3D:
+    """The process with Open3D, started when it is first wanted and ended with the stack it is entered in."""
+
+    def __init__(self, stack: ExitStack) -> None:
+        self._stack = stack
+        self._process: Open3DProcess | None = None
+
+    def __call__(self) -> Open3DProcess:
+        if self._process is None:
+            self._process = self._stack.enter_context(Open3DProcess())
+        return self._process
+
+
+def _read(plan: CtPlan, open3d: Callable[[], Open3DProcess]) -> SurfaceMesh:
+    path, scale = plan.mesh.file, plan.mesh.scale
+    suffix = path.suffix.lower()
+    if suffix == ".stl":
+        return read_stl(path, scale)
+    if suffix not in (".ply", ".obj"):
+        raise PlanError(f"{path}: no surface file is known by the suffix '{suffix}'; expected .stl, .ply or .obj")
+    try:
+        return open3d().read(path, scale)
+    except Open3DMissing as error:
+        raise PlanError(f"{path}: {suffix[1:].upper()} is read by Open3D. {error}. Or export the surface as STL") from None
+
+
+def _heights(plan: CtPlan, mesh: SurfaceMesh) -> list[float]:
+    where = plan.sections
+    if where.every_mm is None:
+        return list(where.heights_mm)
+    low, high = height_range_mm(mesh, where.normal)
+    start = low + where.every_mm / 2 if where.from_mm is None else where.from_mm
+    end = high if where.to_mm is None else where.to_mm
+    count = int(np.floor((end - start) / where.every_mm + 1e-9)) + 1
+    if not 1 <= count <= _MOST_SECTIONS:
+        raise PlanError(
+            f"a section every {where.every_mm:g} mm from {start:g} to {end:g} mm makes {max(count, 0)}; expected 1 to {_MOST_SECTIONS} "
+            f"(the surface spans {low:.3f} to {high:.3f} mm along the normal)"
+        )
+    return [start + index * where.every_mm for index in range(count)]
+
+
+def _check_own_nominals(plan: CtPlan, heights: Sequence[float]) -> None:
+    for at in plan.sections.nominal_at:
+        nearest = min(heights, key=lambda height: abs(height - at.height_mm))
+        if abs(nearest - at.height_mm) > _SAME_HEIGHT_MM:
+            raise PlanError(
+                f"{at.file}: a nominal for height {at.height_mm:g} mm, which is none of the sections; the nearest is {nearest:g} mm"
+            )
+
+
+class _Profiles:
+    """The nominal profile of each section; each file is read once."""
+
+    def __init__(self, plan: CtPlan) -> None:
+        self._plan = plan
+        self._own = {at.height_mm: at.file for at in plan.sections.nominal_at}
+        self._profiles: dict[Path, NominalProfile] = {}
+        self.notes: list[str] = []
+        for path in (plan.nominal.file, *self._own.values()):
+            self._load(path)
+
+    def at(self, height_mm: float) -> tuple[Path, NominalProfile]:
+        near = [path for height, path in self._own.items() if abs(height - height_mm) <= _SAME_HEIGHT_MM]
+        path = near[0] if near else self._plan.nominal.file
+        return path, self._profiles[path]
+
+    def _load(self, path: Path) -> None:
+        nominal = self._plan.nominal
+        file = load_nominal(path, nominal.scale, nominal.closed)
+        side = nominal.material or material_side(file.curve)
+        if side is None:
+            raise PlanError(f"{path}: an open profile does not show on which side its material lies; say material left or right")
+        self.notes += [f"{path.name}: {note}" for note in file.notes]
+        self._profiles[path] = discretize(file.curve, material=side)
+
+
+def _slices(
+    plan: CtPlan, mesh: SurfaceMesh, heights: list[float], open3d: Callable[[], Open3DProcess], notes: list[str]
+) -> Iterator[Slice]:
+    """Slices by the cutter of the plan; where Open3D is missing or breaks down, the rest by numpy, and a note says so."""
+    cutter = _cutter(plan, len(heights), open3d, notes)
+    done = 0
+    try:
+        for cut in _cut(plan, mesh, heights, cutter):
+            yield cut
+            done += 1
+    except Open3DMissing as error:
+        notes.append(f"sections from {heights[done]:g} mm on were cut by numpy: {error}")
+        yield from _cut(plan, mesh, heights[done:], NumpyCutter())
+
+
+def _cut(plan: CtPlan, mesh: SurfaceMesh, heights: list[float], cutter: Cutter) -> Iterator[Slice]:
+    return cut_surface(mesh, plan.sections.normal, heights, cutter=cutter, weld_mm=plan.cut.weld_mm, shortest_mm=plan.cut.shortest_mm)
+
+
+def _cutter(plan: CtPlan, sections: int, open3d: Callable[[], Open3DProcess], notes: list[str]) -> Cutter:
+    wanted = plan.cut.cutter
+    if wanted == "numpy" or (wanted == "auto" and sections > _FEW_SECTIONS):
+        return NumpyCutter()
+    status = open3d().status()
+    if status.version is not None:
+        return open3d()
+    if wanted == "open3d":
+        raise PlanError(f"{status.sentence()}; or cut with numpy, which gives the same points")
+    notes.append(f"cut by numpy. {status.sentence()}")
+    return NumpyCutter()
+
+
+def _inspect(plan: CtPlan, cut: Slice, profiles: _Profiles, clock: Callable[[], float], stop: threading.Event) -> SectionOutcome:
+    """One section through the pipeline; an outline that cannot be this profile is refused before anything is fitted."""
+    path, profile = profiles.at(cut.asked_mm)
+    outline = _outline(cut)
+    spacing_mm = profile.length_mm / _LEAST_POINTS
+    judged = tuple(with_points_between(contour, spacing_mm) for contour in outline)
+    other_part = _other_part(cut, outline, profile)
+    run = _refused(judged, other_part) if other_part else _run(plan, cut, judged, profile, clock, stop)
+    warnings = list(_all_warnings(cut, outline, run))
+    if _points_in(judged) > _points_in(outline):
+        warnings.append(f"a coarse surface: points were set between its corners, no farther apart than {spacing_mm:.3f} mm")
+    return SectionOutcome(cut, judged, path, profile, run, tuple(warnings))
+
+
+def _run(
+    plan: CtPlan, cut: Slice, judged: tuple[Contour, ...], profile: NominalProfile, clock: Callable[[], float], stop: threading.Event
+) -> RunOutcome:
+    registration = plan.registration
+    live = LiveInspection(
+        profile,
+        plan.tolerance.zone,
+        datum=pose_of(registration.datum),
+        fit=registration.fit,
+        method=registration.method,
+        section=SectionPlane(cut.height_mm * cut.axes.normal, cut.axes.x, cut.axes.normal),
+        coverage_min=registration.coverage_min,
+        reject_outliers=registration.reject_outliers,
+        provisional=False,
+    )
+    source = ContourSource(judged, plan.mesh.file.name)
+    started = RunStarted(plan.part.name, plan.part.serial_number or "", "", f"surface {plan.mesh.file.name}", simulated=False)
+    return run_inspection(source, live, [], started, buffer_points=_BUFFER_POINTS, clock=clock, stop=stop)
+
+
+def _other_part(cut: Slice, outline: tuple[Contour, ...], profile: NominalProfile) -> RegistrationError | None:
+    """Why a closed outline cannot be the section of a nominal that goes round: the lengths are too far apart."""
+    gap_mm = float(np.hypot(*(profile.points_mm[-1] - profile.points_mm[0])))
+    goes_round = profile.curve.closed or gap_mm < _ALMOST_CLOSED * profile.length_mm
+    if not (outline and outline[0].closed and goes_round):
+        return None
+    share = outline[0].length_mm / profile.length_mm
+    if 1 / _LENGTHS_APART < share < _LENGTHS_APART:
+        return None
+    return RegistrationError(
+        f"the outline at height {cut.asked_mm:g} mm is {outline[0].length_mm:.2f} mm long, the nominal {profile.length_mm:.2f} mm: "
+        "this is no section of the part. Check the height, the normal, the unit of the surface and the scale of the nominal"
+    )
+
+
+def _refused(judged: tuple[Contour, ...], refusal: RegistrationError) -> RunOutcome:
+    count = _points_in(judged)
+    counts = Counts(received=count, rejected=count, rejected_by_reason={"not registered": count})
+    return RunOutcome("complete", None, counts, None, refusal)
+
+
+def _points_in(contours: tuple[Contour, ...]) -> int:
+    return sum(len(contour.points_mm) for contour in contours)
+
+
+def _outline(cut: Slice) -> tuple[Contour, ...]:
+    """The contours that make the section's outline."""
+    outer = cut.outer()
+    if not outer or outer[0].closed:
+        return outer[:1]
+    return tuple(contour for contour in outer if not contour.closed)
+
+
+def _all_warnings(cut: Slice, outline: tuple[Contour, ...], run: RunOutcome) -> Iterator[str]:
+    yield from cut.warnings
+    beside = [contour for contour in cut.contours if not any(contour is part for part in outline)]
+    if beside:
+        holes = sum(contour.hole for contour in beside)
+        longest = beside[0].length_mm
+        yield f"{len(beside)} further contour(s) beside the outline, {holes} of them holes, are not judged; the longest is {longest:.2f} mm"
+    if run.refusal is not None:
+        yield str(run.refusal)

@@ -1,0 +1,31 @@
+"""Which wire formats there are: every `*_frames.py` of this package that says `DECODERS`. A new one needs no entry here."""
+
+import importlib
+import inspect
+import pkgutil
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from drivers.source import Decoder
+
+
+def decoders() -> Mapping[str, Callable[..., Decoder]]:
+    """Return what makes a decoder, by the name of its format."""
+    found: dict[str, Callable[..., Decoder]] = {}
+    for module in pkgutil.iter_modules([str(Path(__file__).parent)]):
+        if module.name.endswith("_frames"):
+            found.update(importlib.import_module(f"{__package__}.{module.name}").DECODERS)
+    return found
+
+
+def decoder(name: str, **options: object) -> Decoder:
+    """Make the decoder of a format; raise `ValueError` naming what is missing, unknown or out of range."""
+    known = decoders()
+    if name not in known:
+        raise ValueError(f"format {name!r} is none of {', '.join(sorted(known))}")
+    try:
+        inspect.signature(known[name]).bind(**options)
+    except TypeError as error:
+        expected = ", ".join(inspect.signature(known[name]).parameters) or "nothing"
+        raise ValueError(f"format {name}: {error}; it takes {expected}") from None
+    return known[name](**options)

@@ -1,0 +1,203 @@
+r"""The ASCII line format, defined here, and its decoder.
+
+Every line ends with `*`, the CRC-16/CCITT-FALSE of all bytes before the `*` as four upper-case hexadecimal digits,
+carriage return and line feed. Decimal point only, no exponent, no blanks.
+
+    S,<device>,<serial number>,<unit>,<count>   opens a scan. Names: printable characters but comma and asterisk.
+                                                Unit: mm, um, cm, m, inch. Count: points to come; empty if unknown.
+    P,<seq>,<t_us>,<x>,<y>,<z>,<flags>          one point. seq: 0 for the first point of a scan, wraps after 4294967295.
+                                                t_us: microseconds by the device's clock, wraps after 4294967295.
+                                                flags: decimal 0 to 255; bit 0 set: the device marks the point invalid;
+                                                the other bits are free for the device and not judged here.
+    H,<seq>,<t_us>                              heartbeat: alive, nothing to send; seq: number of the next point.
+    E,<count>                                   closes the scan; count: points sent, so that a lost tail shows.
+
+The device may repeat S before the first point and E after the last one, so that one damaged line does not cost the
+scan; repeats change nothing. The host sends `G` CR LF when it opens the link; a device that waits for a host
+begins (or goes on) then, others need not listen. Points without a scan header have no unit and are rejected,
+unless the unit is given to the decoder. S after points means that the device began anew.
+"""
+
+import re
+from binascii import crc_hqx
+
+import numpy as np
+
+from drivers.codecs.sequence import SequenceCounter, WrappingClock
+from drivers.errors import ProtocolError
+from drivers.source import Arrival, Damaged, Heartbeat, Lost, PointBatch, Rejected, ScanClosed, ScanOpened
+
+MM_PER_UNIT = {"mm": 1.0, "um": 1e-3, "cm": 10.0, "m": 1000.0, "inch": 25.4}
+LONGEST_LINE = 256  # bytes before the line feed; anything longer is garbage
+WRAP = 1 << 32
+INVALID = 1  # bit 0 of flags
+
+NUMBER = rb"-?[0-9]{1,12}(?:\.[0-9]{1,12})?"
+POINT = re.compile(rb"P,([0-9]{1,10}),([0-9]{1,10}),(%b),(%b),(%b),([0-9]{1,3})" % (NUMBER, NUMBER, NUMBER))
+HEARTBEAT = re.compile(rb"H,([0-9]{1,10}),([0-9]{1,10})")
+OPENING = re.compile(rb"S,([ -)+\x2d-~]*),([ -)+\x2d-~]*),([a-z]+),([0-9]{0,10})")
+CLOSING = re.compile(rb"E,([0-9]{1,10})")
+
+
+class AsciiDecoder:
+    """Bytes of the ASCII line format to arrivals in millimetres."""
+
+    def __init__(self, unit: str | None = None) -> None:
+        if unit is not None and unit not in MM_PER_UNIT:
+            raise ValueError(f"unit {unit!r} is none of {', '.join(MM_PER_UNIT)}")
+        self._mm_per_unit = None if unit is None else MM_PER_UNIT[unit]
+        self._header: bytes | None = None
+        self._pending = b""
+        self._overlong = False
+        self._out: list[Arrival] = []
+        self._asked = False
+        self._begin()
+
+    def request(self) -> bytes:
+        """Tell a device that waits for its host, once after each opening of the link, to begin."""
+        asked, self._asked = self._asked, True
+        return b"" if asked else b"G\r\n"
+
+    def feed(self, data: bytes) -> list[Arrival]:
+        """Decode the next bytes."""
+        lines = (self._pending + data).split(b"\n")
+        self._pending = lines.pop()
+        self._lines(lines)
+        self._pending = self._without_excess(self._pending)
+        return self._handed_over()
+
+    def interrupted(self) -> list[Arrival]:
+        """Count the begun line, if any, as damaged."""
+        if self._pending:
+            self._damaged(len(self._pending), "line cut off where the link ended")
+        self._pending, self._overlong, self._asked = b"", False, False
+        return self._handed_over()
+
+    def _begin(self) -> None:
+        self._counter = SequenceCounter(WRAP)
+        self._closed = False
+        self._clock = WrappingClock(WRAP, 1e6)
+        self._sequence: list[int] = []
+        self._raw_us: list[int] = []
+        self._xyz: list[float] = []
+
+    def _lines(self, lines: list[bytes]) -> None:
+        """Take whole lines: points in sequence here, where speed counts, everything else elsewhere."""
+        counter = self._counter
+        expected = counter.expected
+        for line in lines:
+            body = line[:-6]
+            found = POINT.fullmatch(body)
+            if found is not None and not self._overlong and line[-6:] == b"*%04X\r" % crc_hqx(body, 0xFFFF):
+                sequence, raw_us, x, y, z, flags = found.groups()
+                if int(sequence) == expected and flags == b"0" and not self._closed:
+                    self._sequence.append(expected)
+                    self._raw_us.append(int(raw_us))
+                    self._xyz += (float(x), float(y), float(z))
+                    expected += 1
+                    continue
+            counter.expected = expected
+            self._other_line(line)
+            counter = self._counter
+            expected = counter.expected
+        counter.expected = expected
+
+    def _other_line(self, line: bytes) -> None:
+        """Take a line that is not simply the next good point."""
+        rest = self._without_excess(line)
+        overlong, self._overlong = self._overlong, False
+        if overlong:
+            self._damaged(len(rest) + 1, "no line end in time")
+            return
+        body = rest[:-6]
+        if rest[-6:] != b"*%04X\r" % crc_hqx(body, 0xFFFF):
+            self._damaged(len(rest) + 1, "checksum wrong" if len(rest) > 6 and rest[-6:-5] == b"*" else "not a whole line")
+        elif found := POINT.fullmatch(body):
+            self._point(found)
+        elif found := HEARTBEAT.fullmatch(body):
+            self._lost(self._counter.reach(int(found[1])))
+            self._append(Heartbeat())
+        elif found := OPENING.fullmatch(body):
+            self._opened(body, found)
+        elif found := CLOSING.fullmatch(body):
+            self._close(int(found[1]))
+        else:
+            self._damaged(len(rest) + 1, "sound line of unknown form")
+
+    def _point(self, found: re.Match[bytes]) -> None:
+        sequence, raw_us, x, y, z, flags = found.groups()
+        if self._closed:
+            self._append(Rejected(1, "sent after the end of the scan"))
+            return
+        place = self._counter.place(int(sequence))
+        if place.repeated:
+            self._append(Rejected(1, "frame repeated"))
+            return
+        self._lost(place.lost)
+        if int(flags) & INVALID:
+            self._append(Rejected(1, "marked invalid by the device"))
+            return
+        self._sequence.append(place.sequence)
+        self._raw_us.append(int(raw_us))
+        self._xyz += (float(x), float(y), float(z))
+
+    def _opened(self, body: bytes, found: re.Match[bytes]) -> None:
+        if body == self._header and self._counter.expected == 0:
+            return  # said once more before the first point
+        device, serial_number, unit, count = (group.decode("ascii") for group in found.groups())
+        if unit not in MM_PER_UNIT:
+            known = ", ".join(MM_PER_UNIT)
+            raise ProtocolError(f"{device} {serial_number} sends points in {unit!r}; set the device to one of {known}")
+        self._flush()
+        self._begin()
+        self._header, self._mm_per_unit = body, MM_PER_UNIT[unit]
+        self._append(ScanOpened(device, serial_number, int(count) if count else None))
+
+    def _close(self, count: int) -> None:
+        if self._closed:
+            return
+        self._lost(self._counter.reach(count % WRAP))
+        self._closed = True
+        self._append(ScanClosed(count))
+
+    def _without_excess(self, line: bytes) -> bytes:
+        """Count what no line can hold as damage at fixed places, so that garbage without a line end needs no memory."""
+        while len(line) > LONGEST_LINE:
+            self._damaged(LONGEST_LINE, "no line end in time")
+            line = line[LONGEST_LINE:]
+            self._overlong = True
+        return line
+
+    def _damaged(self, byte_count: int, reason: str) -> None:
+        self._append(Damaged(byte_count, reason))
+
+    def _lost(self, count: int) -> None:
+        if count:
+            self._append(Lost(count, "gap in the sequence numbers" if count > 0 else "arrived late after all"))
+
+    def _append(self, arrival: Arrival) -> None:
+        self._flush()
+        self._out.append(arrival)
+
+    def _flush(self) -> None:
+        """Turn the points collected so far into one batch."""
+        if not self._sequence:
+            return
+        sequence, raw_us, xyz = self._sequence, self._raw_us, self._xyz
+        self._sequence, self._raw_us, self._xyz = [], [], []
+        if self._mm_per_unit is None:
+            self._out.append(Rejected(len(sequence), "no scan header arrived: the unit is unknown"))
+            return
+        points_mm = np.array(xyz).reshape(-1, 3)
+        if self._mm_per_unit != 1.0:
+            points_mm = points_mm * self._mm_per_unit
+        time_s = np.array(self._clock.ticks(raw_us)) / 1e6
+        self._out.append(PointBatch(np.array(sequence), time_s, points_mm))
+
+    def _handed_over(self) -> list[Arrival]:
+        self._flush()
+        out, self._out = self._out, []
+        return out
+
+
+DECODERS = {"ascii": AsciiDecoder}

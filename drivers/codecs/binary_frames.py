@@ -1,0 +1,248 @@
+"""The counted binary format, defined here, and its decoder.
+
+All numbers are little-endian. A frame has 24 bytes:
+
+    A5 5A | type u8 | flags u8 | seq u16 | t_us u32 | 12 bytes | CRC-16/CCITT-FALSE u16 over the 22 bytes before it
+
+    type 0  opens a scan: serial number u32, announced count u64 (0: unknown). seq and t_us mean nothing.
+    type 1  one point: x, y, z i32 in 1e-5 mm. seq: 0 for the first point of a scan, wraps. t_us: the device's clock, wraps.
+            flags bit 0: the device marks the point invalid; the other bits are free for the device.
+    type 2  heartbeat: number of points sent so far u64, 4 bytes free. seq: number of the next point.
+    type 3  closes the scan: number of points sent u64, 4 bytes free.
+
+A fast scanner sends its points in blocks instead, between the same opening, heartbeats and closing:
+
+    A5 5B | n u16 | seq u32 | t_us u64 | CRC-16/CCITT-FALSE u16 over the 16 bytes before it
+    n times: dt_us u32 since t_us | x, y, z i32 in 1e-5 mm | flags u16
+    CRC-32 (IEEE 802.3) u32 over all bytes before it; n at most 1024
+
+Opening and closing may be repeated, as a damaged one is else not made up for. A 16-bit counter wraps within a link
+that was away for long: the clock then tells how often, and the next heartbeat or the closing corrects it. Devices
+send a heartbeat at least every 30,000 points.
+"""
+
+from binascii import crc32, crc_hqx
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.codecs.sequence import SequenceCounter, WrappingClock
+from drivers.source import Arrival, Damaged, Heartbeat, Lost, PointBatch, Rejected, ScanClosed, ScanOpened
+
+FRAME = np.dtype([("sync", "<u2"), ("type", "u1"), ("flags", "u1"), ("seq", "<u2"), ("t_us", "<u4"), ("xyz", "<i4", 3), ("crc", "<u2")])
+HEAD = np.dtype([("sync", "<u2"), ("n", "<u2"), ("seq", "<u4"), ("t_us", "<u8"), ("crc", "<u2")])
+BLOCK_POINT = np.dtype([("dt_us", "<u4"), ("xyz", "<i4", 3), ("flags", "<u2")])
+SIZE, CHECKED = FRAME.itemsize, FRAME.itemsize - 2
+SYNC, FRAME_SYNC, BLOCK_SYNC = b"\xa5", 0x5AA5, 0x5BA5
+LARGEST_BLOCK = 1024
+OPENING, POINT, HEARTBEAT, CLOSING = range(4)
+INVALID = 1
+UNITS_PER_MM = 1e5
+RUN = 256  # frames looked at together; a damaged one among them costs that many checksums at most
+
+
+class BinaryDecoder:
+    """Bytes of the counted binary format to arrivals in millimetres."""
+
+    def __init__(self) -> None:
+        self._pending = b""
+        self._out: list[Arrival] = []
+        self._asked = False
+        self._damage = 0
+        self._away = False
+        self._begin()
+
+    def request(self) -> bytes:
+        """Tell a device that waits for its host, once after each opening of the link, to begin."""
+        asked, self._asked = self._asked, True
+        return b"" if asked else b"G"
+
+    def feed(self, data: bytes) -> list[Arrival]:
+        """Decode the next bytes."""
+        data = self._pending + data
+        at = 0
+        while True:
+            at += self._run(data, at)
+            used = self._one(data, at)
+            if not used:
+                break
+            at += used
+        self._pending = data[at:]
+        return self._handed_over()
+
+    def interrupted(self) -> list[Arrival]:
+        """Count a begun frame as damaged; the counter may have wrapped when the link comes back."""
+        self._damage += len(self._pending)
+        self._pending, self._away, self._asked = b"", True, False
+        return self._handed_over()
+
+    def _begin(self) -> None:
+        self._counter = SequenceCounter(1 << 16)
+        self._clock = WrappingClock(1 << 32, 1e6)
+        self._opened = self._closed = self._in_blocks = False
+        self._last_us: int | None = None
+        self._last_sequence = -1
+        self._us_per_point = 0.0
+
+    def _run(self, data: bytes, start: int) -> int:
+        """Take good points in sequence, many at once; return the number of bytes used."""
+        count = min((len(data) - start) // SIZE, RUN)
+        if count < 2 or self._away or self._closed or self._damage:
+            return 0
+        frames = np.frombuffer(data, dtype=FRAME, count=count, offset=start)
+        places = range(start, start + count * SIZE, SIZE)
+        crc = np.array([crc_hqx(data[at : at + CHECKED], 0xFFFF) for at in places], dtype=np.uint16)
+        expected = (self._counter.expected + np.arange(count)) & 0xFFFF
+        plain = (frames["sync"] == FRAME_SYNC) & (frames["type"] == POINT) & (frames["flags"] == 0)
+        good = plain & (frames["crc"] == crc) & (frames["seq"] == expected)
+        if not good.all():
+            count = int(good.argmin())
+            if not count:
+                return 0
+            frames = frames[:count]
+        self._batch(self._counter.expected + np.arange(count), frames["t_us"].astype(np.int64), frames["xyz"])
+        self._counter.expected += count
+        return count * SIZE
+
+    def _one(self, data: bytes, at: int) -> int:
+        """Take one frame or step over what is none; return the number of bytes used, 0 if more are needed."""
+        left = len(data) - at
+        if left and data[at] != SYNC[0]:
+            found = data.find(SYNC, at)
+            return self._skip((found if found >= 0 else len(data)) - at)
+        if left < 2:
+            return 0
+        if data[at + 1] == FRAME_SYNC >> 8:
+            return self._frame(data[at : at + SIZE])
+        if data[at + 1] == BLOCK_SYNC >> 8:
+            return self._block(data, at)
+        return self._skip(1)
+
+    def _frame(self, frame: bytes) -> int:
+        if len(frame) < SIZE:
+            return 0
+        fields = np.frombuffer(frame, dtype=FRAME)[0]
+        if int(fields["crc"]) != crc_hqx(frame[:CHECKED], 0xFFFF) or fields["type"] > CLOSING:
+            return self._skip(1)
+        self._sound()
+        kind, total = int(fields["type"]), int.from_bytes(frame[10:18], "little")
+        if kind == POINT:
+            self._point(fields)
+        elif kind == OPENING:
+            self._open(frame)
+        elif kind == HEARTBEAT:
+            self._reach(total)
+            self._out.append(Heartbeat())
+        elif not self._closed:
+            self._reach(total)
+            self._closed = True
+            self._out.append(ScanClosed(total))
+        return SIZE
+
+    def _point(self, fields: np.void) -> None:
+        raw_us = int(fields["t_us"])
+        near = self._counter.expected + self._missed(raw_us) if self._away else None
+        self._away = False
+        if self._counts(self._counter.unwrap(int(fields["seq"]), near), int(fields["flags"])):
+            self._batch(np.array([self._placed]), np.array([raw_us]), fields["xyz"][None])
+
+    def _counts(self, sequence: int, flags: int) -> bool:
+        """Account for one frame; tell whether it is a point to hand on."""
+        if self._closed:
+            self._out.append(Rejected(1, "sent after the end of the scan"))
+            return False
+        place = self._counter.place(sequence, near=sequence)
+        self._placed = place.sequence
+        if place.repeated:
+            self._out.append(Rejected(1, "frame repeated"))
+            return False
+        self._lose(place.lost)
+        if flags & INVALID:
+            self._out.append(Rejected(1, "marked invalid by the device"))
+            return False
+        return True
+
+    def _block(self, data: bytes, at: int) -> int:
+        if len(data) - at < HEAD.itemsize:
+            return 0
+        head = np.frombuffer(data, dtype=HEAD, count=1, offset=at)[0]
+        count, body = int(head["n"]), at + HEAD.itemsize
+        if int(head["crc"]) != crc_hqx(data[at : body - 2], 0xFFFF) or not 0 < count <= LARGEST_BLOCK:
+            return self._skip(1)
+        end = body + count * BLOCK_POINT.itemsize
+        if len(data) < end + 4:
+            return 0
+        if int.from_bytes(data[end : end + 4], "little") != crc32(data[at:end]):
+            return self._skip(1)
+        self._sound()
+        points = np.frombuffer(data, dtype=BLOCK_POINT, count=count, offset=body)
+        self._block_points(self._unwrapped_32(int(head["seq"])), int(head["t_us"]) + points["dt_us"].astype(np.int64), points)
+        return end + 4 - at
+
+    def _block_points(self, first: int, t_us: NDArray[np.int64], points: NDArray[np.void]) -> None:
+        self._away, self._in_blocks = False, True  # the clock of blocks does not wrap
+        count = len(points)
+        if first >= self._counter.expected and not points["flags"].any() and not self._closed:
+            self._lose(self._counter.place(first, near=first).lost)
+            self._counter.expected = first + count
+            self._batch(first + np.arange(count), t_us, points["xyz"])
+            return
+        keep = np.array([self._counts(first + i, int(flags)) for i, flags in enumerate(points["flags"])])
+        if keep.any():
+            self._batch((first + np.arange(count))[keep], t_us[keep], points["xyz"][keep])
+
+    def _unwrapped_32(self, seq: int) -> int:
+        anchor, half = self._counter.expected, 1 << 31
+        return anchor + (seq - anchor + half) % (1 << 32) - half
+
+    def _open(self, frame: bytes) -> None:
+        if self._opened and self._counter.expected == 0:
+            return  # said once more before the first point
+        self._begin()
+        self._opened = True
+        count = int.from_bytes(frame[14:22], "little")
+        self._out.append(ScanOpened("counted binary frames", str(int.from_bytes(frame[10:14], "little")), count or None))
+
+    def _batch(self, sequence: NDArray[np.int64], t_us: NDArray[np.int64], xyz: NDArray[np.int32]) -> None:
+        self._learn_pace(int(sequence[-1]), int(t_us[-1]))
+        time_s = t_us / 1e6 if self._in_blocks else self._clock.seconds(t_us)
+        self._out.append(PointBatch(sequence, time_s, xyz / UNITS_PER_MM))
+
+    def _learn_pace(self, sequence: int, raw_us: int) -> None:
+        """Follow the time from point to point; a pause counts little."""
+        points = sequence - self._last_sequence
+        if self._last_us is not None and points > 0:
+            us = ((raw_us - self._last_us) % (1 << 32)) / points
+            self._us_per_point += 0.2 * (min(us, 2 * self._us_per_point) - self._us_per_point) if self._us_per_point else us
+        self._last_sequence, self._last_us = sequence, raw_us
+
+    def _missed(self, raw_us: int) -> int:
+        """Estimate from the clock how many points were taken while the link was away."""
+        if self._last_us is None or not self._us_per_point:
+            return 0
+        return round(((raw_us - self._last_us) % (1 << 32)) / self._us_per_point) - 1
+
+    def _reach(self, total: int) -> None:
+        self._lose(self._counter.reach_total(total))
+
+    def _lose(self, count: int) -> None:
+        if count:
+            self._out.append(Lost(count, "gap in the sequence numbers" if count > 0 else "arrived late after all"))
+
+    def _skip(self, count: int) -> int:
+        self._damage += count
+        return count
+
+    def _sound(self) -> None:
+        """Hand on what damage there was before a sound frame."""
+        if self._damage:
+            self._out.append(Damaged(self._damage, "no valid frame"))
+            self._damage = 0
+
+    def _handed_over(self) -> list[Arrival]:
+        self._sound()
+        out, self._out = self._out, []
+        return out
+
+
+DECODERS = {"binary": BinaryDecoder}

@@ -1,0 +1,193 @@
+"""RIFTEK RF60x distance sensors: the binary stream of nibbles, and the ASCII lines; decoders.
+
+Facts: manuals of RF602 (2019), p. 12-19, and RF605 (2011), p. 15-17. Request: address byte (bit 7 clear), then
+`80 | code`; codes: 1 identify, 6 one result, 7 stream of results, 8 stop. A result is a burst of four bytes
+`1 SB CNT1 CNT0 D3 D2 D1 D0`, low nibble first; CNT is the same within a burst and counts bursts modulo 4; SB set:
+renewed since the last transmission. Distance = value * range / 16384. ASCII: a request line, answered by a line.
+
+What this format cannot tell, and therefore nobody behind it: there is no checksum, so a flipped data bit is a wrong
+distance unless `largest_step_mm` gives it away; CNT counts modulo 4, so a loss of 4, 8, ... bursts in a row goes
+unseen, and the time, which is the number of the burst over the rate, is then wrong. After a lost link it would be
+anybody's guess: the scan has to begin anew. The ASCII lines carry no counter at all.
+
+Points are (0, 0, distance); an axis puts them where they belong.
+"""
+
+import re
+
+import numpy as np
+
+from drivers.errors import ProtocolError
+from drivers.source import Arrival, Damaged, Lost, PointBatch, Rejected, ScanClosed
+
+FULL_SCALE = 16384
+STREAM, STOP = 7, 8
+LONGEST_LINE = 64
+NUMBER = re.compile(rb"-?[0-9]{1,6}(\.[0-9]{1,6})?")
+
+
+class _Distances:
+    """Distances in order to arrivals; ends after `count` of them."""
+
+    def __init__(self, rate_hz: float, count: int | None, largest_step_mm: float | None) -> None:
+        self.expected = 0
+        self.closed = False
+        self._rate_hz = rate_hz
+        self._count = count
+        self._largest_step_mm = largest_step_mm
+        self._before_mm: float | None = None
+        self._numbers: list[int] = []
+        self._distances_mm: list[float] = []
+        self._out: list[Arrival] = []
+
+    def take(self, distance_mm: float, lost: int = 0, refused: str = "") -> None:
+        """Take the next distance, after `lost` missing ones, unless it is `refused` for a reason."""
+        if self.closed:
+            return
+        if lost:
+            self.say(Lost(lost, "gap in the burst counter"))
+        number = self.expected + lost
+        self.expected = number + 1
+        before_mm, self._before_mm = self._before_mm, distance_mm
+        if not refused and self._largest_step_mm is not None and before_mm is not None:
+            refused = "jump larger than the plan allows" if abs(distance_mm - before_mm) > self._largest_step_mm else ""
+        if refused:
+            self.say(Rejected(1, refused))
+        else:
+            self._numbers.append(number)
+            self._distances_mm.append(distance_mm)
+        if self._count is not None and self.expected >= self._count:
+            self.say(ScanClosed(None))
+            self.closed = True
+
+    def say(self, arrival: Arrival) -> None:
+        """Append an arrival behind the points so far."""
+        self._flush()
+        self._out.append(arrival)
+
+    def handed_over(self) -> list[Arrival]:
+        """Return everything since the last call."""
+        self._flush()
+        out, self._out = self._out, []
+        return out
+
+    def _flush(self) -> None:
+        if self._numbers:
+            sequence = np.array(self._numbers, dtype=np.int64)
+            points_mm = np.zeros((len(sequence), 3))
+            points_mm[:, 2] = self._distances_mm
+            self._out.append(PointBatch(sequence, sequence / self._rate_hz, points_mm))
+            self._numbers, self._distances_mm = [], []
+
+
+class RiftekDecoder:
+    """The binary stream.
+
+    range_mm, address   the sensor's measuring range and network address
+    rate_hz             its sampling rate: the only clock there is
+    count               the scan ends after so many bursts; None: it goes on
+    largest_step_mm     a larger step from burst to burst is rejected; None: everything is believed
+    """
+
+    def __init__(
+        self, range_mm: float, rate_hz: float, *, address: int = 1, count: int | None = None, largest_step_mm: float | None = None
+    ) -> None:
+        if not (range_mm > 0 and rate_hz > 0 and 1 <= address <= 127):
+            raise ValueError(f"range {range_mm} mm and rate {rate_hz} Hz must be positive, address {address} between 1 and 127")
+        self._range_mm = range_mm
+        self._address = address
+        self._distances = _Distances(rate_hz, count, largest_step_mm)
+        self._burst = b""
+        self._last_count: int | None = None
+        self._asked = self._away = False
+
+    def request(self) -> bytes:
+        """Ask, once, for the stream of results; for its end once the scan is over."""
+        if self._asked and not self._distances.closed:
+            return b""
+        self._asked = True
+        return bytes([self._address, 0x80 | (STOP if self._distances.closed else STREAM)])
+
+    def feed(self, data: bytes) -> list[Arrival]:
+        """Decode the next bytes; a burst counts once the next one begins, so that an inserted byte shows."""
+        if self._away:
+            raise ProtocolError("the RIFTEK burst counter cannot tell what was lost while the link was away; begin the scan anew")
+        for byte in data:
+            if byte < 0x80:
+                self._end_of_burst()
+                self._distances.say(Damaged(1, "byte of no answer"))
+            elif self._burst and (byte ^ self._burst[0]) & 0x70:
+                self._end_of_burst()
+                self._burst = bytes([byte])
+            elif len(self._burst) < 64:
+                self._burst += bytes([byte])
+            else:
+                self._distances.say(Damaged(1, "burst without end"))
+        return self._distances.handed_over()
+
+    def interrupted(self) -> list[Arrival]:
+        """Count the begun burst as damaged."""
+        if self._burst:
+            self._distances.say(Damaged(len(self._burst), "burst cut off where the link ended"))
+        self._burst, self._away = b"", True
+        return self._distances.handed_over()
+
+    def _end_of_burst(self) -> None:
+        bursts, self._burst = self._burst, b""
+        if len(bursts) % 4:
+            self._distances.say(Damaged(len(bursts), "burst of a wrong length"))
+            return
+        for start in range(0, len(bursts), 4):  # more than one where three in a row were lost between them
+            self._result(bursts[start : start + 4])
+
+    def _result(self, burst: bytes) -> None:
+        counter = burst[0] >> 4 & 3
+        lost = 0 if self._last_count is None else (counter - self._last_count - 1) % 4
+        self._last_count = counter
+        value = sum((byte & 15) << 4 * place for place, byte in enumerate(burst))
+        refused = "" if burst[0] & 0x40 else "not renewed since the last transmission"
+        if value > FULL_SCALE:
+            refused = "outside the measuring range"
+        self._distances.take(value * self._range_mm / FULL_SCALE, lost, refused)
+
+
+class RiftekAsciiDecoder:
+    """The ASCII lines: each request is answered by one line with the distance in mm; the next request follows the answer."""
+
+    def __init__(self, rate_hz: float, *, request_line: str = "R1", count: int | None = None, largest_step_mm: float | None = None) -> None:
+        if not rate_hz > 0:
+            raise ValueError(f"rate {rate_hz} Hz must be positive")
+        self._line = request_line.encode("ascii") + b"\r\n"
+        self._distances = _Distances(rate_hz, count, largest_step_mm)
+        self._pending = b""
+        self._waiting = 0
+
+    def request(self) -> bytes:
+        """Ask for the next distance when the last one is there, or has been waited for twenty times in vain."""
+        self._waiting = (self._waiting + 1) % 20
+        return self._line if self._waiting == 1 and not self._distances.closed else b""
+
+    def feed(self, data: bytes) -> list[Arrival]:
+        """Decode the next bytes."""
+        lines = (self._pending + data).split(b"\n")
+        self._pending = lines.pop()
+        for line in lines:
+            self._waiting = 0
+            if line.endswith(b"\r") and NUMBER.fullmatch(line[:-1]):
+                self._distances.take(float(line[:-1]))
+            else:
+                self._distances.say(Damaged(len(line) + 1, "line that is no distance"))
+        while len(self._pending) > LONGEST_LINE:
+            self._distances.say(Damaged(LONGEST_LINE, "no line end in time"))
+            self._pending = self._pending[LONGEST_LINE:]
+        return self._distances.handed_over()
+
+    def interrupted(self) -> list[Arrival]:
+        """Count the begun line as damaged."""
+        if self._pending:
+            self._distances.say(Damaged(len(self._pending), "line cut off where the link ended"))
+        self._pending, self._waiting = b"", 0
+        return self._distances.handed_over()
+
+
+DECODERS = {"riftek": RiftekDecoder, "riftek-ascii": RiftekAsciiDecoder}

@@ -1,0 +1,146 @@
+"""A scanner on a serial port, or on a TCP socket that stands for one: the only file of drivers that knows pyserial.
+
+Parity errors and overruns do not show through pyserial, on any system: checksums and counters in the format must
+tell them. What pyserial raises becomes a `LinkError` here.
+"""
+
+import os
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing
+
+import serial
+from serial.tools import list_ports
+
+from drivers.errors import DeviceError, LinkError, ProtocolError
+from drivers.links.reconnect import kept_up
+from drivers.source import Arrival, Damaged, Decoder, ScanClosed, WireBytes
+
+POLL_S = 0.05  # how long a read waits before it looks whether to stop
+LARGEST_READ = 1 << 16
+
+
+def ports() -> list[tuple[str, str]]:
+    """Return the serial ports of this computer: name and what the system says of it."""
+    return [(port.device, port.description) for port in list_ports.comports()]
+
+
+class SerialScanner:
+    """Points of one scan from a serial address: a port name, `host:port` or any address pyserial knows."""
+
+    def __init__(
+        self,
+        address: str,
+        decoder: Decoder,
+        *,
+        baud_rate: int = 115_200,
+        parity: str = serial.PARITY_NONE,
+        silence_s: float = 3.0,
+        reconnect_s: float = 0.0,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """Without a byte for `silence_s` the link counts as lost; a lost link is tried again for `reconnect_s`."""
+        self._address = serial_address(address)
+        self._decoder = decoder
+        self._baud_rate = baud_rate
+        self._parity = parity
+        self._silence_s = silence_s
+        self._reconnect_s = reconnect_s
+        self._clock = clock
+        self._stopped = threading.Event()
+
+    def stop(self) -> None:
+        """End `arrivals` within half a second."""
+        self._stopped.set()
+
+    def arrivals(self) -> Iterator[Arrival]:
+        """Open the link, yield what arrives, end after `ScanClosed`."""
+        return kept_up(lambda: closing(self._open()), self._scan, reconnect_s=self._reconnect_s, stopped=self._stopped, clock=self._clock)
+
+    def _scan(self, port: serial.Serial) -> Iterator[Arrival]:
+        watch = _Watch(self._silence_s, self._clock())
+        try:
+            while not self._stopped.is_set():
+                self._write(port, self._decoder.request())
+                data = self._read(port)
+                found: list[Arrival] = []
+                if data:
+                    yield WireBytes(self._clock(), data)
+                    found = self._decoder.feed(data)
+                    yield from found
+                if any(isinstance(arrival, ScanClosed) for arrival in found):
+                    self._write(port, self._decoder.request())
+                    return
+                self._judge(watch.saw(data, found, self._clock()))
+        except DeviceError:  # whatever ends the scan, the begun frame is accounted for
+            yield from self._decoder.interrupted()
+            raise
+
+    def _judge(self, state: str) -> None:
+        """Raise what the watch found."""
+        if state == "silent":
+            raise LinkError(f"{self._address}: silent for {self._silence_s:g} s; is the device switched on and scanning?")
+        if state == "garbled":
+            raise ProtocolError(
+                f"{self._address}: bytes arrive but for {self._silence_s:g} s not one valid frame; "
+                f"check baud rate ({self._baud_rate}), parity ({self._parity}) and the format of the device"
+            )
+
+    def _open(self) -> serial.Serial:
+        options = {"exclusive": True} if os.name == "posix" else {}
+        try:
+            return serial.serial_for_url(
+                self._address, baudrate=self._baud_rate, parity=self._parity, timeout=POLL_S, write_timeout=1.0, **options
+            )
+        except (serial.SerialException, OSError, ValueError) as error:
+            hint = "is it plugged in, free, and named right? `cmmlink ports` lists the ports"
+            raise LinkError(f"{self._address}: cannot be opened: {error}; {hint}") from error
+
+    def _read(self, port: serial.Serial) -> bytes:
+        """Return what is there, at the latest after POLL_S."""
+        try:
+            if "://" not in self._address:
+                return bytes(port.read(max(1, port.in_waiting)))
+            data = port.read(1)  # a socket does not tell how much is there: wait for the first byte, then take the rest
+            if data:
+                port.timeout = 0
+                data += port.read(LARGEST_READ)
+                port.timeout = POLL_S
+            return bytes(data)
+        except (serial.SerialException, OSError) as error:
+            raise LinkError(f"{self._address}: the link was lost: {error}") from error
+
+    def _write(self, port: serial.Serial, data: bytes) -> None:
+        if not data:
+            return
+        try:
+            port.write(data)
+        except (serial.SerialException, OSError) as error:
+            raise LinkError(f"{self._address}: the link was lost: {error}") from error
+
+
+class _Watch:
+    """Tells a device that is silent, or sends nothing sound, from one that is only slow."""
+
+    def __init__(self, patience_s: float, now_s: float) -> None:
+        self._patience_s = patience_s
+        self._last_byte_s = self._last_sound_s = now_s
+
+    def saw(self, data: bytes, found: list[Arrival], now_s: float) -> str:
+        """Take note of one read; return "silent", "garbled" or "" if all is well."""
+        if not data:
+            return "silent" if now_s - self._last_byte_s > self._patience_s else ""
+        self._last_byte_s = now_s
+        damaged = [isinstance(arrival, Damaged) for arrival in found]
+        if not all(damaged):
+            self._last_sound_s = now_s
+        return "garbled" if any(damaged) and now_s - self._last_sound_s > self._patience_s else ""
+
+
+def serial_address(text: str) -> str:
+    """Return pyserial's address for `host:port`, and everything else as it is."""
+    host, colon, port = text.rpartition(":")
+    if colon and host and "/" not in text and port.isdigit():
+        return f"socket://{text}"
+    return text

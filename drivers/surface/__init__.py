@@ -1,0 +1,1 @@
+"""Surfaces: meshes read, cut, and chained into contours."""

@@ -1,0 +1,297 @@
+"""Open3D in a process of its own: it cuts selected triangles and reads PLY and OBJ files.
+
+Why a process: importing Open3D stops every thread of a program for a tenth of a second at a time, and `slice_plane` holds the
+interpreter for as long as it runs; acquisition must never wait for either. And a file on which Open3D crashes (a text that is
+no OBJ does it) costs a message and not the run. This is the only file that imports open3d, and only the child does.
+
+The two speak through pipes: a line of JSON, then the bytes of the arrays it announces.
+"""
+
+import ctypes
+import importlib.util
+import json
+import os
+import platform
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Lock
+from types import ModuleType, TracebackType
+from typing import IO, Any, Final, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.errors import MeshError
+from drivers.surface.stl_file import SurfaceMesh, surface_of
+
+# Shared libraries that Open3D needs and wheels do not bring, with the package that holds each on Debian/Ubuntu and Fedora.
+LIBRARIES: Final = {
+    "libusb-1.0.so.0": ("libusb-1.0-0", "libusb1"),
+    "libGL.so.1": ("libgl1", "mesa-libGL"),
+    "libEGL.so.1": ("libegl1", "mesa-libEGL"),
+    "libX11.so.6": ("libx11-6", "libX11"),
+}
+_CHILD: Final = "import sys; sys.path.append(sys.argv[1]); from drivers.surface.open3d_process import serve; serve()"
+
+
+class Open3DMissing(RuntimeError):  # noqa: N818 - reads as the sentence it is
+    """Open3D cannot be loaded; the message says why and what mends it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Open3DStatus:
+    """Whether Open3D can be loaded.
+
+    version : None when it cannot
+    missing : shared libraries that the system lacks
+    mend    : the exact command that mends it, when one is known
+    reason  : what the import said
+    """
+
+    version: str | None
+    missing: tuple[str, ...] = ()
+    mend: tuple[str, ...] | None = None
+    reason: str = ""
+
+    def sentence(self) -> str:
+        """One line for the operator."""
+        if self.version:
+            return f"Open3D {self.version} can be loaded"
+        what = f"the system lacks {', '.join(self.missing)}" if self.missing else self.reason
+        return f"Open3D cannot be loaded: {what}" + (f"; mend it with: {' '.join(self.mend)}" if self.mend else "")
+
+
+class Open3DProcess:
+    """A running child with Open3D in it: a `Cutter` for ct_slice.py, and the reader of PLY and OBJ.
+
+    Use as a context manager. Starting returns at once; the first call waits until Open3D is there.
+    """
+
+    def __init__(self, python: Sequence[str] = (sys.executable,)) -> None:
+        self._python = tuple(python)
+        self._child = _start(self._python)
+        self._status: Open3DStatus | None = None
+        self._turn = Lock()  # one question at a time; threads that chain meanwhile do not wait
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the child; it has nothing to save."""
+        _end(self._child)
+
+    def status(self) -> Open3DStatus:
+        """Wait until Open3D is loaded, or is known not to load."""
+        if self._status is None:
+            try:
+                hello, _ = self._receive()
+                self._status = status_from(hello)
+            except Open3DMissing as error:
+                self._status = Open3DStatus(None, reason=str(error))
+        return self._status
+
+    @property
+    def name(self) -> str:
+        """As a result states it."""
+        return f"open3d {self.status().version}"
+
+    def cut(self, triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Cut (t, 3, 3) triangles, in-plane x, y and height above the plane, to (s, 2, 2) segments by `slice_plane`."""
+        with self._turn:
+            _, (points, lines) = self._ask({"do": "cut"}, [np.ascontiguousarray(triangles, dtype=np.float64)])
+        return np.asarray(points[lines][:, :, :2], dtype=np.float64)
+
+    def read(self, path: Path, scale: float = 1.0) -> SurfaceMesh:
+        """Read PLY or OBJ, whatever Open3D reads; raises `MeshError` where it yields no triangles or breaks."""
+        if not path.is_file():
+            raise MeshError(f"{path}: there is no such file; check the path")
+        with self._turn:
+            loaded = self.status().version is not None
+            try:
+                answer, arrays = self._ask({"do": "read", "path": str(path)}, [])
+            except Open3DMissing as error:
+                if not loaded:
+                    raise
+                raise MeshError(f"{path}: Open3D breaks down on it ({error}); export the surface again, or as STL") from error
+        if "error" in answer:
+            raise MeshError(f"{path}: Open3D cannot read it ({answer['error']}); export the surface again, or as STL")
+        vertices, triangles = arrays
+        return surface_of(_corners(vertices * scale, triangles, path), str(path), path.suffix[1:].upper())
+
+    def _ask(self, request: dict[str, Any], arrays: list[NDArray[Any]]) -> tuple[dict[str, Any], list[NDArray[Any]]]:
+        status = self.status()
+        if status.version is None:
+            raise Open3DMissing(status.sentence())
+        if self._child.poll() is not None:  # it broke down on an earlier question: a bad file must not spoil the next
+            _end(self._child)
+            self._child = _start(self._python)
+            self._receive()
+        try:
+            assert self._child.stdin is not None
+            _send(self._child.stdin, request, arrays)
+        except OSError as error:
+            raise Open3DMissing(f"the process with Open3D ended (exit status {self._child.wait()})") from error
+        return self._receive()
+
+    def _receive(self) -> tuple[dict[str, Any], list[NDArray[Any]]]:
+        assert self._child.stdout is not None
+        message = _read_message(self._child.stdout)
+        if message is None:
+            raise Open3DMissing(f"the process with Open3D ended (exit status {self._child.wait()})")
+        return message
+
+
+def _start(python: tuple[str, ...]) -> subprocess.Popen[bytes]:
+    root = str(Path(__file__).resolve().parents[2])
+    return subprocess.Popen([*python, "-P", "-c", _CHILD, root], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+
+
+def _end(child: subprocess.Popen[bytes]) -> None:
+    assert child.stdin is not None
+    assert child.stdout is not None
+    child.kill()
+    child.wait()
+    child.stdout.close()
+    with suppress(OSError):  # what was still to be sent has no receiver any more
+        child.stdin.close()
+
+
+def open3d_status(python: Sequence[str] = (sys.executable,)) -> Open3DStatus:
+    """Try to load Open3D in a process of its own and say what came of it, and what would mend it."""
+    with Open3DProcess(python) as child:
+        return child.status()
+
+
+def mend_open3d(status: Open3DStatus, run: Callable[[Sequence[str]], int], is_root: bool) -> bool:
+    """Install the missing shared libraries where that is possible: apt, and root. `run` gives the command's exit status.
+
+    Returns whether a command ran and succeeded; `status.mend` is what the operator has to run otherwise.
+    """
+    if status.mend is None or status.mend[0] != "apt-get" or not is_root:
+        return False
+    return run(("apt-get", "update", "--quiet")) == 0 and run(status.mend) == 0
+
+
+def status_from(hello: dict[str, Any], which: Callable[[str], str | None] = shutil.which) -> Open3DStatus:
+    """Read the first message of the child, and find the command that would mend what it complains of."""
+    if "version" in hello:
+        return Open3DStatus(str(hello["version"]))
+    missing = tuple(hello.get("missing", ()))
+    return Open3DStatus(None, missing, _mending_command(missing, bool(hello.get("installed")), which), str(hello.get("error", "")))
+
+
+def _mending_command(missing: tuple[str, ...], installed: bool, which: Callable[[str], str | None]) -> tuple[str, ...] | None:
+    if not installed:
+        linux_x86 = sys.platform == "linux" and platform.machine() == "x86_64"
+        return (sys.executable, "-m", "pip", "install", "open3d-cpu==0.20.*" if linux_x86 else "open3d==0.20.*", "libusb-package")
+    if missing and which("apt-get"):
+        return ("apt-get", "install", "--yes", *(LIBRARIES[name][0] for name in missing))
+    if missing and which("dnf"):
+        return ("dnf", "install", "--assumeyes", *(LIBRARIES[name][1] for name in missing))
+    return None
+
+
+def _corners(vertices: NDArray[np.floating], triangles: NDArray[np.integer], path: Path) -> NDArray[np.floating]:
+    if not len(triangles):
+        raise MeshError(f"{path}: no triangle was found in it; is it a point cloud, or truncated? Export the surface again, or as STL")
+    if triangles.min() < 0 or triangles.max() >= len(vertices):
+        bad = int(np.flatnonzero((triangles < 0).any(axis=1) | (triangles >= len(vertices)).any(axis=1))[0])
+        raise MeshError(
+            f"{path}: triangle {bad + 1} names a vertex that is not there (there are {len(vertices)}); export the surface again"
+        )
+    return np.asarray(vertices[triangles])
+
+
+def _send(pipe: IO[bytes], message: dict[str, Any], arrays: list[NDArray[Any]]) -> None:
+    """One message: its JSON line, which announces the arrays, then their bytes."""
+    pipe.write(json.dumps({**message, "arrays": [[array.dtype.str, list(array.shape)] for array in arrays]}).encode() + b"\n")
+    for array in arrays:
+        pipe.write(np.ascontiguousarray(array).reshape(-1).view(np.uint8).data)
+    pipe.flush()
+
+
+def _read_message(pipe: IO[bytes]) -> tuple[dict[str, Any], list[NDArray[Any]]] | None:
+    """Read what `_send` wrote; None at the end of the pipe."""
+    line = pipe.readline()
+    if not line.endswith(b"\n"):
+        return None
+    message = json.loads(line)
+    arrays = []
+    for dtype, shape in message.pop("arrays"):
+        array = np.empty(shape, np.dtype(dtype))
+        data = pipe.read(array.nbytes)
+        if len(data) < array.nbytes:
+            return None
+        arrays.append(np.frombuffer(data, array.dtype).reshape(shape))
+    return message, arrays
+
+
+def serve() -> None:
+    """Run as the child: load Open3D, say hello, answer until the pipe closes."""
+    pipe_in, pipe_out = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what libraries print must not get among the answers
+    try:
+        open3d = _load()
+    except Exception as error:
+        installed = importlib.util.find_spec("open3d") is not None
+        _send(pipe_out, {"error": str(error), "installed": installed, "missing": _missing_libraries()}, [])
+        return
+    _send(pipe_out, {"version": open3d.__version__}, [])
+    while (message := _read_message(pipe_in)) is not None:
+        request, arrays = message
+        answer, results = _cut(open3d, arrays[0]) if request["do"] == "cut" else _read(open3d, request["path"])
+        _send(pipe_out, answer, results)
+
+
+def _load() -> ModuleType:
+    """Import Open3D, with the libusb of the package index loaded first: pip installs none that the loader would find."""
+    if sys.platform == "linux" and importlib.util.find_spec("libusb_package") is not None:
+        import libusb_package  # noqa: PLC0415 - only the child loads it
+
+        library = libusb_package.get_library_path()
+        if library is not None:
+            ctypes.CDLL(str(library))
+    import open3d  # noqa: PLC0415 - only the child loads it
+
+    return open3d
+
+
+def _missing_libraries() -> list[str]:
+    if sys.platform != "linux":
+        return []
+    missing = []
+    for name in LIBRARIES:
+        try:
+            ctypes.CDLL(name)
+        except OSError:
+            missing.append(name)
+    return missing
+
+
+def _cut(open3d: Any, triangles: NDArray[np.float64]) -> tuple[dict[str, Any], list[NDArray[Any]]]:
+    """Slice at height zero, in float64; the unit normal is z because heights are."""
+    core = open3d.core
+    corners = core.Tensor.from_numpy(triangles.reshape(-1, 3).copy())
+    indices = core.Tensor.from_numpy(np.arange(3 * len(triangles), dtype=np.int64).reshape(-1, 3))
+    lines = open3d.t.geometry.TriangleMesh(corners, indices).slice_plane([0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0])
+    if "positions" not in lines.point or "indices" not in lines.line:
+        return {}, [np.empty((0, 3)), np.empty((0, 2), dtype=np.int64)]
+    return {}, [lines.point.positions.numpy(), lines.line.indices.numpy()]
+
+
+def _read(open3d: Any, path: str) -> tuple[dict[str, Any], list[NDArray[Any]]]:
+    try:
+        mesh = open3d.t.io.read_triangle_mesh(path)
+        if "positions" not in mesh.vertex or "indices" not in mesh.triangle:
+            return {}, [np.empty((0, 3)), np.empty((0, 3), dtype=np.int64)]
+        return {}, [mesh.vertex.positions.numpy(), mesh.triangle.indices.numpy()]
+    except Exception as error:
+        return {"error": str(error)}, []

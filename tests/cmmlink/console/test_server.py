@@ -1,0 +1,208 @@
+"""The doors of the server, tried without a browser: what a hostile page, program or network could send."""
+
+import http.client
+import json
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from websockets import Origin
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection, connect
+
+from cmmlink.console.launch import kept_token
+from cmmlink.console.server import ConsoleServer
+from cmmlink.console.station import Station
+
+from .played import Device, means, write_plan
+
+TOKEN = "a-token-for-this-test-of-32-characters"
+HELLO = json.dumps({"token": TOKEN})
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[ConsoleServer]:
+    server = ConsoleServer(Station(means({"blade.yaml": write_plan(tmp_path)}, Device().connect)), "test", token=TOKEN)
+    server.start()
+    yield server
+    server.stop()
+
+
+def got(server: ConsoleServer, path: str, **headers: str) -> http.client.HTTPResponse:
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=10)
+    connection.request("GET", path, headers=headers)
+    answer = connection.getresponse()
+    answer.read()
+    connection.close()
+    return answer
+
+
+@contextmanager
+def joined(
+    server: ConsoleServer, origin: str | None = "", first: str = json.dumps({"token": TOKEN}), **more: Any
+) -> Iterator[ClientConnection]:
+    """A socket with a token sent; without `origin`, one that says it comes from the page."""
+    told = f"http://127.0.0.1:{server.port}" if origin == "" else origin
+    with connect(f"ws://127.0.0.1:{server.port}/live", origin=Origin(told) if told else None, **more) as socket:
+        socket.send(first)
+        yield socket
+
+
+def closing_code(socket: ClientConnection) -> int | None:
+    """Why the server closes the socket, whatever it says before."""
+    try:
+        while True:
+            socket.recv(timeout=10)
+    except ConnectionClosed as closed:
+        return closed.rcvd.code if closed.rcvd else None
+
+
+def answered(socket: ClientConnection, command: Any) -> dict[str, Any]:
+    socket.send(command if isinstance(command, str) else json.dumps(command))
+    while True:
+        message = socket.recv(timeout=10)
+        if isinstance(message, str) and (told := json.loads(message))["type"] == "answer":
+            return dict(told)
+
+
+def test_page_and_its_files_are_served_with_the_security_headers(server: ConsoleServer) -> None:
+    for path, media in (("/", "text/html"), ("/main.js", "text/javascript"), ("/console.css", "text/css"), ("/icon.svg", "image/svg+xml")):
+        answer = got(server, path)
+        assert answer.status == 200
+        assert (answer.getheader("content-type") or "").startswith(media)
+        policy = answer.getheader("content-security-policy") or ""
+        assert "default-src 'none'" in policy
+        assert "script-src 'self'" in policy
+        assert "unsafe" not in policy
+        assert answer.getheader("x-content-type-options") == "nosniff"
+        assert answer.getheader("x-frame-options") == "DENY"
+        assert answer.getheader("referrer-policy") == "no-referrer"
+
+
+def test_page_asks_nothing_of_other_hosts() -> None:
+    static = Path(__file__).parents[3] / "cmmlink" / "console" / "static"
+    for file in static.iterdir():
+        text = file.read_text(encoding="utf-8").replace("http://www.w3.org/2000/svg", "")
+        assert "http://" not in text.replace("`http://", "")
+        assert "https://" not in text
+        assert "eval(" not in text
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/../server.py",
+        "/..%2fserver.py",
+        "/%2e%2e/%2e%2e/etc/passwd",
+        "/static/main.js",
+        "//etc/passwd",
+        "/blade.yaml",
+        "/__init__.py",
+        "/server.py",
+        "/main.js%00.html",
+        "/.",
+    ],
+)
+def test_no_other_file_can_be_read(server: ConsoleServer, path: str) -> None:
+    assert got(server, path).status == 404
+
+
+def test_foreign_host_is_refused_everywhere(server: ConsoleServer) -> None:
+    for host in ("evil.example", f"evil.example:{server.port}", "127.0.0.1:1", "", f"127.0.0.1.evil.example:{server.port}"):
+        assert got(server, "/", Host=host).status == 400
+    with pytest.raises(InvalidStatus) as refusal, joined(server, additional_headers={"Host": "evil.example"}):
+        pass
+    assert refusal.value.response.status_code in (400, 403)
+    assert got(server, "/", Host=f"localhost:{server.port}").status == 200
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "null", "https://127.0.0.1", "http://127.0.0.1:1", None])
+def test_foreign_or_missing_origin_is_refused(server: ConsoleServer, origin: str | None) -> None:
+    with pytest.raises(InvalidStatus) as refusal, joined(server, origin):
+        pass
+    assert refusal.value.response.status_code == 403
+    assert server.pages == 0
+
+
+@pytest.mark.parametrize("first", ["", "hello", "[]", '{"token": null}', '{"token": "guess"}', '{"do": "abort"}', "[" * 5000])
+def test_wrong_token_closes_with_4401_and_tells_nothing(server: ConsoleServer, first: str) -> None:
+    with joined(server, first=first) as socket:
+        assert closing_code(socket) == 4401
+
+
+def test_message_too_large_is_refused(server: ConsoleServer) -> None:
+    with joined(server) as socket:
+        socket.send('{"do": "' + "x" * 100_000 + '"}')
+        assert closing_code(socket) == 1009
+
+
+@pytest.mark.parametrize(
+    ("command", "says"),
+    [
+        ("no json", "no command"),
+        ("[1, 2]", "no command"),
+        ({"do": "format"}, "no command 'format'"),
+        ({"do": ["start"]}, "no command"),
+        ({"do": "choose"}, "needs a text 'plan'"),
+        ({"do": "choose", "plan": "../../etc/passwd"}, "there is no plan"),
+        ({"do": "choose", "plan": "/etc/passwd"}, "there is no plan"),
+        ({"do": "acknowledge", "alarm": "all"}, "needs a whole number"),
+        ({"do": "enter", "serial_number": "x" * 500}, "at most 120 characters"),
+        ({"do": "enter", "operator": "a\u0000b"}, "printable"),
+        ({"do": "start"}, "choose a plan first"),
+        ({"do": "abort"}, "nothing is being measured"),
+        ({"do": "end"}, "nothing is being measured"),
+        ({"do": "open", "run": "../../station"}, "keeps no records"),
+        ({"do": "replay", "run": 7}, "needs a text 'run'"),
+    ],
+)
+def test_command_that_makes_no_sense_is_answered_in_words(server: ConsoleServer, command: Any, says: str) -> None:
+    with joined(server) as socket:
+        answer = answered(socket, command)
+    assert answer["ok"] is False
+    assert says in answer["message"]
+
+
+def test_export_needs_the_token(server: ConsoleServer) -> None:
+    assert got(server, "/export/last").status == 401
+    assert got(server, "/export/last", Authorization="Bearer guess").status == 401
+    assert got(server, "/export/last", Authorization=f"Bearer {TOKEN}").status == 404
+    assert got(server, "/export/..%2f..%2fetc", Authorization=f"Bearer {TOKEN}").status == 404
+
+
+def test_pages_are_limited_in_number(server: ConsoleServer) -> None:
+    with ExitStack() as open_ones:
+        for _ in range(16):
+            open_ones.enter_context(joined(server)).recv(timeout=10)
+        with joined(server) as one_more:
+            assert closing_code(one_more) == 1013
+
+
+def test_server_is_bound_to_this_machine_alone(server: ConsoleServer) -> None:
+    assert server._socket.getsockname()[0] == "127.0.0.1"
+    assert not server.remote
+    assert server.address == f"http://127.0.0.1:{server.port}/#{TOKEN}"
+
+
+def test_open_server_takes_addresses_but_no_foreign_names(tmp_path: Path) -> None:
+    server = ConsoleServer(Station(means({}, Device().connect)), "test", "0.0.0.0", token=TOKEN)
+    server.start()
+    assert server.remote
+    assert got(server, "/", Host=f"192.0.2.7:{server.port}").status == 200
+    assert got(server, "/", Host=f"[2001:db8::7]:{server.port}").status == 200
+    assert got(server, "/", Host=f"evil.example:{server.port}").status == 400
+    assert got(server, "/", Host="192.0.2.7:1").status == 400
+    server.stop()
+
+
+def test_token_is_kept_and_readable_by_its_owner_alone(tmp_path: Path) -> None:
+    folder = tmp_path / "data"
+    token = kept_token(folder)
+    assert len(token) >= 32
+    assert kept_token(folder) == token
+    assert (folder / "console-token").stat().st_mode & 0o077 == 0
+    (folder / "console-token").write_text("short", encoding="ascii")
+    assert len(kept_token(folder)) >= 32
+    assert kept_token(tmp_path / "other") != token
