@@ -11,6 +11,7 @@ test: .venv/test-installed
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/pytest -n 2 $(PYTEST_OPTIONS)
+	@tests/page/check $(PAGE_OPTIONS)
 
 # A hundred recording processes killed at random moments; every acknowledged point must be there.
 soak: .venv/test-installed
