@@ -8,8 +8,7 @@ import numpy as np
 from cmmlink.errors import PlanError
 from cmmlink.nominal_files import NominalFile, load_nominal, material_side
 from cmmlink.plan.scan import Datum, Plan
-from inspection import LiveInspection, NominalProfile, RigidTransform, SectionPlane, discretize
-from inspection.nominal import Material
+from inspection import LiveInspection, Material, NominalProfile, RigidTransform, SectionPlane, discretize
 
 
 def profile_of(file: NominalFile, path: Path, material: Material | None) -> NominalProfile:

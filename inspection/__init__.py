@@ -1,25 +1,35 @@
-"""Inspection of free-form profiles: nominal, registration, signed deviations, verdicts. Pure maths on arrays."""
+"""Inspection of free-form profiles: nominal, registration, signed deviations, verdicts. Pure maths on arrays.
 
+This is the front door: an application imports what `__all__` lists and none of the files behind it.
+"""
+
+from inspection import synthetic
 from inspection.coarse import register_coarse
 from inspection.curve import NurbsCurve
-from inspection.deviations import Deviations, profile_error_mm
+from inspection.deviations import Deviations, Method, profile_error_mm
 from inspection.errors import InspectionError, NominalError, RegistrationError
 from inspection.fine import register, register_fine
-from inspection.live import InspectionResult, LiveInspection, LiveUpdate, Rejection, rehearse
+from inspection.kernels import while_compiling
+from inspection.live import FitName, LiveInspection, LiveUpdate, State, rehearse
 from inspection.minimum_zone import MinimumZone, fit_minimum_zone
-from inspection.nominal import NominalProfile, discretize
+from inspection.nominal import Material, NominalProfile, discretize
 from inspection.profile_error import deviations
 from inspection.registration import Registration
+from inspection.result import NOT_JUDGED, InspectionResult, Rejection, Stretch, coverage
 from inspection.rigid import RigidTransform
 from inspection.section import SectionPlane
 from inspection.tolerance import ToleranceZone, Verdict
 
 __all__ = [
+    "NOT_JUDGED",
     "Deviations",
+    "FitName",
     "InspectionError",
     "InspectionResult",
     "LiveInspection",
     "LiveUpdate",
+    "Material",
+    "Method",
     "MinimumZone",
     "NominalError",
     "NominalProfile",
@@ -29,8 +39,11 @@ __all__ = [
     "Rejection",
     "RigidTransform",
     "SectionPlane",
+    "State",
+    "Stretch",
     "ToleranceZone",
     "Verdict",
+    "coverage",
     "deviations",
     "discretize",
     "fit_minimum_zone",
@@ -39,4 +52,6 @@ __all__ = [
     "register_coarse",
     "register_fine",
     "rehearse",
+    "synthetic",
+    "while_compiling",
 ]

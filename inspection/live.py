@@ -30,10 +30,8 @@ from inspection.section import SectionPlane
 from inspection.tolerance import ToleranceZone, Verdict
 
 Array = NDArray[np.float64]
-Fit = Literal["best-fit", "minimum-zone", "none"]
+FitName = Literal["best-fit", "minimum-zone", "none"]
 State = Literal["seeking", "provisional", "settled"]
-
-__all__ = ["InspectionResult", "LiveInspection", "LiveUpdate", "Rejection"]
 
 _USABLE = (Rejection.NONE, Rejection.BEYOND_END)  # what a registration may use; beyond which end depends on the pose
 _BLOCK = 64  # points between two moves of the state
@@ -89,7 +87,7 @@ class LiveInspection:
         zone: ToleranceZone,
         *,
         datum: RigidTransform | None = None,
-        fit: Fit = "best-fit",
+        fit: FitName = "best-fit",
         method: Method = "exact",
         tip_radius_mm: float = 0.0,
         section: SectionPlane | None = None,
@@ -99,8 +97,8 @@ class LiveInspection:
         provisional: bool = True,
     ) -> None:
         check_tip_radius(tip_radius_mm, nominal)
-        if fit not in get_args(Fit):
-            raise ValueError(f"fit must be one of {', '.join(get_args(Fit))}, not {fit!r}")
+        if fit not in get_args(FitName):
+            raise ValueError(f"fit must be one of {', '.join(get_args(FitName))}, not {fit!r}")
         if method not in get_args(Method):
             raise ValueError(f"method must be one of {', '.join(get_args(Method))}, not {method!r}")
         self._nominal, self._zone, self._fit, self._method, self._tip = nominal, zone, fit, method, tip_radius_mm

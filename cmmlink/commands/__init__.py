@@ -63,8 +63,7 @@ from drivers.files.point_file import PointFileSource
 from drivers.links.axis import Beam, ConstantFeed, FollowedAxis
 from drivers.links.serial_scanner import SerialScanner, ports
 from drivers.source import Decoder, ScanSource
-from inspection import InspectionError, LiveInspection, NominalProfile, ToleranceZone, Verdict, rehearse
-from inspection.kernels import while_compiling
+from inspection import InspectionError, LiveInspection, NominalProfile, ToleranceZone, Verdict, rehearse, while_compiling
 
 if TYPE_CHECKING:
     from cmmlink.console.server import ConsoleServer

@@ -18,8 +18,7 @@ from cmmlink.console.extremes import DEVIATION, FOOT_X, NORMAL_X, STATION, VERDI
 from cmmlink.events import Arrived, Counts, Event, Judged, RunStarted
 from cmmlink.result_json import number, summary
 from drivers.source import Heartbeat, LinkDown, PointBatch, ScanClosed, ScanOpened
-from inspection import LiveUpdate, NominalProfile, ToleranceZone, Verdict
-from inspection.result import coverage
+from inspection import LiveUpdate, NominalProfile, ToleranceZone, Verdict, coverage
 
 Phase = Literal["preparing", "starting", "measuring", "ending", "finished"]
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from inspection.curve import NurbsCurve
+from inspection import NurbsCurve
 
 _CHORD_ERROR_MM = 1e-5  # of the polyline to the curve: far below what any deviation is read to
 

@@ -19,8 +19,7 @@ import numpy as np
 from cmmlink.errors import YamlError
 from drivers.errors import PointFileError
 from drivers.files.point_file import read_text
-from inspection.curve import NurbsCurve
-from inspection.errors import NominalError
+from inspection import NominalError, NurbsCurve
 
 _ALMOST_CLOSED = 0.05  # a gap below this fraction of the length still tells inside from outside: a blunt trailing edge
 

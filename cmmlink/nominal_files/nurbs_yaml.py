@@ -13,8 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from cmmlink.nominal_files import NominalFile
 from cmmlink.plan.yaml_model import read_model
-from inspection.curve import NurbsCurve
-from inspection.errors import NominalError
+from inspection import NominalError, NurbsCurve
 
 SUFFIXES = (".yaml", ".yml")
 

@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmmlink.nominal_files import NominalFile
-from inspection.curve import NurbsCurve
-from inspection.errors import NominalError
+from inspection import NominalError, NurbsCurve
 
 Array = NDArray[np.float64]
 Lines = NDArray[np.int64]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from cmmlink.nominal_files import NominalFile
 from cmmlink.nominal_files.through_points import through_points
 from drivers.files.point_file import checked_mm, parse_columns
-from inspection.errors import NominalError
+from inspection import NominalError
 
 SUFFIXES = (".dat",)
 

@@ -65,7 +65,7 @@ from cmmlink.plan.yaml_model import line_of, read_model
 from drivers.codecs.register_map import shipped_maps
 from drivers.errors import PointFileError
 from drivers.files.point_file import read_text
-from inspection.tolerance import ToleranceZone
+from inspection import ToleranceZone
 
 Vector = tuple[float, float, float]
 Text = Annotated[str, Field(min_length=1)]

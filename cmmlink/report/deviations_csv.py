@@ -5,8 +5,7 @@ import math
 from pathlib import Path
 
 from cmmlink.record.bodies import JudgedRows
-from inspection import InspectionResult, Rejection, Verdict
-from inspection.result import NOT_JUDGED
+from inspection import NOT_JUDGED, InspectionResult, Rejection, Verdict
 
 HEADER = ("index", "x_mm", "y_mm", "station_mm", "foot_x_mm", "foot_y_mm", "deviation_mm", "verdict")
 

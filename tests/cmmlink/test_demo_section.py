@@ -12,9 +12,7 @@ from cmmlink.demo.section import CAP_START, nominal_csv, nominal_points, outline
 from cmmlink.nominal_files import load_nominal, material_side
 from cmmlink.plan.scan import load_plan
 from drivers.files.point_file import read_points
-from inspection.curve import NurbsCurve
-from inspection.nominal import discretize
-from inspection.profile_error import deviations
+from inspection import NurbsCurve, deviations, discretize
 
 Array = NDArray[np.float64]
 

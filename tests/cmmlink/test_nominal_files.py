@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cmmlink.nominal_files import NominalFile, known_suffixes, load_nominal, material_side
 from cmmlink.nominal_files.nurbs_yaml import save_nurbs_yaml
-from inspection.curve import NurbsCurve
-from inspection.errors import NominalError
+from inspection import NominalError, NurbsCurve
 from tests.inspection import profiles
 
 Array = NDArray[np.float64]

@@ -13,7 +13,7 @@ from cmmlink.plan.scan import FileDevice, ModbusDevice, Plan, SerialDevice, load
 from cmmlink.plan.yaml_model import read_model
 from cmmlink.record.recorder import Basis
 from drivers.codecs.register_map import load_map
-from inspection.tolerance import ToleranceZone
+from inspection import ToleranceZone
 
 SHORT = """\
 part: {name: blade, serial_number: 0012}
