@@ -1,55 +1,7 @@
 """The inspection plan: a YAML file, validated into an immutable model.
 
-A plan needs four keys; everything else has the default shown. Relative paths are relative to the plan's own folder.
-
-    part: {name: blade, serial_number: null}
-    operator: null
-    nominal:
-      file: blade.dat               # UIUC dat, points, or NURBS yaml
-      scale: 1.0                    # file units to mm: the chord, for airfoils in chord units
-      closed: null                  # true, false, or null: what the file shows
-      material: null                # left or right of the direction of travel; null: inside a closed profile
-    tolerance:
-      lower_mm: -0.05               # deviation, positive out of material
-      upper_mm: 0.05
-      uncertainty_mm: 0.0           # expanded uncertainty U (95 %) of one deviation, ISO 14253-1
-    device:
-      type: serial                  # a stream over a serial port or a TCP socket
-      address: COM3                 # port name, or host:port
-      format: ascii                 # ascii, binary, optoncdt, riftek, riftek-ascii
-      options: {}                   # of the format, like {range_mm: 50, rate_hz: 1000, count: 5000}
-      baud_rate: 115200
-      parity: N                     # N, E, O
-      silence_s: 5.0                # a device silent for longer has failed
-      reconnect_s: 0.0              # how long a lost link is tried again
-      axis: null                    # for distance sensors: {feed_mm_s: 10, origin_mm: [0, 0, 0], distance_direction: [0, 1, 0],
-                                    # axis_direction: [1, 0, 0]}; or, instead of feed_mm_s, follow: {another device}
-    # device:
-    #   type: modbus                # registers over TCP (host:port) or RTU (a port name)
-    #   address: 192.168.1.10:502
-    #   map: gocator                # or generic-ring, generic-fifo, riftek-rf60x; anything else is a yaml file of yours
-    #   device_id: 1
-    #   points: null                # the scan ends after so many, for devices that tell no end
-    #   timeout_s: 1.0              # longer than the slowest answer
-    # device: {type: file, file: points.csv, scale: 1.0}    a file of points in place of a device
-    probe: {tip_radius_mm: 0.0}     # above 0: the points are ball centres
-    section:                        # the plane of the section in machine coordinates
-      origin_mm: [0, 0, 0]
-      x_axis: [1, 0, 0]             # direction, any length; what of it lies along the normal is dropped
-      normal: [0, 0, 1]
-      off_plane_max_mm: null        # reject points farther from the plane; null: none
-    registration:
-      fit: best-fit                 # best-fit, minimum-zone, none; none is also the default where a datum is given
-      method: exact                 # exact, circle, chord, pcp, veaw, inversion
-      datum: null                   # {rotation_deg: 0, translation_mm: [0, 0]}: known pose, nominal from section
-      coverage_min: 0.95            # fraction of the nominal's length to be measured before conform is proven
-      reject_outliers: false        # find gross outliers, fit without them, report them as rejected; conform is then not proven
-    discretisation: {samples: 10000, pole_angle_min_deg: 178.0, step_min: 1e-4}
-    buffer_points: 500000
-    out: null                       # folder for the results; null: none written
-    records: null                   # folder of the run records; null: the user's. A console keeps all runs in its own
-
-A further device is a further model with its own `type`, added to the union `Device`.
+Relative paths are relative to the plan's own folder. Every field says in its description what it means; docs/plan.md is written
+from these descriptions. A further device is a further model with its own `type`, added to the union `Device`.
 """
 
 from collections.abc import Callable
@@ -71,6 +23,10 @@ Vector = tuple[float, float, float]
 Text = Annotated[str, Field(min_length=1)]
 Positive = Annotated[float, Field(gt=0)]
 
+_SILENCE = "how long a device may send nothing before it counts as failed"
+_RECONNECT = "how long a lost link is tried again while the run goes on"
+_PARITY = "the parity of a serial port: none, even or odd"
+_AXIS = "what makes points of the distances of a one-dimensional sensor"
 _LEAST_SINE = 1e-3  # between x axis and normal: below it the direction of x in the plane is noise
 
 
@@ -82,16 +38,18 @@ class Part(_Settings):
     """What is measured."""
 
     name: Text = Field(description="the name of the part")
-    serial_number: Text | None = None
+    serial_number: Text | None = Field(default=None, description="the serial number of this one part; digits keep their leading zeros")
 
 
 class Nominal(_Settings):
-    """The nominal profile, as load_nominal takes it, and the side of the material."""
+    """The nominal profile, and on which side of it the material lies."""
 
-    file: Path = Field(description="the file of the nominal profile")
-    scale: Positive = 1.0
-    closed: bool | None = None
-    material: Literal["left", "right"] | None = None
+    file: Path = Field(description="the file of the nominal profile: UIUC dat, points, or NURBS yaml")
+    scale: Positive = Field(default=1.0, description="how many mm a unit of the file is; for an airfoil in chord units, the chord in mm")
+    closed: bool | None = Field(default=None, description="whether the profile is closed; null: what the file shows")
+    material: Literal["left", "right"] | None = Field(
+        default=None, description="the side of the material, seen along the direction of travel; null: inside a closed profile"
+    )
 
 
 class Tolerance(_Settings):
@@ -99,7 +57,7 @@ class Tolerance(_Settings):
 
     lower_mm: float = Field(description="the lower limit of the deviation in mm, like -0.05")
     upper_mm: float = Field(description="the upper limit of the deviation in mm, like 0.05")
-    uncertainty_mm: float = 0.0
+    uncertainty_mm: float = Field(default=0.0, description="the expanded uncertainty U (95 %) of one deviation, as in ISO 14253-1")
 
     @field_validator("upper_mm")
     @classmethod
@@ -127,11 +85,13 @@ class Tolerance(_Settings):
 class Axis(_Settings):
     """What makes points of the distances of a one-dimensional sensor: a constant feed, or a second device that tells the position."""
 
-    origin_mm: Vector = (0.0, 0.0, 0.0)
-    distance_direction: Vector = (0.0, 1.0, 0.0)
-    axis_direction: Vector = (1.0, 0.0, 0.0)
-    feed_mm_s: float | None = None
-    follow: "Annotated[SerialDevice | ModbusDevice, Field(discriminator='type')] | None" = None
+    origin_mm: Vector = Field(default=(0.0, 0.0, 0.0), description="where a distance of zero lies while the axis stands at zero")
+    distance_direction: Vector = Field(default=(0.0, 1.0, 0.0), description="the direction in which distances grow, of length 1")
+    axis_direction: Vector = Field(default=(1.0, 0.0, 0.0), description="the direction in which the axis moves the sensor, of length 1")
+    feed_mm_s: float | None = Field(default=None, description="the constant speed of the axis, timed by the sensor's own clock")
+    follow: "Annotated[SerialDevice | ModbusDevice, Field(discriminator='type')] | None" = Field(
+        default=None, description="a second device, in place of feed_mm_s, whose x is the position of the axis"
+    )
 
     @field_validator("distance_direction", "axis_direction")
     @classmethod
@@ -150,31 +110,35 @@ class Axis(_Settings):
 class SerialDevice(_Settings):
     """A device that streams over a serial port or a TCP socket, in one of the formats of drivers, with that format's options."""
 
-    type: Literal["serial"]
+    type: Literal["serial"] = Field(description="a stream over a serial port or a TCP socket")
     address: Text = Field(description="a port name like COM3 or /dev/ttyUSB0, or host:port")
-    baud_rate: Annotated[int, Field(gt=0)] = 115200
-    silence_s: Positive = 5.0
-    reconnect_s: Annotated[float, Field(ge=0)] = 0.0
-    format: Text = "ascii"
-    options: dict[str, Annotated[int | float | str, Field(union_mode="left_to_right")]] = {}
-    parity: Literal["N", "E", "O"] = "N"
-    axis: Axis | None = None
+    baud_rate: int = Field(default=115200, gt=0, description="the speed of a serial port in bits per second")
+    silence_s: Positive = Field(default=5.0, description=_SILENCE)
+    reconnect_s: float = Field(default=0.0, ge=0, description=_RECONNECT)
+    format: Text = Field(default="ascii", description="how points are spelled on the wire: ascii, binary, optoncdt, riftek or riftek-ascii")
+    options: dict[str, Annotated[int | float | str, Field(union_mode="left_to_right")]] = Field(
+        default={}, description="options of the format, like {range_mm: 50, rate_hz: 1000, count: 5000}"
+    )
+    parity: Literal["N", "E", "O"] = Field(default="N", description=_PARITY)
+    axis: Axis | None = Field(default=None, description=_AXIS)
 
 
 class ModbusDevice(_Settings):
     """A device whose points are read from registers, over TCP (host:port) or RTU (a port name), as its map describes."""
 
-    type: Literal["modbus"]
-    address: Text = Field(description="host:port, or the port name of an RTU line")
+    type: Literal["modbus"] = Field(description="registers over TCP or RTU")
+    address: Text = Field(description="an address host:port, or the port name of an RTU line")
     map: Text | dict[str, Any] = Field(description="a register map: a yaml file, or the name of a shipped one like generic-ring or gocator")
-    device_id: Annotated[int, Field(ge=0, le=255)] = 1
-    points: Annotated[int, Field(ge=1)] | None = None
-    baud_rate: Annotated[int, Field(gt=0)] = 19200
-    parity: Literal["N", "E", "O"] = "E"
-    timeout_s: Positive = 1.0
-    silence_s: Positive = 5.0
-    reconnect_s: Annotated[float, Field(ge=0)] = 0.0
-    axis: Axis | None = None
+    device_id: int = Field(default=1, ge=0, le=255, description="the unit identifier of the device on its line")
+    points: Annotated[int, Field(ge=1)] | None = Field(
+        default=None, description="the number of points after which the scan ends, for devices that do not tell an end"
+    )
+    baud_rate: int = Field(default=19200, gt=0, description="the speed of an RTU line in bits per second")
+    parity: Literal["N", "E", "O"] = Field(default="E", description=_PARITY)
+    timeout_s: Positive = Field(default=1.0, description="how long an answer is waited for; longer than the slowest answer")
+    silence_s: Positive = Field(default=5.0, description=_SILENCE)
+    reconnect_s: float = Field(default=0.0, ge=0, description=_RECONNECT)
+    axis: Axis | None = Field(default=None, description=_AXIS)
 
     @property
     def own_map(self) -> Path | None:
@@ -185,9 +149,9 @@ class ModbusDevice(_Settings):
 class FileDevice(_Settings):
     """A file of points in place of a device."""
 
-    type: Literal["file"]
+    type: Literal["file"] = Field(description="a file of points in place of a device")
     file: Path = Field(description="the file of points: csv, txt, asc, xyz or npy")
-    scale: Positive = 1.0
+    scale: Positive = Field(default=1.0, description="how many mm a unit of the file is")
 
 
 Device = Annotated[SerialDevice | ModbusDevice | FileDevice, Field(discriminator="type")]
@@ -195,18 +159,24 @@ Axis.model_rebuild()
 
 
 class Probe(_Settings):
-    """The tip of the probe; a radius above zero says that the points are ball centres."""
+    """The tip of the probe."""
 
-    tip_radius_mm: Annotated[float, Field(ge=0)] = 0.0
+    tip_radius_mm: float = Field(default=0.0, ge=0, description="the radius of the tip's ball; above 0, the points are ball centres")
 
 
 class Section(_Settings):
     """The plane of the section in machine coordinates; directions of any length, not parallel."""
 
-    origin_mm: Vector = (0.0, 0.0, 0.0)
-    normal: Vector = (0.0, 0.0, 1.0)
-    x_axis: Annotated[Vector, Field(validate_default=True)] = (1.0, 0.0, 0.0)
-    off_plane_max_mm: Positive | None = None
+    origin_mm: Vector = Field(default=(0.0, 0.0, 0.0), description="a point of the plane, which becomes the section's origin")
+    normal: Vector = Field(default=(0.0, 0.0, 1.0), description="the direction of the plane's normal, of any length")
+    x_axis: Vector = Field(
+        default=(1.0, 0.0, 0.0),
+        validate_default=True,
+        description="the direction of the section's x axis, of any length; what of it lies along the normal is dropped",
+    )
+    off_plane_max_mm: Positive | None = Field(
+        default=None, description="the distance from the plane beyond which a point is rejected; null: no point is rejected for it"
+    )
 
     @field_validator("normal", "x_axis")
     @classmethod
@@ -227,18 +197,28 @@ class Section(_Settings):
 class Datum(_Settings):
     """A known pose: the motion that brings section coordinates onto the nominal."""
 
-    rotation_deg: float = 0.0
-    translation_mm: tuple[float, float] = (0.0, 0.0)
+    rotation_deg: float = Field(default=0.0, description="the rotation about the section's origin, counterclockwise")
+    translation_mm: tuple[float, float] = Field(default=(0.0, 0.0), description="the translation after the rotation")
 
 
 class Registration(_Settings):
     """How the points come onto the nominal, and how much of it they must cover."""
 
-    datum: Datum | None = None
-    fit: Annotated[Literal["best-fit", "minimum-zone", "none"], Field(validate_default=True)] = "best-fit"
-    method: Literal["exact", "circle", "chord", "pcp", "veaw", "inversion"] = "exact"
-    coverage_min: Annotated[float, Field(ge=0, le=1)] = 0.95
-    reject_outliers: bool = False
+    datum: Datum | None = Field(default=None, description="a known pose, from section to nominal; null: the pose is found by a fit")
+    fit: Literal["best-fit", "minimum-zone", "none"] = Field(
+        default="best-fit",
+        validate_default=True,
+        description="how the pose is found; none is also the default where a datum is given",
+    )
+    method: Literal["exact", "circle", "chord", "pcp", "veaw", "inversion"] = Field(
+        default="exact", description="how deviations are found: exact, or one of the published approximations"
+    )
+    coverage_min: float = Field(
+        default=0.95, ge=0, le=1, description="the share of the nominal's length that must be measured before conform is proven"
+    )
+    reject_outliers: bool = Field(
+        default=False, description="find gross outliers, fit without them and report them as rejected; conform is then not proven"
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -261,28 +241,30 @@ class Registration(_Settings):
 
 
 class Discretisation(_Settings):
-    """Sampling of the nominal; see inspection.discretize."""
+    """How finely the nominal is sampled."""
 
-    samples: Annotated[int, Field(ge=8, le=400_000)] = 10_000
-    pole_angle_min_deg: Annotated[float, Field(gt=0, lt=180)] = 178.0
-    step_min: Annotated[float, Field(gt=0, lt=1)] = 1e-4
+    samples: int = Field(default=10_000, ge=8, le=400_000, description="the number of samples to begin with, even in the parameter")
+    pole_angle_min_deg: float = Field(default=178.0, gt=0, lt=180, description="samples are added until every pole angle is at least this")
+    step_min: float = Field(default=1e-4, gt=0, lt=1, description="the smallest step between samples, as a share of the parameter's range")
 
 
 class Plan(_Settings):
     """One inspection: what, against what, with what, and where the results go."""
 
     part: Part = Field(description="a mapping with the part's name")
-    operator: Text | None = None
+    operator: Text | None = Field(default=None, description="who measures")
     nominal: Nominal = Field(description="a mapping with the nominal's file")
     tolerance: Tolerance = Field(description="a mapping with lower_mm and upper_mm")
     device: Device = Field(description="a mapping with the device's type and address")
-    probe: Probe = Probe()
-    section: Section = Section()
-    registration: Registration = Registration()
-    discretisation: Discretisation = Discretisation()
-    buffer_points: Annotated[int, Field(ge=1)] = 500_000
-    out: Path | None = None
-    records: Path | None = None
+    probe: Probe = Field(default=Probe(), description="the tip of the probe")
+    section: Section = Field(default=Section(), description="the plane of the section in machine coordinates")
+    registration: Registration = Field(default=Registration(), description="how the points come onto the nominal")
+    discretisation: Discretisation = Field(default=Discretisation(), description="how finely the nominal is sampled")
+    buffer_points: int = Field(default=500_000, ge=1, description="how many points may wait between the device and the inspection")
+    out: Path | None = Field(default=None, description="the folder for the results; null: no results are written")
+    records: Path | None = Field(
+        default=None, description="the folder of the run records; null: the user's own. A console keeps all its runs in one folder"
+    )
 
     def effective_yaml(self) -> str:
         """Spell the plan with every default filled in and every path absolute; as a plan it means the same."""

@@ -1,24 +1,7 @@
 """The plan of a CT inspection: a YAML file, validated into an immutable model.
 
-    part: {name: blade, serial_number: null}
-    mesh: {file: blade.stl, scale: 1.0}       # STL, PLY or OBJ; mm per unit of the file
-    nominal: {file: blade.dat, scale: 60, closed: null, material: null}
-    tolerance: {lower_mm: -0.05, upper_mm: 0.05, uncertainty_mm: 0.0}
-    sections:
-      normal: [0, 0, 1]                       # the part's axis in the scan, of any length
-      heights_mm: [20, 50, 80]                # along the unit normal, from the scan's origin
-      # every_mm: 0.5                         # in place of heights_mm: a section every 0.5 mm
-      # from_mm: 10                           # null: half a step above the lowest point
-      # to_mm: 90                             # null: the highest point
-      nominal_at: []                          # {height_mm: 80, file: tip.dat}: sections with a nominal of their own
-    cut:
-      cutter: auto                            # auto, open3d, numpy; auto: Open3D, and numpy for more than 50 sections
-      weld_mm: 1e-6                           # loose ends no farther apart are one point
-      shortest_mm: null                       # shorter pieces are dust; null: 5 % of the section's longest
-    registration: {fit: best-fit, method: exact, datum: null, coverage_min: 0.95, reject_outliers: false}
-    out: null
-
-Relative paths are relative to the plan's own folder.
+Relative paths are relative to the plan's own folder. Every field says in its description what it means; docs/ct-plan.md is written
+from these descriptions.
 """
 
 from pathlib import Path
@@ -43,7 +26,7 @@ class Mesh(_Settings):
     """The surface."""
 
     file: Path = Field(description="the surface file: STL, PLY or OBJ")
-    scale: Positive = 1.0
+    scale: Positive = Field(default=1.0, description="how many mm a unit of the file is")
 
 
 class NominalAt(_Settings):
@@ -56,12 +39,12 @@ class NominalAt(_Settings):
 class Sections(_Settings):
     """Where the surface is cut."""
 
-    normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    heights_mm: tuple[float, ...] = ()
-    every_mm: Positive | None = None
-    from_mm: float | None = None
-    to_mm: float | None = None
-    nominal_at: tuple[NominalAt, ...] = ()
+    normal: tuple[float, float, float] = Field(default=(0.0, 0.0, 1.0), description="the part's axis in the scan, of any length")
+    heights_mm: tuple[float, ...] = Field(default=(), description="the heights of the sections along the normal, from the scan's origin")
+    every_mm: Positive | None = Field(default=None, description="the step from section to section, in place of heights_mm")
+    from_mm: float | None = Field(default=None, description="the first height with every_mm; null: half a step above the lowest point")
+    to_mm: float | None = Field(default=None, description="the last height with every_mm; null: the highest point")
+    nominal_at: tuple[NominalAt, ...] = Field(default=(), description="the sections that have a nominal of their own")
 
     @field_validator("normal")
     @classmethod
@@ -84,9 +67,14 @@ class Sections(_Settings):
 class Cut(_Settings):
     """How the surface is cut."""
 
-    cutter: Literal["auto", "open3d", "numpy"] = "auto"
-    weld_mm: Positive = 1e-6
-    shortest_mm: Annotated[float, Field(ge=0)] | None = None
+    cutter: Literal["auto", "open3d", "numpy"] = Field(
+        default="auto",
+        description="what cuts; auto: Open3D where it is there, numpy for more than 50 sections; the points are the same",
+    )
+    weld_mm: Positive = Field(default=1e-6, description="loose ends no farther apart than this are one point")
+    shortest_mm: Annotated[float, Field(ge=0)] | None = Field(
+        default=None, description="pieces shorter than this are dust; null: 5 % of the section's longest"
+    )
 
 
 class CtPlan(_Settings):
@@ -97,9 +85,9 @@ class CtPlan(_Settings):
     nominal: Nominal = Field(description="a mapping with the nominal's file")
     tolerance: Tolerance = Field(description="a mapping with lower_mm and upper_mm")
     sections: Sections = Field(description="a mapping with heights_mm or every_mm")
-    cut: Cut = Cut()
-    registration: Registration = Registration()
-    out: Path | None = None
+    cut: Cut = Field(default=Cut(), description="how the surface is cut")
+    registration: Registration = Field(default=Registration(), description="how the points of a section come onto its nominal")
+    out: Path | None = Field(default=None, description="the folder for the results; null: no results are written")
 
 
 def load_ct_plan(path: Path) -> CtPlan:

@@ -1,40 +1,7 @@
 """Modbus devices as data: a YAML map says which registers hold what, and how they are to be read.
 
-    device: my scanner
-    table: holding                  # holding registers (function 3) or input registers (function 4)
-    word_order: high-first          # or low-first: which register of a 32- or 64-bit number comes first
-    pattern: ring                   # latest, ring, queue or fifo, see below
-    status:                         # optional for latest, queue and fifo: what is read besides the points
-      at: 0                         # address as the protocol counts, from 0
-      fields:
-        magic: {at: 0, type: uint32, equals: 0x434D4D31}       # refuse any other device
-        written: {at: 2, type: uint32}                         # points written so far (ring)
-        state: {at: 4, type: uint16, finished: 2}              # this value: the scan is over
-        sent: {at: 7, type: uint32}                            # points taken: the sequence runs from 0 to it
-        overflow: {at: 5, type: uint16}                        # not 0: the device itself lost points
-        heartbeat: {at: 6, type: uint16}                       # changes while the device is alive
-    points:
-      at: 100
-      entries: 100                  # ring only: how many points the ring holds
-      fields:                       # `at` counts from the first register of a point
-        sequence: {at: 0, type: uint16}                        # its counter, which wraps
-        time: {at: 1, type: uint32, scale: 1.0e-6}             # seconds = scale * value; wraps
-        x: {at: 3, type: int32, scale: 1.0e-5}                 # mm = scale * value + offset
-        y: {at: 5, type: int32, scale: 1.0e-5, invalid: 0x80000000}   # this value means no value
-        flags: {at: 7, type: uint16, invalid_bits: 1}          # any of these bits set: an invalid point
-        crc: {at: 8, type: uint16}      # CRC-16/CCITT-FALSE over the registers before it in the block
-
-latest  the points block holds one point, new when its sequence has changed. Without a sequence every reading counts.
-ring    `written` runs ahead; point number n lies in place n modulo entries. Overrun points are lost, and counted.
-queue   reading the block `pop` takes the oldest message out of the device's queue; the points block, read after it,
-        belongs to that message. `pop` may hold sequence, time, overflow, x, y, z as well.
-fifo    function 24 at the address of the points block hands over up to 31 registers, and forgets them.
-
-`overflow` may stand in every block: it is heard wherever it is read. Without `sent` the scan of a ring that tells its end
-runs from 0 to `written`: what of it was never read soundly is lost.
-
-Coordinates that are not named are 0; a distance sensor's distance is z. Every scale is finite and not 0; true and false are
-no numbers.
+Every field says in its description what it means, as do the tables of the names that a block may hold; docs/register-map.md is
+written from them.
 """
 
 import math
@@ -58,6 +25,44 @@ NUMPY_TYPES = {
 }  # fmt: skip
 
 
+PATTERNS = {
+    "latest": "the points block holds one point, which is new when its sequence has changed; without a sequence every reading counts",
+    "ring": "point number n lies in place n modulo entries, and `written` runs ahead; points that were overrun are lost, and counted",
+    "queue": "reading the block `pop` takes the oldest message out of the device's queue; the points block, read after it, belongs to it",
+    "fifo": "function 24 at the address of the points block hands over up to 31 registers, and the device forgets them",
+}
+STATUS_FIELDS = {
+    "magic": "a number with `equals`: any other device is refused",
+    "written": "the number of points written so far; a ring needs it",
+    "state": "a number with `finished`: at that value the scan is over",
+    "announced": "the number of points that the scan is going to have; 0 says nothing",
+    "sent": "the number of points taken: the sequence runs from 0 to it; without it, a ring that tells its end has sent what it wrote",
+    "overflow": "not 0: the device itself lost points",
+    "heartbeat": "a number that changes while the device is alive",
+    "crc": "the checksum CRC-16/CCITT-FALSE over the registers before it in the block",
+}
+POP_FIELDS = {
+    "pop": "the register whose reading takes the oldest message out of the queue",
+    "queued": "the number of messages that wait",
+    "overflow": "not 0: the device itself lost points",
+    "sequence": "the counter of the message",
+    "time": "the time of the message; seconds = scale * value",
+    "x": "the coordinate x; mm = scale * value + offset",
+    "y": "the coordinate y; mm = scale * value + offset",
+    "z": "the coordinate z, or the distance of a distance sensor; mm = scale * value + offset",
+}
+POINTS_FIELDS = {
+    "sequence": "the counter of the point, which wraps; gaps in it are counted as lost",
+    "time": "the time of the point; seconds = scale * value; an integer wraps",
+    "x": "the coordinate x; mm = scale * value + offset",
+    "y": "the coordinate y; mm = scale * value + offset",
+    "z": "the coordinate z, or the distance of a distance sensor; mm = scale * value + offset",
+    "flags": "bits of the point; with `invalid_bits` they mark it as invalid",
+    "overflow": "not 0: the device itself lost points",
+    "crc": "the checksum CRC-16/CCITT-FALSE over the registers before it in the point",
+}
+
+
 def _no_truth_value(given: object) -> object:
     if isinstance(given, bool):  # pydantic takes true for 1, YAML takes yes and on for true
         raise ValueError("true or false where a number belongs")
@@ -75,14 +80,16 @@ class _Part(BaseModel):
 class RegisterField(_Part):
     """One number: where it lies in its block, and what it means."""
 
-    at: Annotated[Whole, Field(ge=0, le=65535)]
-    type: Literal["uint16", "int16", "uint32", "int32", "uint64", "int64", "float32", "float64"]
-    scale: Number = 1.0
-    offset: Number = 0.0
-    invalid: Whole | None = None
-    invalid_bits: Whole = 0
-    equals: Whole | None = None
-    finished: Whole | None = None
+    at: Whole = Field(ge=0, le=65535, description="the first register of the number, counted from the first register of its block")
+    type: Literal["uint16", "int16", "uint32", "int32", "uint64", "int64", "float32", "float64"] = Field(
+        description="how the number is stored"
+    )
+    scale: Number = Field(default=1.0, description="the factor from the stored number to mm, or to seconds for a time; not 0")
+    offset: Number = Field(default=0.0, description="what is added after scaling")
+    invalid: Whole | None = Field(default=None, description="the bit pattern that means no value, like 0x80000000")
+    invalid_bits: Whole = Field(default=0, description="any of these bits set marks an invalid point")
+    equals: Whole | None = Field(default=None, description="the value that the field must have; at any other the device is refused")
+    finished: Whole | None = Field(default=None, description="the value that says that the scan is over")
 
     @field_validator("scale")
     @classmethod
@@ -106,10 +113,12 @@ class RegisterField(_Part):
 class Block(_Part):
     """Registers read together."""
 
-    at: Annotated[Whole, Field(ge=0, le=65535)]
-    fields: Annotated[dict[str, RegisterField], Field(min_length=1)]
-    entries: Annotated[Whole, Field(ge=1)] = 1
-    registers: Annotated[Whole, Field(ge=0, le=MOST_REGISTERS)] = 0
+    at: Whole = Field(ge=0, le=65535, description="the first register of the block, counted from 0 as on the wire")
+    fields: dict[str, RegisterField] = Field(min_length=1, description="the numbers in the block by their names")
+    entries: Whole = Field(default=1, ge=1, description="how many points a ring holds; of the points block only")
+    registers: Whole = Field(
+        default=0, ge=0, le=MOST_REGISTERS, description="the size of one entry, where it is larger than its last field shows"
+    )
 
     @property
     def size(self) -> int:
@@ -128,20 +137,22 @@ class Block(_Part):
 class RegisterMap(_Part):
     """One kind of Modbus device."""
 
-    device: Annotated[str, Field(min_length=1)]
-    source: str = ""
-    table: Literal["holding", "input"] = "holding"
-    word_order: Literal["high-first", "low-first"] = "high-first"
-    pattern: Literal["latest", "ring", "queue", "fifo"]
-    status: Block | None = None
-    pop: Block | None = None
-    points: Block
+    device: str = Field(min_length=1, description="the name of the device, for messages and results")
+    source: str = Field(default="", description="where the addresses come from, like a manual and its section")
+    table: Literal["holding", "input"] = Field(default="holding", description="holding registers (function 3), or input registers (4)")
+    word_order: Literal["high-first", "low-first"] = Field(
+        default="high-first", description="which register of a number of 32 or 64 bits comes first"
+    )
+    pattern: Literal["latest", "ring", "queue", "fifo"] = Field(description="how the device hands its points over")
+    status: Block | None = Field(default=None, description="what is read besides the points; a ring needs it")
+    pop: Block | None = Field(default=None, description="what takes the oldest message out of a queue")
+    points: Block = Field(description="the points")
 
     @model_validator(mode="after")
     def _complete(self) -> "RegisterMap":
-        _only(self.status, {"magic", "written", "state", "overflow", "heartbeat", "announced", "sent", "crc"}, "status")
-        _only(self.pop, {"pop", "queued", "overflow", "sequence", "time", "x", "y", "z"}, "pop")
-        _only(self.points, {"sequence", "time", "x", "y", "z", "flags", "overflow", "crc"}, "points")
+        _only(self.status, STATUS_FIELDS, "status")
+        _only(self.pop, POP_FIELDS, "pop")
+        _only(self.points, POINTS_FIELDS, "points")
         named = set(self.points.fields) | (set(self.pop.fields) if self.pop else set())
         if not named & {"x", "y", "z"}:
             raise ValueError("points: none of x, y, z is named")
@@ -156,8 +167,8 @@ class RegisterMap(_Part):
         return self
 
 
-def _only(block: Block | None, names: set[str], where: str) -> None:
-    unknown = sorted(set(block.fields) - names) if block else []
+def _only(block: Block | None, names: Mapping[str, str], where: str) -> None:
+    unknown = sorted(set(block.fields) - set(names)) if block else []
     if unknown:
         raise ValueError(f"{where}: field {unknown[0]!r} is none of {', '.join(sorted(names))}")
 

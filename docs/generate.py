@@ -1,0 +1,103 @@
+"""Write the pages of docs that come from the models: `python docs/generate.py`; a test compares them with what stands there."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from pydantic import BaseModel
+
+from cmmlink.plan.reference import Group, groups_of, table
+from cmmlink.plan.scan import Plan
+from cmmlink.plan.surface import CtPlan
+from drivers.codecs.register_map import PATTERNS, POINTS_FIELDS, POP_FIELDS, STATUS_FIELDS, RegisterMap
+
+DOCS = Path(__file__).parent
+WRITTEN = "<!-- Written by docs/generate.py from the models. Change the descriptions there, then run it. -->\n"
+
+PLAN = """
+# The inspection plan
+
+A plan is a YAML file that says what is measured, against which nominal, with which device, and where the results go. Four keys are
+required; every other key has the default shown. Relative paths are relative to the plan's own folder. `cmmlink check plan.yaml` checks a
+plan and every file that it names, and a mistake is reported with its file, line and key.
+
+```yaml
+part: {name: blade}
+nominal: {file: blade.dat, scale: 100}
+tolerance: {lower_mm: -0.05, upper_mm: 0.05}
+device: {type: serial, address: /dev/ttyUSB0}
+```
+
+Anchors, aliases, tags and repeated keys of YAML are refused, so that a plan means what a reader sees.
+"""
+
+CT_PLAN = """
+# The plan of a CT inspection
+
+`cmmlink ct plan.yaml` cuts a surface into sections and inspects each of them. A plan in place of options serves many sections, blades
+whose nominal changes with the height, and repetition. Relative paths are relative to the plan's own folder.
+
+```yaml
+part: {name: blade}
+mesh: {file: blade.stl}
+nominal: {file: blade.dat, scale: 60}
+tolerance: {lower_mm: -0.05, upper_mm: 0.05}
+sections: {normal: [0, 0, 1], heights_mm: [20, 50, 80]}
+```
+"""
+
+REGISTER_MAP = """
+# The register map of a Modbus device
+
+Any device that keeps its points in registers needs a map and nothing else. The map says which registers hold what and how they are to be
+read. Addresses count from 0, as on the wire: register 40001 of a manual is usually the holding register 0 here. `drivers/codecs/maps` holds
+the maps that are shipped, to copy from.
+
+```yaml
+device: my controller
+pattern: latest
+points:
+  at: 40
+  fields:
+    sequence: {at: 0, type: uint16}
+    x: {at: 1, type: float32}
+    y: {at: 3, type: float32}
+```
+
+If numbers of two registers come out absurd, add `word_order: low-first`. Coordinates that are not named are 0. Every scale is finite and
+not 0, and `true` and `false` are not numbers here.
+"""
+
+
+def page(intro: str, model: type[BaseModel]) -> str:
+    """A page of one model: what it is for, and a table for each group of its keys."""
+    return "\n".join([WRITTEN, intro.strip(), "", *(_part(group) for group in groups_of(model))])
+
+
+def named(title: str, meanings: Mapping[str, str]) -> str:
+    """A table of names and their meanings under a title."""
+    rows = [f"| `{name}` | {meaning[0].upper()}{meaning[1:]}. |" for name, meaning in meanings.items()]
+    return "\n".join([f"## {title}", "", "| name | meaning |", "| --- | --- |", *rows, ""])
+
+
+def _part(group: Group) -> str:
+    return f"## {f'`{group.path}`' if group.path else 'All keys'}\n\n{group.meaning}\n\n{table(group)}\n"
+
+
+def _register_map() -> str:
+    fields = [
+        named("Names in the block `status`", STATUS_FIELDS),
+        named("Names in the block `pop`", POP_FIELDS),
+        named("Names in the block `points`", POINTS_FIELDS),
+    ]
+    return "\n".join([page(REGISTER_MAP, RegisterMap), named("The four patterns", PATTERNS), *fields])
+
+
+PAGES: dict[str, Callable[[], str]] = {
+    "plan.md": lambda: page(PLAN, Plan),
+    "ct-plan.md": lambda: page(CT_PLAN, CtPlan),
+    "register-map.md": _register_map,
+}
+
+if __name__ == "__main__":
+    for name, write in PAGES.items():
+        (DOCS / name).write_text(write(), encoding="utf-8")
