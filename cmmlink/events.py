@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from drivers.source import Arrival
+from drivers import Arrival
 from inspection import InspectionResult, LiveUpdate
 
 Ending = Literal["complete", "aborted", "interrupted"]

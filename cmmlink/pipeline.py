@@ -13,8 +13,7 @@ import numpy as np
 
 from cmmlink.buffer import HandOver
 from cmmlink.events import Arrived, Counts, Ending, Event, Judged, RunFinished, RunStarted, Sink
-from drivers.errors import DeviceError
-from drivers.source import Arrival, Damaged, Lost, PointBatch, Rejected, ScanSource
+from drivers import Arrival, Damaged, DeviceError, Lost, PointBatch, Rejected, ScanSource
 from inspection import InspectionError, InspectionResult, LiveInspection, Rejection
 
 _LOOK_S = 0.05  # how often the run looks whether it was asked to stop

@@ -20,10 +20,20 @@ from cmmlink.nominal_files import load_nominal, material_side
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan.surface import CtPlan
 from cmmlink.result_json import summary
-from drivers.surface.contour_source import Contour, ContourSource, Slice, with_points_between
-from drivers.surface.cut import Cutter, NumpyCutter, cut_surface, height_range_mm
-from drivers.surface.open3d_process import Open3DMissing, Open3DProcess
-from drivers.surface.stl_file import SurfaceMesh, read_stl
+from drivers.surface import (
+    Contour,
+    ContourSource,
+    Cutter,
+    NumpyCutter,
+    Open3DMissing,
+    Open3DProcess,
+    Slice,
+    SurfaceMesh,
+    cut_surface,
+    height_range_mm,
+    read_stl,
+    with_points_between,
+)
 from inspection import LiveInspection, NominalProfile, RegistrationError, SectionPlane, Verdict, discretize
 
 _FEW_SECTIONS = 50  # up to here Open3D costs less than half a second; numpy gives the same points, a stack of 200 twice as fast

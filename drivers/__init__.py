@@ -1,1 +1,66 @@
-"""Devices, and files of points, to batches of points in millimetres."""
+"""Devices, and files of points, to batches of points in millimetres.
+
+This is the front door: the contract of every source and decoder, the errors, the wire formats by name, register maps, and
+files of points. What opens a link stays in `drivers.links`, and what cuts surfaces in `drivers.surface`: pyserial, pymodbus,
+scipy and Open3D are loaded only by those who import from there.
+"""
+
+from drivers.codecs import decoder, decoders
+from drivers.codecs.register_decoder import RegisterDecoder
+from drivers.codecs.register_map import RegisterMap, load_map, shipped_maps
+from drivers.errors import DeviceError, DeviceRefused, LinkError, MeshError, PointFileError, ProtocolError
+from drivers.files.point_file import PointFile, PointFileSource, convert_to_mm, points_of, read_points
+from drivers.files.text_table import Columns, parse_columns, read_text
+from drivers.links.capture import Capture
+from drivers.source import (
+    Arrival,
+    Damaged,
+    Decoder,
+    Heartbeat,
+    LinkDown,
+    LinkUp,
+    Lost,
+    PointBatch,
+    Rejected,
+    ScanClosed,
+    ScanOpened,
+    ScanSource,
+    WireBytes,
+)
+
+__all__ = [
+    "Arrival",
+    "Capture",
+    "Columns",
+    "Damaged",
+    "Decoder",
+    "DeviceError",
+    "DeviceRefused",
+    "Heartbeat",
+    "LinkDown",
+    "LinkError",
+    "LinkUp",
+    "Lost",
+    "MeshError",
+    "PointBatch",
+    "PointFile",
+    "PointFileError",
+    "PointFileSource",
+    "ProtocolError",
+    "RegisterDecoder",
+    "RegisterMap",
+    "Rejected",
+    "ScanClosed",
+    "ScanOpened",
+    "ScanSource",
+    "WireBytes",
+    "convert_to_mm",
+    "decoder",
+    "decoders",
+    "load_map",
+    "parse_columns",
+    "points_of",
+    "read_points",
+    "read_text",
+    "shipped_maps",
+]

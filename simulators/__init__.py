@@ -1,1 +1,24 @@
-"""Fake devices that speak the wire protocols, each a program of its own."""
+"""Simulated devices that speak the wire protocols, each a program of its own.
+
+This is the front door: which devices there are, what they are told, and the scan that they will send. They share no line
+with `drivers`, so that a mistake in one is not hidden by the same mistake in the other.
+"""
+
+from simulators.devices import known_devices
+from simulators.faults import CATALOGUE, Fault, Injector
+from simulators.motion import Motion, Walk, read_path, walk
+from simulators.settings import SimulatorSettings, say, settings_from
+
+__all__ = [
+    "CATALOGUE",
+    "Fault",
+    "Injector",
+    "Motion",
+    "SimulatorSettings",
+    "Walk",
+    "known_devices",
+    "read_path",
+    "say",
+    "settings_from",
+    "walk",
+]

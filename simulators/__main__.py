@@ -2,12 +2,13 @@
 
 import sys
 
-from simulators.settings import devices, say, settings_from
+from simulators.devices import known_devices
+from simulators.settings import say, settings_from
 
 
 def main(arguments: list[str]) -> None:
     """Serve the device named first."""
-    known = devices()
+    known = known_devices()
     if not arguments or arguments[0] not in known:
         raise SystemExit(f"name a device: {', '.join(sorted(known))}")
     try:

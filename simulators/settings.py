@@ -1,8 +1,6 @@
 """What a simulated device is told, from Python or from a command line, and how its parent process hears of it."""
 
 import argparse
-import importlib
-import pkgutil
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -35,16 +33,6 @@ class SimulatorSettings:
 
 Announce = Callable[[str], None]
 Serve = Callable[[SimulatorSettings, Announce], None]
-
-
-def devices() -> Mapping[str, Serve]:
-    """Return every simulated device: the modules of this package that say `DEVICES`."""
-    package = __package__ or "simulators"
-    found: dict[str, Serve] = {}
-    for module in pkgutil.iter_modules([str(Path(__file__).parent)]):
-        if module.name != "__main__":
-            found.update(getattr(importlib.import_module(f"{package}.{module.name}"), "DEVICES", {}))
-    return found
 
 
 def settings_from(arguments: Sequence[str], program: str | None = None) -> SimulatorSettings:

@@ -57,12 +57,20 @@ from cmmlink.report.stack_folder import write_stack
 from cmmlink.report.terminal import WORDS, LiveTable, print_summary
 from cmmlink.result_json import identity, summary
 from cmmlink.stack import SectionOutcome, inspect_stack
-from drivers.codecs import decoder
-from drivers.errors import DeviceError, LinkError, MeshError, PointFileError
-from drivers.files.point_file import PointFileSource
+from drivers import (
+    Decoder,
+    DeviceError,
+    LinkError,
+    MeshError,
+    PointFileError,
+    PointFileSource,
+    RegisterDecoder,
+    ScanSource,
+    decoder,
+    load_map,
+)
 from drivers.links.axis import Beam, ConstantFeed, FollowedAxis
 from drivers.links.serial_scanner import SerialScanner, ports
-from drivers.source import Decoder, ScanSource
 from inspection import InspectionError, LiveInspection, NominalProfile, ToleranceZone, Verdict, rehearse, while_compiling
 
 if TYPE_CHECKING:
@@ -458,7 +466,6 @@ def _link_of(device: SerialDevice | ModbusDevice) -> ScanSource:
             silence_s=device.silence_s,
             reconnect_s=device.reconnect_s,
         )
-    from drivers.codecs.register_map import load_map  # noqa: PLC0415
     from drivers.links.modbus_scanner import ModbusScanner  # noqa: PLC0415 - pymodbus is loaded for those who need it
 
     return ModbusScanner(
@@ -480,8 +487,6 @@ def decoder_of(device: Device) -> Decoder | None:
         return None
     if isinstance(device, SerialDevice):
         return decoder(device.format, **device.options)
-    from drivers.codecs.register_decoder import RegisterDecoder  # noqa: PLC0415 - with the maps, only where Modbus is spoken
-    from drivers.codecs.register_map import load_map  # noqa: PLC0415
 
     return RegisterDecoder(load_map(device.map), count=device.points)
 
@@ -835,9 +840,9 @@ def list_ports() -> int:
 @app.command(add_help_option=False, context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
 def simulate(context: typer.Context, device: Annotated[str, typer.Argument(metavar="DEVICE")] = "") -> int:
     """Serve a simulated device."""
-    from simulators.settings import devices, say, settings_from  # noqa: PLC0415 - only this command knows simulators
+    from simulators import known_devices, say, settings_from  # noqa: PLC0415 - only this command knows simulators
 
-    known = devices()
+    known = known_devices()
     if device in ("-h", "--help"):
         typer.echo(textwrap.fill(f"cmmlink simulate DEVICE, one of: {', '.join(sorted(known))}", 80) + "\n")
         settings_from(["--help"], "cmmlink simulate DEVICE")

@@ -5,7 +5,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 
-from drivers.surface.open3d_process import Open3DStatus, mend_open3d, open3d_status
+from drivers.surface import Open3DStatus, mend_open3d, open3d_status
 
 
 def look_after_open3d(

@@ -7,7 +7,7 @@ from datetime import datetime
 from typing import Literal
 
 from cmmlink.events import Arrived, Event, Judged, RunFinished, RunStarted
-from drivers.source import Damaged, LinkDown, LinkUp, Lost, Rejected
+from drivers import Damaged, LinkDown, LinkUp, Lost, Rejected
 
 Severity = Literal["fault", "warning"]
 _MOST = 200  # alarms kept; the oldest acknowledged ones go first

@@ -21,7 +21,7 @@ from cmmlink.record.recorder import Basis, Evidence, Recorder
 from cmmlink.record.replay import Replay, recorded_plan, recorded_profile, replay
 from cmmlink.record.store import Store
 from cmmlink.result_json import summary
-from drivers.source import Decoder
+from drivers import Decoder
 from inspection import NominalProfile
 
 _MOST_LISTED = 500

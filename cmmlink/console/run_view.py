@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from cmmlink.console.extremes import DEVIATION, FOOT_X, NORMAL_X, STATION, VERDICT, ChangedBins, Extremes
 from cmmlink.events import Arrived, Counts, Event, Judged, RunStarted
 from cmmlink.result_json import number, summary
-from drivers.source import Heartbeat, LinkDown, PointBatch, ScanClosed, ScanOpened
+from drivers import Heartbeat, LinkDown, PointBatch, ScanClosed, ScanOpened
 from inspection import LiveUpdate, NominalProfile, ToleranceZone, Verdict, coverage
 
 Phase = Literal["preparing", "starting", "measuring", "ending", "finished"]

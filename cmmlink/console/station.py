@@ -23,8 +23,7 @@ from cmmlink.events import Event, RunStarted, Sink
 from cmmlink.from_plan import planned_inspection, planned_profile
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan.scan import FileDevice, Plan, load_plan
-from drivers.errors import DeviceError, PointFileError
-from drivers.source import PointBatch, ScanOpened, ScanSource
+from drivers import DeviceError, PointBatch, PointFileError, ScanOpened, ScanSource
 from inspection import InspectionError, NominalProfile, rehearse
 
 Found = TypeVar("Found")

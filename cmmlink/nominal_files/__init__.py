@@ -17,8 +17,7 @@ from typing import Literal, Protocol, cast
 import numpy as np
 
 from cmmlink.errors import YamlError
-from drivers.errors import PointFileError
-from drivers.files.point_file import read_text
+from drivers import PointFileError, read_text
 from inspection import NominalError, NurbsCurve
 
 _ALMOST_CLOSED = 0.05  # a gap below this fraction of the length still tells inside from outside: a blunt trailing edge

@@ -4,7 +4,7 @@ import numpy as np
 
 from cmmlink.nominal_files import NominalFile
 from cmmlink.nominal_files.through_points import through_points
-from drivers.files.point_file import parse_columns, points_of
+from drivers import parse_columns, points_of
 from inspection import NominalError
 
 SUFFIXES = (".asc", ".csv", ".txt", ".xyz")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from cmmlink.nominal_files import NominalFile
 from cmmlink.nominal_files.through_points import through_points
-from drivers.files.point_file import checked_mm, parse_columns
+from drivers import convert_to_mm, parse_columns
 from inspection import NominalError
 
 SUFFIXES = (".dat",)
@@ -37,7 +37,7 @@ def read(text: str, scale: float, closed: bool | None) -> NominalFile:
     table, lines, counts = _without_counts(columns.values, columns.line_numbers, notes)
     blocks = _blocks(table, lines, body.split("\n"), counts)
     kind, (points, order) = _loop(blocks, notes)
-    points_mm = checked_mm(points, order, scale)
+    points_mm = convert_to_mm(points, order, scale)
     if scale == 1.0 and np.ptp(points_mm, axis=0).max() <= _CHORD_UNITS:
         notes.append("no scale given: a chord of 1 is taken as 1 mm")
     return through_points(points_mm, order, closed, kind, (*columns.notes, *notes))

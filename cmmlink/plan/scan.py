@@ -14,9 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validat
 
 from cmmlink.errors import PlanError, YamlError
 from cmmlink.plan.yaml_model import line_of, read_model
-from drivers.codecs.register_map import shipped_maps
-from drivers.errors import PointFileError
-from drivers.files.point_file import read_text
+from drivers import PointFileError, read_text, shipped_maps
 from inspection import ToleranceZone
 
 Vector = tuple[float, float, float]

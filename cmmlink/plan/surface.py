@@ -12,8 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 from cmmlink.errors import PlanError, YamlError
 from cmmlink.plan.scan import Nominal, Part, Registration, Tolerance
 from cmmlink.plan.yaml_model import read_model
-from drivers.errors import PointFileError
-from drivers.files.point_file import read_text
+from drivers import PointFileError, read_text
 
 Positive = Annotated[float, Field(gt=0)]
 

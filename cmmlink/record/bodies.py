@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmmlink.errors import StoreError
-from drivers.source import Arrival, PointBatch, WireBytes
+from drivers import Arrival, PointBatch, WireBytes
 from inspection import InspectionResult
 
 POINT_BYTES = 40

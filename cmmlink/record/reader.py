@@ -19,7 +19,7 @@ from cmmlink.record.bodies import Moment, unpack_document, unpack_moments, unpac
 from cmmlink.record.chain import Record, is_damaged
 from cmmlink.record.recorder import end_draft
 from cmmlink.record.store import FILE_NAME, Store
-from drivers.source import Arrival, PointBatch, Rejected, WireBytes
+from drivers import Arrival, PointBatch, Rejected, WireBytes
 
 _CUT_OFF = "the program ended before the run did: power failure, crash or kill"
 

@@ -23,8 +23,7 @@ from cmmlink.record.bodies import Moment, pack_document, pack_judged, pack_momen
 from cmmlink.record.chain import Draft, Kind
 from cmmlink.record.store import Store
 from cmmlink.result_json import number, summary
-from drivers.codecs.register_map import load_map
-from drivers.source import PointBatch, Rejected, WireBytes
+from drivers import PointBatch, Rejected, WireBytes, load_map
 from inspection import InspectionResult
 
 COMMIT_S = 0.1

@@ -25,8 +25,7 @@ from cmmlink.record.reader import RecordedRun, moments_of, points_of, reads_of
 from cmmlink.record.recorder import result_sha256, software
 from cmmlink.record.store import Store
 from cmmlink.result_json import summary
-from drivers.links.capture import Capture
-from drivers.source import Arrival, Decoder, LinkDown, LinkUp, PointBatch
+from drivers import Arrival, Capture, Decoder, LinkDown, LinkUp, PointBatch
 from inspection import NominalProfile
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from cmmlink.errors import PlanError
 from cmmlink.report.deviations_csv import write_deviations
 from cmmlink.stack import SectionOutcome, StackOutcome
-from drivers.surface.contour_source import Slice
+from drivers.surface import Slice
 from inspection import ToleranceZone
 
 CONTOUR_HEADER = ("contour", "closed", "hole", "x_mm", "y_mm", "z_mm", "section_x_mm", "section_y_mm")

@@ -11,7 +11,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 from rich.table import Table
 
 from cmmlink.events import Arrived, Counts, Event, Judged, RunStarted
-from drivers.source import LinkDown, LinkUp, ScanOpened
+from drivers import LinkDown, LinkUp, ScanOpened
 from inspection import InspectionResult, LiveUpdate, Rejection, ToleranceZone, Verdict
 
 WORDS = {Verdict.CONFORM: "CONFORM", Verdict.UNCERTAIN: "NOT PROVEN", Verdict.NONCONFORM: "NOT CONFORM"}

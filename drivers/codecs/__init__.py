@@ -4,7 +4,6 @@ import importlib
 import inspect
 import pkgutil
 from collections.abc import Callable, Mapping
-from pathlib import Path
 
 from drivers.source import Decoder
 
@@ -12,9 +11,9 @@ from drivers.source import Decoder
 def decoders() -> Mapping[str, Callable[..., Decoder]]:
     """Return what makes a decoder, by the name of its format."""
     found: dict[str, Callable[..., Decoder]] = {}
-    for module in pkgutil.iter_modules([str(Path(__file__).parent)]):
+    for module in pkgutil.iter_modules(__path__):
         if module.name.endswith("_frames"):
-            found.update(importlib.import_module(f"{__package__}.{module.name}").DECODERS)
+            found.update(importlib.import_module(f"{__name__}.{module.name}").DECODERS)
     return found
 
 

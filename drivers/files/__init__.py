@@ -1,1 +1,1 @@
-"""Files of points."""
+"""Files of points, and tables of numbers from any text."""

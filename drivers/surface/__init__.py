@@ -1,1 +1,31 @@
-"""Surfaces: meshes read, cut, and chained into contours."""
+"""Surfaces: meshes are read, cut, and chained into contours. This is the front door for whoever needs surfaces.
+
+Open3D itself is loaded only by the child process of `Open3DProcess`.
+"""
+
+from drivers.surface.contour_source import Contour, ContourSource, Gap, Slice, with_points_between
+from drivers.surface.cut import Cutter, NumpyCutter, cut_surface, height_range_mm
+from drivers.surface.open3d_process import Open3DMissing, Open3DProcess, Open3DStatus, mend_open3d, open3d_status
+from drivers.surface.section_axes import SectionAxes
+from drivers.surface.stl_file import SurfaceMesh, read_stl, surface_of
+
+__all__ = [
+    "Contour",
+    "ContourSource",
+    "Cutter",
+    "Gap",
+    "NumpyCutter",
+    "Open3DMissing",
+    "Open3DProcess",
+    "Open3DStatus",
+    "SectionAxes",
+    "Slice",
+    "SurfaceMesh",
+    "cut_surface",
+    "height_range_mm",
+    "mend_open3d",
+    "open3d_status",
+    "read_stl",
+    "surface_of",
+    "with_points_between",
+]

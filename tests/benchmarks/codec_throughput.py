@@ -19,10 +19,11 @@ from drivers.codecs.binary_frames import FRAME, BinaryDecoder
 from drivers.codecs.optoncdt_frames import OptoncdtDecoder
 from drivers.codecs.riftek_frames import RiftekDecoder
 from drivers.source import Decoder, PointBatch
-from simulators.binary_scanner import BlockDevice
-from simulators.optoncdt_scanner import OptoncdtDevice
-from simulators.riftek_scanner import RiftekDevice
-from simulators.serial_scanner import AsciiDevice, Device, Sample
+from simulators.devices.ascii_scanner import AsciiDevice
+from simulators.devices.binary_scanner import BlockDevice
+from simulators.devices.optoncdt_scanner import OptoncdtDevice
+from simulators.devices.riftek_scanner import RiftekDevice
+from simulators.stream import Device, Sample
 
 POINTS = 200_000
 CHUNKS = (64, 1024, 16_384)

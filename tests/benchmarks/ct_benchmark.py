@@ -96,7 +96,7 @@ def role_trimesh(path: Path, normal: NDArray[np.float64], heights: list[float], 
 
 def role_phantom(path: Path, voxel_mm: float) -> dict[str, object]:
     """Write the phantom; apart, because Linux counts what the starting process held towards the peak of the started one."""
-    from tests.ct_phantom import Defect, make_phantom
+    from tests.drivers.surface.ct_phantom import Defect, make_phantom
 
     scan = make_phantom(seed=1, voxel_mm=voxel_mm, height_mm=10.0, defect=Defect(0.1, 40.0, 5.0))
     records = np.zeros(len(scan.corners_mm), RECORD)
@@ -111,7 +111,7 @@ def role_truth(path: Path, voxel_mm: float) -> dict[str, object]:
 
     from cmmlink.plan.surface import CtPlan
     from cmmlink.stack import inspect_stack
-    from tests.ct_phantom import Defect, make_phantom, noise_mm, write_nominal, write_stl
+    from tests.drivers.surface.ct_phantom import Defect, make_phantom, noise_mm, write_nominal, write_stl
 
     defect = Defect(0.1, 40.0, 5.0)
     scan = make_phantom(seed=1, voxel_mm=voxel_mm, height_mm=10.0, specks=25, defect=defect)

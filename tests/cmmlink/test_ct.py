@@ -21,8 +21,18 @@ from cmmlink.stack import SectionOutcome, StackOutcome, inspect_stack
 from drivers.errors import MeshError
 from drivers.surface.open3d_process import Open3DMissing
 from inspection import RegistrationError, Verdict
-from tests.ct_phantom import GOE404, Defect, Phantom, airfoil, make_phantom, noise_mm, write_nominal, write_spline, write_stl
-from tests.drivers.meshes import Triangles, ascii_stl, binary_stl, box, tube, write
+from tests.drivers.surface.ct_phantom import (
+    GOE404,
+    Defect,
+    Phantom,
+    airfoil,
+    make_phantom,
+    noise_mm,
+    write_nominal,
+    write_spline,
+    write_stl,
+)
+from tests.drivers.surface.meshes import Triangles, ascii_stl, binary_stl, box, tube, write
 
 VOXEL = 0.1
 DEFECT = Defect(height_mm=0.1, station_mm=40.0, part_height_mm=2.0)

@@ -19,7 +19,7 @@ from drivers.codecs.register_map import load_map
 from drivers.links.modbus_scanner import ModbusScanner
 from drivers.links.serial_scanner import SerialScanner
 from drivers.source import Arrival, PointBatch, ScanClosed, ScanSource, WireBytes
-from tests.drivers.streams import Account, account
+from tests.drivers.codecs.streams import Account, account
 from tests.integration.simulated import simulated
 
 SIMULATED = {"serial": "ascii", "binary": "binary", "binary-block": "binary", "modbus-ring": "generic-ring", "modbus-fifo": "generic-fifo"}

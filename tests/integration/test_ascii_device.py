@@ -11,7 +11,7 @@ from drivers.codecs.ascii_frames import AsciiDecoder
 from drivers.errors import LinkError, ProtocolError
 from drivers.links.serial_scanner import SerialScanner
 from drivers.source import Arrival, LinkDown, LinkUp, PointBatch, ScanClosed, ScanOpened
-from tests.drivers.streams import Account, account, only_sent_points
+from tests.drivers.codecs.streams import Account, account, only_sent_points
 from tests.integration.simulated import Simulated, simulated
 
 LINES = [

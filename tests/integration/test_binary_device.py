@@ -7,7 +7,7 @@ import pytest
 from drivers.codecs.binary_frames import BinaryDecoder
 from drivers.links.serial_scanner import SerialScanner
 from drivers.source import LinkDown, LinkUp, ScanClosed, ScanOpened
-from tests.drivers.streams import account, only_sent_points
+from tests.drivers.codecs.streams import account, only_sent_points
 from tests.integration.simulated import simulated
 
 COUNT = 1000

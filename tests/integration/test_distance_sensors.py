@@ -13,7 +13,7 @@ from drivers.links.axis import Beam, ConstantFeed
 from drivers.links.serial_scanner import SerialScanner
 from drivers.source import Decoder, ScanClosed
 from simulators.motion import Motion, fed
-from tests.drivers.streams import account
+from tests.drivers.codecs.streams import account
 from tests.integration.simulated import Simulated, simulated
 
 COUNT, RATE_HZ, SPEED_MM_S = 300, 1000.0, 100.0

@@ -14,7 +14,7 @@ from drivers.codecs.register_map import load_map
 from drivers.errors import DeviceRefused, LinkError, ProtocolError
 from drivers.links.modbus_scanner import ModbusScanner
 from drivers.source import Arrival, Heartbeat, LinkDown, LinkUp, PointBatch, ScanClosed, ScanOpened
-from tests.drivers.streams import Account, account, only_sent_points
+from tests.drivers.codecs.streams import Account, account, only_sent_points
 from tests.integration.simulated import Simulated, simulated
 
 COUNT = 1000

@@ -26,7 +26,7 @@ from cmmlink.plan.scan import Plan
 from drivers.errors import LinkError
 from drivers.source import Damaged, LinkDown, LinkUp, Lost, PointBatch
 from inspection import InspectionResult, NominalProfile, RigidTransform, synthetic
-from tests.drivers.meshes import binary_stl, tube, write
+from tests.drivers.surface.meshes import binary_stl, tube, write
 
 from .conftest import TOKEN, Bench, MakeBench
 from .played import CLOSED, PLAN, batches, measured, opened

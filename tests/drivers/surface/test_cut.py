@@ -15,8 +15,8 @@ from drivers.surface.contour_source import ContourSource, Slice, with_points_bet
 from drivers.surface.cut import Cutter, NumpyCutter, cut_surface, height_range_mm
 from drivers.surface.open3d_process import Open3DProcess
 from drivers.surface.stl_file import SurfaceMesh, read_stl, surface_of
-from tests.ct_phantom import make_phantom
-from tests.drivers.meshes import Triangles, ascii_stl, binary_stl, box, rotation, tube, write
+from tests.drivers.surface.ct_phantom import make_phantom
+from tests.drivers.surface.meshes import Triangles, ascii_stl, binary_stl, box, rotation, tube, write
 
 CUBE = box((0, 0, 0), (10, 10, 10))
 A, B = 12.0, 5.0  # half axes of an ellipse; below 16 mm a float32 is good to 0.5e-6 mm
@@ -203,7 +203,7 @@ def test_open3d_is_never_loaded_into_this_process() -> None:
         "from drivers.surface.cut import cut_surface\n"
         "from drivers.surface.open3d_process import Open3DProcess\n"
         "from drivers.surface.stl_file import surface_of\n"
-        "from tests.drivers.meshes import box\n"
+        "from tests.drivers.surface.meshes import box\n"
         "with Open3DProcess() as child:\n"
         "    (found,) = cut_surface(surface_of(box((0, 0, 0), (1, 1, 1)), '', ''), (0, 0, 1), [0.5], cutter=child)\n"
         "assert len(found.contours) == 1\n"
@@ -212,7 +212,7 @@ def test_open3d_is_never_loaded_into_this_process() -> None:
     with Open3DProcess() as process:
         if process.status().version is None:
             pytest.skip(process.status().sentence())
-    subprocess.run([sys.executable, "-c", program], check=True, cwd=Path(__file__).parents[2])
+    subprocess.run([sys.executable, "-c", program], check=True, cwd=Path(__file__).parents[3])
 
 
 # Bad surfaces: a clear error or a stated warning, never an empty result that looks good ---------------------------------

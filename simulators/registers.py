@@ -1,4 +1,4 @@
-"""Simulated scanners behind Modbus TCP or RTU: the only file of simulators that knows pymodbus; a program of its own.
+"""The engine of simulated devices behind Modbus TCP or RTU: the only file of simulators that knows pymodbus.
 
 A device keeps registers that are computed when they are read; the server, the pace, the line and its faults are here.
 `pty` serves RTU over a pair of pseudo-terminals with a relay between them, which is where bytes are damaged.

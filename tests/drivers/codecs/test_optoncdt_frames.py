@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from drivers.codecs.optoncdt_frames import ERRORS, OptoncdtDecoder
 from drivers.errors import DeviceRefused, ProtocolError
 from drivers.source import ScanClosed, ScanOpened
-from simulators.optoncdt_scanner import FIRST_COUNT, OptoncdtDevice
-from simulators.serial_scanner import Sample
-from tests.drivers.streams import Account, account, any_cut_is_the_same, decoded, flipped
+from simulators.devices.optoncdt_scanner import FIRST_COUNT, OptoncdtDevice
+from simulators.stream import Sample
+from tests.drivers.codecs.streams import Account, account, any_cut_is_the_same, decoded, flipped
 
 INFO = b"GETOUTINFO_RS422 DIST1 COUNTER TIMESTAMPLO TIMESTAMPHI\r\n->"
 # By hand from the manual's layout (ILD1420 p. 84): 32760 = 0111 111111 111000 is 38 7F 87;

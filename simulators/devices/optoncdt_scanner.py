@@ -1,15 +1,14 @@
-"""A simulated Micro-Epsilon optoNCDT 1420 on RS422, over which the part is fed; a program of its own.
+"""A simulated Micro-Epsilon optoNCDT 1420 on RS422, over which the part is fed.
 
 Range 50 mm; the path gives the distance y over x. It answers ASCII commands with a prompt while it streams three-byte
 words, and adds the values asked for with OUTADD_RS422 to every distance.
 """
 
-import sys
 from collections.abc import Sequence
 
 from simulators.motion import fed
-from simulators.serial_scanner import Device, Sample, stream
-from simulators.settings import Announce, SimulatorSettings, say, settings_from
+from simulators.settings import Announce, SimulatorSettings
+from simulators.stream import Device, Sample, stream
 
 RANGE_MM = 50.0
 FIRST_COUNT = 262_000  # so that the 18-bit counter soon wraps
@@ -72,6 +71,3 @@ def serve(settings: SimulatorSettings, announce: Announce) -> None:
 
 
 DEVICES = {"optoncdt": serve}
-
-if __name__ == "__main__":
-    serve(settings_from(sys.argv[1:]), say)

@@ -15,7 +15,7 @@ from drivers.codecs.register_map import load_map
 from drivers.errors import DeviceRefused, LinkError
 from drivers.links.modbus_scanner import FifoAnswer, ModbusScanner
 from drivers.source import PointBatch, ScanClosed
-from tests.drivers.streams import account
+from tests.drivers.codecs.streams import account
 
 RIFTEK = load_map("riftek-rf60x")
 

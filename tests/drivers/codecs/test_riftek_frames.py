@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from drivers.codecs.riftek_frames import RiftekAsciiDecoder, RiftekDecoder
 from drivers.errors import ProtocolError
 from drivers.source import Arrival, ScanClosed
-from simulators.riftek_scanner import RiftekDevice
-from simulators.serial_scanner import Sample
-from tests.drivers.streams import Account, account, any_cut_is_the_same, decoded, flipped
+from simulators.devices.riftek_scanner import RiftekDevice
+from simulators.stream import Sample
+from tests.drivers.codecs.streams import Account, account, any_cut_is_the_same, decoded, flipped
 
 # Manual RF602 rev. 1.2.0, p. 17: request 01 86 is answered F5 FA F2 F0, which is 677, 2.066 mm of a range of 50 mm.
 GOLDEN_RESULT = bytes.fromhex("F5FAF2F0")

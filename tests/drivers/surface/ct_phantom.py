@@ -17,7 +17,7 @@ from scipy.spatial import KDTree
 from scipy.special import erfc
 from skimage.measure import marching_cubes
 
-GOE404 = Path(__file__).parent / "data" / "airfoils" / "goe404.dat"
+GOE404 = Path(__file__).parents[2] / "data" / "airfoils" / "goe404.dat"
 IN_PLANE_DEG, TILT_DEG = 7.3, 2.5
 OFFSET_MM = np.array([12.0, -7.0, 31.0])
 HARDENING, HARDENING_DEPTH_MM = 0.15, 2.0

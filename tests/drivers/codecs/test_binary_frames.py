@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from drivers.codecs.binary_frames import BLOCK_POINT, FRAME, HEAD, BinaryDecoder
 from drivers.source import Heartbeat, ScanClosed, ScanOpened
-from simulators.binary_scanner import BinaryDevice, BlockDevice
-from simulators.serial_scanner import Sample
-from tests.drivers.streams import account, any_cut_is_the_same, decoded, flipped, only_sent_points
+from simulators.devices.binary_scanner import BinaryDevice, BlockDevice
+from simulators.stream import Sample
+from tests.drivers.codecs.streams import account, any_cut_is_the_same, decoded, flipped, only_sent_points
 
 # Written by hand from the format's definition, checksums with a bit-by-bit CRC (check values 29B1 and CBF43926):
 # opening of device 4711 with 3 points; point 0 at 1000 us (1.5, -2.25, 0.125) mm; heartbeat "1 sent";

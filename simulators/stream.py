@@ -1,8 +1,7 @@
-"""A simulated scanner that streams lines of text over a pseudo-terminal or TCP; a program of its own.
+"""The engine of simulated devices that stream: it paces one scan, sends it over a line and lets the faults happen.
 
-`python -m simulators.serial_scanner --address pty --path section.csv` prints the address it serves as its first line,
-waits for a client, streams one scan and ends; its last line says, as JSON, how many points it took and which faults
-struck how often.
+A device says only what its bytes are (`Device`). Its address is announced first; then the engine waits for a client and
+streams one scan; at the end it announces, as JSON, how many points the device took and which faults struck how often.
 """
 
 import copy
@@ -10,7 +9,6 @@ import json
 import math
 import sys
 import time
-from binascii import crc_hqx
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -19,7 +17,7 @@ import numpy as np
 from simulators.faults import CATALOGUE, Injector
 from simulators.line import Line, open_line
 from simulators.motion import Walk, walk
-from simulators.settings import Announce, SimulatorSettings, say, settings_from
+from simulators.settings import Announce, SimulatorSettings
 
 HEARTBEAT_S = 0.5
 IMPATIENCE_S = 2.0  # a client that says nothing for so long gets the scan all the same
@@ -70,50 +68,6 @@ class Device:
     def frames_asked_for(self) -> int | None:
         """Return how many frames the host waits for; None: the device sends them unasked."""
         return None
-
-
-class AsciiDevice(Device):
-    """Lines of text with a checksum each: `P,seq,t_us,x,y,z,flags*CRC`."""
-
-    def __init__(self) -> None:
-        self._heard = b""
-
-    def opening(self, count: int) -> bytes:
-        """Say three times which device begins, so that one damaged line does not cost the scan."""
-        return 3 * _line(f"S,simulated scanner,SIM-0001,mm,{count}")
-
-    def frame(self, samples: Sequence[Sample]) -> bytes:
-        """Return one P line."""
-        [taken] = samples
-        x, y, z = taken.point_mm
-        return _line(f"P,{taken.index % 2**32},{round(taken.time_s * 1e6) % 2**32},{x:.6f},{y:.6f},{z:.6f},{int(taken.invalid)}")
-
-    def heartbeat(self, index: int, time_s: float) -> bytes:
-        """Return one H line."""
-        return _line(f"H,{index % 2**32},{round(time_s * 1e6) % 2**32}")
-
-    def closing(self, count: int) -> bytes:
-        """Say three times how many points were sent."""
-        return 3 * _line(f"E,{count}")
-
-    def answer(self, command: bytes) -> bytes:
-        """Listen for a line `G`."""
-        self._heard = (self._heard + command)[-16:]
-        return b""
-
-    def told_to_begin(self) -> bool:
-        """Tell whether the host sent `G`."""
-        return b"G" in self._heard
-
-
-def _line(text: str) -> bytes:
-    body = text.encode("ascii")
-    return b"%b*%04X\r\n" % (body, crc_hqx(body, 0xFFFF))
-
-
-def serve(settings: SimulatorSettings, announce: Announce) -> None:
-    """Serve one scan of the line format; `announce` gets the address, and at the end the tally as JSON."""
-    stream(settings, AsciiDevice(), announce)
 
 
 def stream(settings: SimulatorSettings, device: Device, announce: Announce, taken: Callable[..., Walk] = walk) -> None:
@@ -248,9 +202,3 @@ class _Scan:
             elif begin_s == math.inf:
                 begin_s = time.monotonic() + IMPATIENCE_S
             self._listen(0.02)
-
-
-DEVICES = {"serial": serve}
-
-if __name__ == "__main__":
-    serve(settings_from(sys.argv[1:]), say)

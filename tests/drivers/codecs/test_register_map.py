@@ -9,7 +9,7 @@ import yaml
 
 from drivers.codecs.register_map import MAPS, Block, RegisterField, columns, load_map, shipped_maps
 
-README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+README = (Path(__file__).parents[3] / "README.md").read_text(encoding="utf-8")
 MINE = "device: my controller\n" + README.partition("\ndevice: my controller\n")[2].partition("```")[0]
 
 

@@ -6,8 +6,8 @@
 import numpy as np
 
 from simulators.faults import Injector
-from simulators.modbus_scanner import RegisterDevice, Words, serve_registers
 from simulators.motion import Walk, fed
+from simulators.registers import RegisterDevice, Words, serve_registers
 from simulators.settings import Announce, SimulatorSettings
 
 RANGE_MM = 50

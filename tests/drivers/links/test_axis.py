@@ -9,7 +9,7 @@ import pytest
 from drivers.errors import LinkError, ProtocolError
 from drivers.links.axis import Beam, ConstantFeed, FollowedAxis
 from drivers.source import Arrival, Damaged, Lost, PointBatch, ScanClosed, WireBytes
-from tests.drivers.streams import account
+from tests.drivers.codecs.streams import account
 
 BEAM = Beam(origin_mm=(1.0, 2.0, 3.0), distance_direction=(0.0, -1.0, 0.0), axis_direction=(0.6, 0.0, 0.8))
 

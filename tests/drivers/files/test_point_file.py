@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from drivers.errors import PointFileError
-from drivers.files.point_file import PointFileSource, parse_columns, points_of, read_points, read_text
+from drivers.files.point_file import PointFileSource, points_of, read_points
+from drivers.files.text_table import parse_columns, read_text
 from drivers.source import PointBatch, ScanClosed, ScanOpened
 
 Array = NDArray[np.float64]

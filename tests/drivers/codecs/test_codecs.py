@@ -3,7 +3,7 @@ import pytest
 from drivers.codecs import decoder, decoders
 from drivers.codecs.ascii_frames import AsciiDecoder
 from drivers.codecs.riftek_frames import RiftekDecoder
-from simulators.settings import devices
+from simulators import known_devices
 
 
 def test_every_format_is_found_by_its_name() -> None:
@@ -14,7 +14,7 @@ def test_every_format_is_found_by_its_name() -> None:
 
 def test_every_simulated_device_is_found_by_its_name() -> None:
     streams = {"serial", "binary", "binary-block", "optoncdt", "riftek", "riftek-ascii"}
-    assert set(devices()) == streams | {"riftek-modbus", "modbus-ring", "modbus-fifo", "gocator"}
+    assert set(known_devices()) == streams | {"riftek-modbus", "modbus-ring", "modbus-fifo", "gocator"}
 
 
 @pytest.mark.parametrize(

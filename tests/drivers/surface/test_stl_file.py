@@ -7,7 +7,7 @@ import pytest
 
 from drivers.errors import MeshError
 from drivers.surface.stl_file import SurfaceMesh, read_stl
-from tests.drivers.meshes import Triangles, ascii_stl, binary_stl, box, write
+from tests.drivers.surface.meshes import Triangles, ascii_stl, binary_stl, box, write
 
 CUBE = box((0, 0, 0), (10, 10, 10))
 

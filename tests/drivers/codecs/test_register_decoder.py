@@ -12,8 +12,7 @@ from drivers.codecs.register_decoder import RegisterDecoder
 from drivers.codecs.register_map import RegisterMap, load_map
 from drivers.errors import DeviceRefused, ProtocolError
 from drivers.source import Arrival, Heartbeat, Lost, ScanClosed, ScanOpened
-from tests.drivers.streams import account
-from tests.drivers.test_ascii_frames import crc_bitwise
+from tests.drivers.codecs.streams import account, crc_bitwise
 
 RING = load_map("generic-ring")
 

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from drivers.codecs.ascii_frames import LONGEST_LINE, AsciiDecoder
 from drivers.errors import ProtocolError
 from drivers.source import Damaged, Heartbeat, ScanClosed, ScanOpened
-from simulators.serial_scanner import AsciiDevice, Sample
-from tests.drivers.streams import account, any_cut_is_the_same, decoded, flipped, only_sent_points
+from simulators.devices.ascii_scanner import AsciiDevice
+from simulators.stream import Sample
+from tests.drivers.codecs.streams import account, any_cut_is_the_same, crc_bitwise, decoded, flipped, only_sent_points
 
 # Written by hand from the format's definition; the checksums by the bitwise CRC-16/CCITT-FALSE below, not by the decoder's library call.
 GOLDEN = (
@@ -22,15 +23,6 @@ GOLDEN = (
     b"P,2,2500,10,20,30,1*C4E8\r\n"
     b"E,3*7F7A\r\n"
 )
-
-
-def crc_bitwise(data: bytes) -> int:
-    crc = 0xFFFF
-    for byte in data:
-        crc ^= byte << 8
-        for _ in range(8):
-            crc = ((crc << 1) ^ 0x1021 if crc & 0x8000 else crc << 1) & 0xFFFF
-    return crc
 
 
 def line(text: str) -> bytes:

@@ -10,8 +10,8 @@ from binascii import crc_hqx
 import numpy as np
 
 from simulators.faults import Injector
-from simulators.modbus_scanner import READ_FIFO, RegisterDevice, Words, serve_registers
 from simulators.motion import Walk
+from simulators.registers import READ_FIFO, RegisterDevice, Words, serve_registers
 from simulators.settings import Announce, SimulatorSettings
 
 RING_AT, ENTRIES = 100, 500

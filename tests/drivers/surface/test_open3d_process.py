@@ -9,7 +9,7 @@ import pytest
 
 from drivers.errors import MeshError
 from drivers.surface.open3d_process import Open3DMissing, Open3DProcess, Open3DStatus, mend_open3d, open3d_status, status_from
-from tests.drivers.meshes import Triangles, box, write
+from tests.drivers.surface.meshes import Triangles, box, write
 
 CUBE = box((0, 0, 0), (10, 10, 10))
 

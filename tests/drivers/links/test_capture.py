@@ -10,8 +10,9 @@ from drivers.codecs.ascii_frames import AsciiDecoder
 from drivers.errors import DeviceError, ProtocolError
 from drivers.links.capture import Capture
 from drivers.source import Arrival, Damaged, LinkDown, LinkUp, PointBatch, WireBytes
+from simulators.devices.ascii_scanner import AsciiDevice
 from simulators.faults import Fault, Injector
-from simulators.serial_scanner import AsciiDevice, Sample
+from simulators.stream import Sample
 
 COUNT = 300
 

@@ -1,15 +1,14 @@
-"""A simulated RIFTEK RF60x distance sensor, binary or ASCII, over which the part is fed; a program of its own.
+"""A simulated RIFTEK RF60x distance sensor, binary or ASCII, over which the part is fed.
 
 Range 50 mm from distance 0; the path gives the distance y over x. The binary stream begins with request 7, ends with
 request 8; request 1 identifies, request 6 gives one result. The ASCII sensor answers `R1` with one distance in mm.
 """
 
-import sys
 from collections.abc import Sequence
 
 from simulators.motion import fed
-from simulators.serial_scanner import Device, Sample, stream
-from simulators.settings import Announce, SimulatorSettings, say, settings_from
+from simulators.settings import Announce, SimulatorSettings
+from simulators.stream import Device, Sample, stream
 
 RANGE_MM = 50.0
 IDENTITY = bytes([63, 0x90, 0x21, 0x43, 80, 0, 50, 0])  # device type, firmware, serial number, base distance, range
@@ -104,6 +103,3 @@ def serve_ascii(settings: SimulatorSettings, announce: Announce) -> None:
 
 
 DEVICES = {"riftek": serve, "riftek-ascii": serve_ascii}
-
-if __name__ == "__main__":
-    serve(settings_from(sys.argv[1:]), say)

@@ -81,3 +81,13 @@ def only_sent_points(book: Account, sent_mm: NDArray[np.float64], within_mm: flo
     got = np.array(book.points_mm).reshape(-1, sent_mm.shape[1])
     wrong = np.abs(got - sent_mm[np.array(book.sequence, dtype=int)]).max(axis=1) > within_mm
     assert not wrong.any(), f"{wrong.sum()} wrong points of {len(got)}"
+
+
+def crc_bitwise(data: bytes) -> int:
+    """CRC-16/CCITT-FALSE bit by bit, as its definition says; no library is asked."""
+    crc = 0xFFFF
+    for byte in data:
+        crc ^= byte << 8
+        for _ in range(8):
+            crc = ((crc << 1) ^ 0x1021 if crc & 0x8000 else crc << 1) & 0xFFFF
+    return crc

@@ -8,8 +8,8 @@ that runs over sets register 978, which stays set. Command 1 starts, 0 stops; th
 import numpy as np
 
 from simulators.faults import Injector
-from simulators.modbus_scanner import RegisterDevice, Words, serve_registers
 from simulators.motion import Walk
+from simulators.registers import RegisterDevice, Words, serve_registers
 from simulators.settings import Announce, SimulatorSettings
 
 STATE_AT, STAMP_AT, MEASUREMENTS_AT = 300, 976, 1000

@@ -1,12 +1,11 @@
-"""A simulated scanner that streams counted binary frames, one a point or many in a block; a program of its own."""
+"""A simulated scanner that streams counted binary frames, one a point or many in a block."""
 
 import struct
-import sys
 from binascii import crc32, crc_hqx
 from collections.abc import Sequence
 
-from simulators.serial_scanner import Device, Sample, stream
-from simulators.settings import Announce, SimulatorSettings, say, settings_from
+from simulators.settings import Announce, SimulatorSettings
+from simulators.stream import Device, Sample, stream
 
 SERIAL_NUMBER = 4711
 
@@ -78,6 +77,3 @@ def serve_blocks(settings: SimulatorSettings, announce: Announce) -> None:
 
 
 DEVICES = {"binary": serve, "binary-block": serve_blocks}
-
-if __name__ == "__main__":
-    serve(settings_from(sys.argv[1:]), say)
