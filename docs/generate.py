@@ -1,6 +1,7 @@
 """Write the pages of docs that come from the models: `python docs/generate.py`; a test compares them with what stands there."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from pydantic import BaseModel
@@ -8,6 +9,20 @@ from pydantic import BaseModel
 from cmmlink.plan.reference import Group, groups_of, table
 from cmmlink.plan.scan import Plan
 from cmmlink.plan.surface import CtPlan
+from cmmlink.record import export
+from cmmlink.report import deviations_csv, stack_folder
+from cmmlink.result_keys import (
+    Exported,
+    Inspected,
+    Measured,
+    Recorded,
+    Replayed,
+    Runs,
+    Shown,
+    StackInspected,
+    Understood,
+    Verified,
+)
 from drivers.codecs.register_map import PATTERNS, POINTS_FIELDS, POP_FIELDS, STATUS_FIELDS, RegisterMap
 
 DOCS = Path(__file__).parent
@@ -68,6 +83,36 @@ not 0, and `true` and `false` are not numbers here.
 """
 
 
+RESULTS = """
+# Results
+
+Every command that takes `--json` prints one object on one line of standard output, and nothing else. Its keys are stable: keys are
+added, not renamed. Lengths are in mm, deviations are positive out of material, and coordinates are those of the nominal. `result.json` in
+the folder of `--out` holds the same object.
+"""
+
+OBJECTS: tuple[tuple[str, type[BaseModel], type[BaseModel] | None], ...] = (
+    ("Of every inspection", Inspected, None),
+    ("`inspect`: further keys", Measured, Inspected),
+    ("`run` and `demo`: further keys", Recorded, Measured),
+    ("`replay`: further keys", Replayed, Inspected),
+    ("`ct`", StackInspected, None),
+    ("`nominal`", Understood, None),
+    ("`runs`", Runs, None),
+    ("`show`, and `run.json` of `export`", Shown, None),
+    ("`export`", Exported, None),
+    ("`verify`", Verified, None),
+)
+
+TABLES: tuple[tuple[str, Mapping[str, str]], ...] = (
+    ("`deviations.csv`: a line for every received point", deviations_csv.COLUMNS),
+    ("`sections.csv` of `ct`: a line for every section", stack_folder.SECTION_COLUMNS),
+    ("`contours.csv` of a section: a line for every contour point", stack_folder.CONTOUR_COLUMNS),
+    ("`points.csv` and `points.npy` of `export`: a line for every point", export.POINT_COLUMNS),
+    ("`wire.csv` of `export`: a line for every read", export.WIRE_COLUMNS),
+)
+
+
 def page(intro: str, model: type[BaseModel]) -> str:
     """A page of one model: what it is for, and a table for each group of its keys."""
     return "\n".join([WRITTEN, intro.strip(), "", *(_part(group) for group in groups_of(model))])
@@ -83,6 +128,26 @@ def _part(group: Group) -> str:
     return f"## {f'`{group.path}`' if group.path else 'All keys'}\n\n{group.meaning}\n\n{table(group)}\n"
 
 
+def results() -> str:
+    """The objects of every command, then the columns of every table."""
+    described: set[str] = set()  # what an earlier object described
+    parts = []
+    for title, model, base in OBJECTS:
+        known = set(base.model_fields) if base else set()
+        own, *inner = groups_of(model)
+        keys = tuple(key for key in own.keys if key.name not in known)
+        fresh = [group for group in inner if group.meaning not in described]
+        described |= {group.meaning for group in inner}
+        parts += [f"## {title}\n\n{own.meaning}\n\n{_holds(replace(own, keys=keys))}\n"]
+        parts += [f"### `{group.path}`\n\n{group.meaning}\n\n{_holds(group)}\n" for group in fresh]
+    return "\n".join([WRITTEN, RESULTS.strip(), "", *parts, *(named(title, columns) for title, columns in TABLES)])
+
+
+def _holds(group: Group) -> str:
+    """The table of an object that is printed: what JSON calls an object is a mapping in YAML."""
+    return table(group, defaults=False).replace("a mapping", "an object").replace("a list of mappings", "a list of objects")
+
+
 def _register_map() -> str:
     fields = [
         named("Names in the block `status`", STATUS_FIELDS),
@@ -96,6 +161,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "plan.md": lambda: page(PLAN, Plan),
     "ct-plan.md": lambda: page(CT_PLAN, CtPlan),
     "register-map.md": _register_map,
+    "results.md": results,
 }
 
 if __name__ == "__main__":

@@ -13,7 +13,18 @@ from cmmlink.record.reader import describe, event_document, moments_of, points_o
 from cmmlink.record.store import Store
 from cmmlink.report.deviations_csv import write_deviations
 
-_POINT_COLUMNS = ("sequence", "time_s", "x_mm", "y_mm", "z_mm")
+POINT_COLUMNS = {
+    "sequence": "the device's own counter of the point, unwrapped",
+    "time_s": "the time of the point by the device's own clock, 0 where it has none",
+    "x_mm": "x in machine coordinates",
+    "y_mm": "y in machine coordinates",
+    "z_mm": "z in machine coordinates",
+}
+WIRE_COLUMNS = {
+    "time_s": "when the bytes were read, by the clock of the run",
+    "offset": "where they begin in wire.bin",
+    "bytes": "how many they are",
+}
 
 
 def export_run(store: Store, run: str, folder: Path) -> list[Path]:
@@ -46,7 +57,7 @@ def _points(store: Store, run: str, folder: Path) -> list[Path]:
     np.save(folder / "points.npy", rows)
     with (folder / "points.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(_POINT_COLUMNS)
+        writer.writerow(POINT_COLUMNS)
         writer.writerows((int(row[0]), *row[1:]) for row in rows.tolist())
     return [folder / "points.npy", folder / "points.csv"]
 
@@ -55,7 +66,7 @@ def _wire(store: Store, run: str, folder: Path) -> list[Path]:
     offset = 0
     with (folder / "wire.bin").open("wb") as raw, (folder / "wire.csv").open("w", newline="", encoding="utf-8") as index:
         writer = csv.writer(index)
-        writer.writerow(("time_s", "offset", "bytes"))
+        writer.writerow(WIRE_COLUMNS)
         for read in reads_of(store, run):
             raw.write(read.data)
             writer.writerow((read.time_s, offset, len(read.data)))

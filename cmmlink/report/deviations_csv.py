@@ -7,14 +7,23 @@ from pathlib import Path
 from cmmlink.record.bodies import JudgedRows
 from inspection import NOT_JUDGED, InspectionResult, Rejection, Verdict
 
-HEADER = ("index", "x_mm", "y_mm", "station_mm", "foot_x_mm", "foot_y_mm", "deviation_mm", "verdict")
+COLUMNS = {
+    "index": "the number of the point in the order of arrival, from 0",
+    "x_mm": "x of the actual surface point in nominal coordinates; ball centres are compensated",
+    "y_mm": "y of the actual surface point in nominal coordinates",
+    "station_mm": "arc length of the foot point from the start of the nominal",
+    "foot_x_mm": "x of the foot point, the nominal point that the actual point is compared with",
+    "foot_y_mm": "y of the foot point",
+    "deviation_mm": "the deviation, positive out of material",
+    "verdict": "conform, nonconform or uncertain; of a rejected point `rejected:` and the reason, beside empty numbers",
+}
 
 
 def write_deviations(result: InspectionResult | JudgedRows, path: Path) -> None:
     """Write the actual points in nominal coordinates, their feet, deviations and verdicts; rejected points say why."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(HEADER)
+        writer.writerow(COLUMNS)
         writer.writerows(_row(result, index) for index in range(result.received))
 
 

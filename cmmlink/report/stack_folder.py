@@ -7,16 +7,32 @@ from pathlib import Path
 
 from cmmlink.errors import PlanError
 from cmmlink.report.deviations_csv import write_deviations
+from cmmlink.result_keys import SectionInspected
 from cmmlink.stack import SectionOutcome, StackOutcome
 from drivers.surface import Slice
 from inspection import ToleranceZone
 
-CONTOUR_HEADER = ("contour", "closed", "hole", "x_mm", "y_mm", "z_mm", "section_x_mm", "section_y_mm")
+CONTOUR_COLUMNS = {
+    "contour": "the number of the contour in its section, from 1",
+    "closed": "closed or open; a closed contour does not repeat its first point",
+    "hole": "hole or outer",
+    "x_mm": "x in the coordinates of the surface",
+    "y_mm": "y in the coordinates of the surface",
+    "z_mm": "z in the coordinates of the surface",
+    "section_x_mm": "x in the plane of the section",
+    "section_y_mm": "y in the plane of the section",
+}
 _SECTION_FILES = ("contours.csv", "deviations.csv", "profile.png")
 _SECTION_KEYS = (
     "height_mm", "asked_height_mm", "verdict", "received", "judged", "rejected", "out_of_tolerance", "max_deviation_mm", "min_deviation_mm",
     "rms_mm", "profile_error_mm", "coverage", "contours", "holes", "open_contours", "set_aside", "cutter",
 )  # fmt: skip
+SECTION_COLUMNS = {
+    **{key: SectionInspected.model_fields[key].description or "" for key in _SECTION_KEYS},
+    "worst_station_mm": "the station of the point farthest from the middle of the zone",
+    "worst_deviation_mm": "the deviation of that point",
+    "warnings": "what was not as it should be in this section, separated by semicolons",
+}
 
 
 def write_stack(
@@ -73,7 +89,7 @@ def write_contours(cut: Slice, path: Path) -> None:
     """Write every contour point, in machine and in section coordinates; closed contours do not repeat their first point."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(CONTOUR_HEADER)
+        writer.writerow(CONTOUR_COLUMNS)
         for number, contour in enumerate(cut.contours, start=1):
             head = (number, "closed" if contour.closed else "open", "hole" if contour.hole else "outer")
             for machine, section in zip(contour.points_mm.tolist(), contour.section_mm.tolist(), strict=True):
@@ -83,7 +99,7 @@ def write_contours(cut: Slice, path: Path) -> None:
 def _write_sections(stack: StackOutcome, path: Path) -> None:
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow((*_SECTION_KEYS, "worst_station_mm", "worst_deviation_mm", "warnings"))
+        writer.writerow(SECTION_COLUMNS)
         for section in stack.sections:
             facts = section.facts()
             worst = facts["worst"] or {}

@@ -12,7 +12,7 @@ from matplotlib.image import imread
 
 from cmmlink.errors import PlanError
 from cmmlink.events import Counts, RunStarted
-from cmmlink.report.deviations_csv import HEADER, write_deviations
+from cmmlink.report.deviations_csv import COLUMNS, write_deviations
 from cmmlink.report.folder import prepare, write_results
 from cmmlink.report.picture import magnification, write_picture
 from cmmlink.result_json import identity, summary
@@ -125,11 +125,11 @@ def test_deviations_csv_has_a_row_for_every_point(profile: NominalProfile, tmp_p
     result = inspected(profile, bumped())
     write_deviations(result, tmp_path / "deviations.csv")
     rows = rows_of(tmp_path / "deviations.csv")
-    assert tuple(rows[0]) == HEADER
-    assert HEADER == ("index", "x_mm", "y_mm", "station_mm", "foot_x_mm", "foot_y_mm", "deviation_mm", "verdict")
+    assert tuple(rows[0]) == tuple(COLUMNS)
+    assert tuple(COLUMNS) == ("index", "x_mm", "y_mm", "station_mm", "foot_x_mm", "foot_y_mm", "deviation_mm", "verdict")
     assert [int(row["index"]) for row in rows] == list(range(360))
     truth = np.column_stack([oval_points(bumped()), [station_mm(i) for i in range(360)], oval_feet(), bumped()])
-    np.testing.assert_allclose([[float(row[name]) for name in HEADER[1:7]] for row in rows], truth, atol=0.51e-6)
+    np.testing.assert_allclose([[float(row[name]) for name in list(COLUMNS)[1:7]] for row in rows], truth, atol=0.51e-6)
     words = np.where(np.abs(bumped() - 0.01) > 0.07, "nonconform", "conform")
     assert [row["verdict"] for row in rows] == words.tolist()
 
@@ -140,7 +140,7 @@ def test_a_rejected_point_keeps_its_row_and_says_why(profile: NominalProfile, tm
     write_deviations(live.finish(), tmp_path / "deviations.csv")
     rows = rows_of(tmp_path / "deviations.csv")
     assert [row["verdict"] for row in rows] == ["conform", "rejected: not finite", "nonconform"]
-    assert [rows[1][name] for name in HEADER[1:7]] == [""] * 6
+    assert [rows[1][name] for name in list(COLUMNS)[1:7]] == [""] * 6
     assert float(rows[2]["deviation_mm"]) == pytest.approx(0.3)
 
 

@@ -1,0 +1,273 @@
+"""The keys of every JSON object that a command prints or writes: their types and what they mean.
+
+The objects are made elsewhere (cmmlink.result_json, cmmlink.stack, cmmlink.record); the tests validate what every command prints
+against these models, which know no key that is not there. docs/results.md is written from them.
+"""
+
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+VerdictWord = Literal["conform", "nonconform", "uncertain"]
+State = Literal["complete", "interrupted", "aborted", "running", "damaged"]
+
+
+class _Json(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+
+class Worst(_Json):
+    """The point farthest from the middle of the tolerance zone."""
+
+    station_mm: float = Field(description="arc length of its foot point from the start of the nominal")
+    x_mm: float = Field(description="x of the actual point in nominal coordinates")
+    y_mm: float = Field(description="y of the actual point in nominal coordinates")
+    deviation_mm: float = Field(description="its deviation, positive out of material")
+
+
+class Pose(_Json):
+    """A motion from section coordinates to nominal coordinates."""
+
+    rotation_deg: float = Field(description="the rotation about the section's origin, counterclockwise")
+    translation_mm: list[float] = Field(min_length=2, max_length=2, description="the translation after the rotation, [x, y]")
+
+
+class Registered(Pose):
+    """How the section lies on the nominal."""
+
+    iterations: int = Field(description="the steps that the fit took; 0 where nothing was fitted")
+    converged: bool = Field(description="whether the fit settled")
+    other_poses: list[Pose] = Field(description="poses that fit as well, for a part that is symmetric; a datum settles which one is meant")
+
+
+class OutStretch(_Json):
+    """A contiguous part of the profile that is out of tolerance."""
+
+    from_mm: float = Field(description="the station at which it begins")
+    to_mm: float = Field(description="the station at which it ends; below from_mm where it crosses the seam of a closed profile")
+    worst_mm: float = Field(description="the deviation in it that is farthest from the middle of the zone")
+
+
+class Zone(_Json):
+    """The tolerance that was applied."""
+
+    lower_mm: float = Field(description="the lower limit of the deviation")
+    upper_mm: float = Field(description="the upper limit of the deviation")
+    uncertainty_mm: float = Field(description="the expanded uncertainty of one deviation")
+
+
+class Inspected(_Json):
+    """What was found. Without a result (nothing could be registered) the counts stand beside nulls, and the verdict is uncertain."""
+
+    verdict: VerdictWord = Field(description="the verdict on the profile; uncertain: neither conformity nor nonconformity is proven")
+    received: int = Field(description="the points that came through the link whole; always judged + rejected")
+    judged: int = Field(description="the points with a verdict")
+    rejected: int = Field(description="the points that cannot be judged")
+    lost: int = Field(description="the points that are missing by the device's own counters")
+    out_of_tolerance: int = Field(description="the points whose verdict is nonconform")
+    max_deviation_mm: float | None = Field(description="the largest deviation")
+    min_deviation_mm: float | None = Field(description="the smallest deviation")
+    rms_mm: float | None = Field(description="the root mean square of the deviations")
+    profile_error_mm: float | None = Field(description="2 * max |deviation|; not the range from smallest to largest")
+    worst: Worst | None = Field(description="the point farthest from the middle of the zone")
+    fit: str | None = Field(description="how the pose was found: best-fit, minimum-zone, or none")
+    method: str | None = Field(description="how deviations were found, like exact")
+    registration: Registered | None = Field(description="how the section lies on the nominal")
+    stretches: list[OutStretch] = Field(description="the contiguous stretches out of tolerance, in the order of their stations")
+    coverage: float = Field(description="the share of the nominal's length that was measured, from 0 to 1")
+    complete: bool = Field(description="whether the scan came to its end")
+    tolerance: Zone | None = Field(description="the tolerance that was applied")
+    rejected_by_reason: dict[str, int] = Field(description="the number of rejected points for each reason that occurred")
+    damaged_bytes: int = Field(description="the bytes on the wire that were no valid frame")
+
+
+class Measured(Inspected):
+    """The result of `inspect`: also what was measured, by whom and with what."""
+
+    part: str = Field(description="the name of the part")
+    serial_number: str | None = Field(description="the serial number of the part")
+    operator: str | None = Field(description="who measured")
+    device: str = Field(description="the device or file that the points came from")
+    simulated: bool = Field(description="whether the device was a simulated one: no real part was measured")
+
+
+class Recorded(Measured):
+    """The result of `run` and `demo`: also what ties it to its record."""
+
+    run: str = Field(description="the id of the recorded run")
+    chain_sha256: str = Field(description="the hash of the run's last record, which follows from every record before it")
+    plan_sha256: str = Field(description="the hash of the effective plan")
+    nominal_sha256: str = Field(description="the hash of the nominal's file")
+    software: dict[str, str] = Field(description="the versions of everything that the result depends on")
+
+
+class Change(_Json):
+    """A value that is not as it was in the recorded run."""
+
+    key: str = Field(description="the dotted key")
+    recorded: Any = Field(description="its value in the recorded run")
+    replayed: Any = Field(description="its value in the replay")
+
+
+class Replayed(Inspected):
+    """The result of `replay`: also how it compares with the recorded one."""
+
+    replay_of: str = Field(description="the id of the recorded run")
+    chain_sha256: str = Field(description="the hash of the run's last record")
+    identical: bool | None = Field(description="whether the result is the recorded one to the last bit; null where none was recorded")
+    changed: list[Change] = Field(description="the settings and software that are not those of the recorded run")
+    differs: list[Change] = Field(description="what of the result is not as recorded")
+
+
+class SectionInspected(Inspected):
+    """One section of a surface: also where it was cut and what was found there."""
+
+    height_mm: float = Field(description="the height at which the section was cut, along the normal")
+    asked_height_mm: float = Field(description="the height that was asked for; the cut is moved a little where facets lie in its plane")
+    contours: int = Field(description="the number of contours in the section")
+    holes: int = Field(description="the number of contours that are holes")
+    open_contours: int = Field(description="the number of contours that do not close")
+    set_aside: int = Field(description="the number of pieces that were too short to be judged")
+    set_aside_longest_mm: float | None = Field(description="the length of the longest of them")
+    cutter: str = Field(description="what cut the surface: open3d or numpy")
+    nominal: str = Field(description="the file of the nominal of this section")
+    warnings: list[str] = Field(description="what was not as it should be in this section")
+
+
+class StackInspected(_Json):
+    """The result of `ct`: the surface, and its sections."""
+
+    verdict: VerdictWord = Field(description="the verdict of the worst section; at best uncertain where sections are missing")
+    complete: bool = Field(description="whether every section that was asked for was inspected")
+    mesh: str = Field(description="the file of the surface")
+    mesh_kind: str = Field(description="the format of that file, like binary STL")
+    triangles: int = Field(description="the number of triangles of the surface")
+    received: int = Field(description="the sum over the sections")
+    judged: int = Field(description="the sum over the sections")
+    rejected: int = Field(description="the sum over the sections")
+    lost: int = Field(description="the sum over the sections")
+    out_of_tolerance: int = Field(description="the sum over the sections")
+    slices: list[SectionInspected] = Field(description="the sections in the order of the plan")
+    notes: list[str] = Field(description="what holds for all sections")
+
+
+class Understood(_Json):
+    """The answer of `nominal`: what was understood of a file."""
+
+    degree: int = Field(description="the degree of the curve")
+    knots: list[float] = Field(description="its knots: as many as control points, plus degree, plus 1")
+    control_points_mm: list[list[float]] = Field(description="its control points [x, y]")
+    weights: list[float] = Field(description="the weights of the control points")
+    closed: bool = Field(description="whether the profile is closed")
+    length_mm: float = Field(description="its length")
+    source_format: str = Field(description="the format that the file was read as")
+    corners: int = Field(description="the number of its corners")
+    material: Literal["left", "right"] | None = Field(description="the side of the material, where the curve shows it")
+    notes: list[str] = Field(description="what was assumed or mended in reading the file")
+
+
+class RunLine(_Json):
+    """One run in the list of runs."""
+
+    run: str = Field(description="the id of the run")
+    started: str | None = Field(description="date and time with the offset from UTC")
+    part: str | None = Field(description="the name of the part")
+    serial_number: str | None = Field(description="the serial number of the part, empty where none was given")
+    state: State = Field(description="how the run ended; running: it is being recorded just now; damaged: its records were altered")
+    received: int | None = Field(description="the points received; null while the run goes on")
+    verdict: VerdictWord | None = Field(description="the verdict; null where there is none")
+
+
+class Runs(_Json):
+    """The answer of `runs`."""
+
+    runs: list[RunLine] = Field(description="every recorded run, oldest first")
+
+
+class Kept(_Json):
+    """How much was recorded of a run."""
+
+    wire_bytes: int = Field(description="the bytes from the wire")
+    reads: int = Field(description="the reads in which they arrived")
+    points: int = Field(description="the points")
+    events: dict[str, int] = Field(description="the other arrivals by their kind")
+    records: int = Field(description="the records in the chain")
+
+
+class RecordedEvent(_Json):
+    """Something that happened on the link; further keys say what, like `reason`, `count`, `expected` or `gap_s`."""
+
+    model_config = ConfigDict(extra="allow")
+
+    event: str = Field(description="its kind, like ScanOpened, Lost or LinkDown")
+    time_s: float = Field(description="when, by the clock of the run")
+    after_points: int = Field(description="the number of points that had arrived before it")
+
+
+class RecordedPose(_Json):
+    """Where the registration stood at one moment of the run."""
+
+    time_s: float = Field(description="when, by the clock of the run")
+    points: int = Field(description="the number of points that had been taken in")
+    state: str = Field(description="seeking, provisional or settled")
+    rotation_rad: float = Field(description="the rotation about the section's origin, counterclockwise")
+    translation_mm: list[float] = Field(description="the translation after the rotation, [x, y]")
+    rms_mm: float | None = Field(description="the root mean square of the deviations at this pose")
+    can_move_mm: float | None = Field(description="by how much a deviation can still move at most; null where it is not known")
+    iterations: int = Field(description="the steps that the fit took")
+    converged: bool = Field(description="whether the fit settled")
+
+
+class Shown(_Json):
+    """The answer of `show`, and `run.json` of `export`: all that is known of a run but its points."""
+
+    run: str = Field(description="the id of the run")
+    started: str = Field(description="date and time with the offset from UTC")
+    clock_s: float = Field(description="the reading of the run's clock at its start")
+    part: str = Field(description="the name of the part")
+    serial_number: str = Field(description="the serial number of the part, empty where none was given")
+    operator: str = Field(description="who measured, empty where nobody was named")
+    device: str = Field(description="the device that the points came from")
+    simulated: bool = Field(description="whether the device was a simulated one")
+    software: dict[str, str] = Field(description="the versions of everything that the result depends on")
+    plan_sha256: str = Field(description="the hash of the effective plan")
+    nominal: str = Field(description="the name of the nominal's file")
+    nominal_sha256: str = Field(description="the hash of the nominal's file")
+    state: State = Field(description="how the run ended")
+    ended: str | None = Field(description="date and time of the end; null while the run goes on")
+    message: str | None = Field(description="what ended the run early, empty where nothing did")
+    received: int | None = Field(description="the points received; null while the run goes on")
+    verdict: VerdictWord | None = Field(description="the verdict; null where there is none")
+    result: Inspected | None = Field(description="the recorded result")
+    chain_sha256: str = Field(description="the hash of the run's last record; empty while the run goes on")
+    recorded: Kept = Field(description="how much was recorded")
+    events: list[RecordedEvent] = Field(description="what happened on the link; damaged frames and heartbeats are counted only")
+    registrations: list[RecordedPose] = Field(description="the history of the registration")
+    plan: str = Field(description="the effective plan as YAML, every default filled in")
+
+
+class Exported(_Json):
+    """The answer of `export`."""
+
+    run: str = Field(description="the id of the run")
+    files: list[str] = Field(description="the files that were written")
+
+
+class Alteration(_Json):
+    """The first record that is not as it was written."""
+
+    number: int = Field(description="its number in the chain")
+    run: str = Field(description="the run that it belongs to, empty where that is not known")
+    kind: str = Field(description="what it holds, like points or result")
+    problem: str = Field(description="what is wrong with it")
+    message: str = Field(description="all of this in one sentence")
+
+
+class Verified(_Json):
+    """The answer of `verify`."""
+
+    altered: bool = Field(description="whether anything was altered")
+    run: str | None = Field(description="the run that was asked for; null: all records")
+    records: int = Field(description="the number of sound records")
+    chain_sha256: str = Field(description="the hash of the last sound record")
+    first: Alteration | None = Field(description="the first record that was altered")
