@@ -28,7 +28,7 @@ from cmmlink.result_keys import (
 )
 from tests.cmmlink.command import cmmlink
 from tests.cmmlink.oval_part import oval_points, write_nominal, write_points
-from tests.drivers.meshes import binary_stl, tube, write
+from tests.drivers.surface.meshes import binary_stl, tube, write
 
 OBJECTS = [value for value in vars(result_keys).values() if isinstance(value, type) and issubclass(value, BaseModel) and value.model_fields]
 
