@@ -36,7 +36,6 @@ from cmmlink.commands.surfaces import ManyHeights, SectionBar, given, own_nomina
 from cmmlink.console.ct_import import Section
 from cmmlink.console.launch import CONSOLE_PORT, graphical_browser, kept_token, served, stay_while_seen
 from cmmlink.console.past_runs import PastRuns
-from cmmlink.console.run_view import Ended, RunFacts
 from cmmlink.console.station import Connected, Means, Refused
 from cmmlink.demo import plan_file as demo_plan_file
 from cmmlink.demo import write_part_path
@@ -54,9 +53,11 @@ from cmmlink.record.replay import Replay
 from cmmlink.record.replay import replay as replayed
 from cmmlink.report.folder import prepare, write_results
 from cmmlink.report.stack_folder import write_stack
-from cmmlink.report.terminal import WORDS, LiveTable, print_summary
+from cmmlink.report.terminal import LiveTable, print_summary
 from cmmlink.result_json import identity, summary
+from cmmlink.run_view import Ended, RunContext
 from cmmlink.stack import SectionOutcome, inspect_stack
+from cmmlink.words import VERDICT_WORDS
 from drivers import (
     Decoder,
     DeviceError,
@@ -798,17 +799,17 @@ def _inspect_surface(file: Path, stop: threading.Event, on_start: Callable[[int]
     )
     if plan.out is not None:
         write_stack(plan.out, stack, plan.tolerance.zone, plan.part.name, pictures=False)
-    told = [f"{WORDS[stack.verdict]}: {len(stack.sections)} sections of {plan.mesh.file.name}", *stack.notes]
+    told = [f"{VERDICT_WORDS[stack.verdict]}: {len(stack.sections)} sections of {plan.mesh.file.name}", *stack.notes]
     return ". ".join([*told, *([f"Results in {plan.out}"] if plan.out is not None else [])])
 
 
 def _section(plan: CtPlan, outcome: SectionOutcome, plan_name: str) -> Section:
     height_mm, run = outcome.slice.height_mm, outcome.run
     title = f"Section at height {height_mm:.3f} mm of {plan.mesh.file.name}"
-    facts = RunFacts(title, plan_name, outcome.profile, plan.tolerance.zone, plan.registration.coverage_min, _BUFFER_POINTS, _today())
+    context = RunContext(title, plan_name, outcome.profile, plan.tolerance.zone, plan.registration.coverage_min, _BUFFER_POINTS, _today())
     started = RunStarted(plan.part.name, plan.part.serial_number or "", "", plan.mesh.file.name, simulated=False)
     ended = Ended(run.ending, str(run.refusal or ""), outcome.facts(), run.result)
-    return Section(height_mm, facts, started, ended, outcome.warnings)
+    return Section(height_mm, context, started, ended, outcome.warnings)
 
 
 @app.command()

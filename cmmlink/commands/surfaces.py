@@ -13,8 +13,9 @@ from typer.core import TyperCommand
 
 from cmmlink.errors import PlanError
 from cmmlink.plan.surface import CtPlan, NominalAt
-from cmmlink.report.terminal import STYLES, WORDS
+from cmmlink.report.terminal import STYLES
 from cmmlink.stack import SectionOutcome, StackOutcome
+from cmmlink.words import VERDICT_WORDS
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _MOST_WARNINGS = 20
@@ -97,7 +98,9 @@ def print_stack(console: Console, stack: StackOutcome) -> None:
     facts = stack.facts()
     cutters = ", ".join(sorted({section.slice.cutter for section in stack.sections}))
     missing = "" if stack.complete else f" of {stack.asked}"
-    console.print(f"[{STYLES[stack.verdict]}]{WORDS[stack.verdict]}[/]  {len(stack.sections)}{missing} sections of {stack.mesh.source}")
+    console.print(
+        f"[{STYLES[stack.verdict]}]{VERDICT_WORDS[stack.verdict]}[/]  {len(stack.sections)}{missing} sections of {stack.mesh.source}"
+    )
     console.print(f"{stack.mesh.triangles} triangles ({stack.mesh.kind}), cut by {cutters}")
     console.print(f"received {facts['received']} = judged {facts['judged']} + rejected {facts['rejected']}; lost {facts['lost']}")
     console.print(
@@ -114,7 +117,7 @@ def print_stack(console: Console, stack: StackOutcome) -> None:
 
 def _line(section: SectionOutcome) -> str:
     result, cut = section.run.result, section.slice
-    head = f"{cut.height_mm:11.4f}  [{STYLES[section.verdict]}]{WORDS[section.verdict]:11}[/]"
+    head = f"{cut.height_mm:11.4f}  [{STYLES[section.verdict]}]{VERDICT_WORDS[section.verdict]:11}[/]"
     if result is None or result.worst is None:
         return f"{head}  nothing judged"
     numbers = f"{result.min_deviation_mm:+7.4f}  {result.max_deviation_mm:+7.4f}  {result.rms_mm:6.4f}  {result.out_of_tolerance:5d}"

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Literal
 
+from cmmlink.console.protocol import AlarmList, AlarmRow
 from cmmlink.events import Arrived, Event, Judged, RunFinished, RunStarted
 from drivers import Damaged, LinkDown, LinkUp, Lost, Rejected
 
@@ -86,6 +87,10 @@ class Alarms:
         with self._lock:
             return sorted(self._alarms.values(), key=lambda alarm: -alarm.number)
 
+    def snapshot(self, most: int) -> AlarmList:
+        """The newest alarms as a page shows them."""
+        return AlarmList(self.fault, tuple(_row_of(alarm) for alarm in self.newest_first()[:most]))
+
     @property
     def fault(self) -> bool:
         """Whether a fault is there, or was and nobody has seen it."""
@@ -115,3 +120,16 @@ class Alarms:
         surplus = len(self._alarms) - _MOST
         for number in sorted(self._alarms, key=lambda one: (not self._alarms[one].acknowledged, one))[: max(surplus, 0)]:
             del self._alarms[number]
+
+
+def _row_of(alarm: Alarm) -> AlarmRow:
+    return AlarmRow(
+        number=alarm.number,
+        severity=alarm.severity,
+        what=alarm.what,
+        detail=alarm.detail,
+        count=alarm.count,
+        since=alarm.since.strftime("%H:%M:%S"),
+        active=alarm.active,
+        acknowledged=alarm.acknowledged,
+    )

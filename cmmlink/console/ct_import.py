@@ -4,10 +4,11 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
-from cmmlink.console.run_view import Ended, RunFacts
+from cmmlink.console.protocol import SectionRow, SurfaceState
 from cmmlink.events import RunStarted
+from cmmlink.run_view import Ended, RunContext
 
 _MOST_SHOWN = 1000
 
@@ -17,7 +18,7 @@ class Section:
     """One section of a surface, judged."""
 
     height_mm: float
-    facts: RunFacts
+    context: RunContext
     started: RunStarted
     ended: Ended
     warnings: tuple[str, ...]
@@ -59,12 +60,11 @@ class CtImport:
         self._message, self.state = message, "failed" if failed else "done"
         self.version += 1
 
-    def described(self) -> dict[str, Any]:
-        """Everything in numbers and words, ready for JSON."""
+    def snapshot(self) -> SurfaceState:
+        """Everything in numbers and words."""
         done = len(self.sections)
-        rows = [_row(section) for section in self.sections[:_MOST_SHOWN]]
-        told = {"plan": self.plan, "state": self.state, "message": self._message, "done": done, "total": self._total}
-        return {**told, "remaining_s": self._remaining_s(done), "sections": rows}
+        rows = tuple(_row_of(section) for section in self.sections[:_MOST_SHOWN])
+        return SurfaceState(self.plan, self.state, self._message, done, self._total, self._remaining_s(done), rows)
 
     def _remaining_s(self, done: int) -> float | None:
         if self.state != "inspecting" or not done:
@@ -72,17 +72,17 @@ class CtImport:
         return round((self._clock() - self._began_s) / done * (self._total - done))
 
 
-def _row(section: Section) -> dict[str, Any]:
-    facts, zone = section.ended.facts, section.facts.zone
-    worst = facts["worst"] or {}
-    return {
-        "height_mm": section.height_mm,
-        "verdict": facts["verdict"],
-        "received": facts["received"],
-        "coverage": facts["coverage"],
-        "worst_mm": worst.get("deviation_mm"),
-        "worst_station_mm": worst.get("station_mm"),
-        "lower_mm": zone.lower_mm,
-        "upper_mm": zone.upper_mm,
-        "warnings": list(section.warnings),
-    }
+def _row_of(section: Section) -> SectionRow:
+    result, zone = section.ended.result, section.context.zone
+    worst = result["worst"] or {}
+    return SectionRow(
+        height_mm=section.height_mm,
+        verdict=result["verdict"],
+        received=result["received"],
+        coverage=result["coverage"],
+        worst_mm=worst.get("deviation_mm"),
+        worst_station_mm=worst.get("station_mm"),
+        lower_mm=zone.lower_mm,
+        upper_mm=zone.upper_mm,
+        warnings=section.warnings,
+    )

@@ -10,7 +10,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from cmmlink.console.run_view import Ended
+from cmmlink.console.protocol import RunRow
 from cmmlink.errors import StoreError
 from cmmlink.events import Counts, RunStarted, Sink
 from cmmlink.plan.scan import Device, Plan
@@ -21,28 +21,12 @@ from cmmlink.record.recorder import Basis, Evidence, Recorder
 from cmmlink.record.replay import Replay, recorded_plan, recorded_profile, replay
 from cmmlink.record.store import Store
 from cmmlink.result_json import summary
+from cmmlink.run_view import Ended
 from drivers import Decoder
 from inspection import NominalProfile
 
 _MOST_LISTED = 500
 _STARTED = ("part", "serial_number", "operator", "device", "simulated")
-
-
-@dataclass(frozen=True, slots=True)
-class PastRun:
-    """One line of the station's history. `worst_mm` is the deviation farthest from the middle of the zone."""
-
-    run: str
-    began: str
-    part: str
-    serial_number: str
-    state: str
-    received: int
-    verdict: str | None
-    worst_mm: float | None
-    worst_station_mm: float | None
-    lower_mm: float | None
-    upper_mm: float | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,7 +54,7 @@ class PastRuns:
     clock: Callable[[], float]
     today: Callable[[], datetime]
     evidence: Evidence | None = None
-    _known: dict[str, PastRun] = field(default_factory=dict)
+    _known: dict[str, RunRow] = field(default_factory=dict)
 
     @contextmanager
     def recorder(self, plan: Plan, started: RunStarted) -> Iterator[Sink]:
@@ -79,7 +63,7 @@ class PastRuns:
             yield recorder
         self.evidence = recorder.evidence
 
-    def runs(self) -> Sequence[PastRun]:
+    def runs(self) -> Sequence[RunRow]:
         """All runs, newest first. Raises StoreError."""
         entries = list_runs(self.folder, self.today)[::-1][:_MOST_LISTED]
         unknown = [entry for entry in entries if entry["run"] not in self._known]
@@ -127,9 +111,9 @@ def _facts(store: Store, run: str) -> dict[str, Any]:
         return {}
 
 
-def _line(entry: dict[str, Any], facts: dict[str, Any]) -> PastRun:
+def _line(entry: dict[str, Any], facts: dict[str, Any]) -> RunRow:
     worst, zone = facts.get("worst") or {}, facts.get("tolerance") or {}
-    return PastRun(
+    return RunRow(
         entry["run"],
         entry["started"] or "",
         entry["part"] or "",

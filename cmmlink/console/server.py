@@ -14,8 +14,8 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Awaitable, Callable, Mapping
-from dataclasses import asdict, dataclass, field
+from collections.abc import Awaitable, Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -28,22 +28,24 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import Request
 from starlette.responses import FileResponse, PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import Message as AsgiMessage
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from cmmlink.console.alarms import Alarm
-from cmmlink.console.messages import nominal_message, points_message
-from cmmlink.console.past_runs import PastRun
-from cmmlink.console.run_view import RunView
+from cmmlink.console.drawing import nominal_message, points_message
+from cmmlink.console.protocol import TOO_MANY_PAGES, WRONG_TOKEN, Alive, Answer, Control, Hello, History, Message, ShownRun, json_of
 from cmmlink.console.station import Refused, Station
+from cmmlink.extremes import PointsVersion
+from cmmlink.run_view import RunView
 
-WRONG_TOKEN = 4401
 _PERIOD_S = 1 / 30  # at most so often a page is sent something
 _ALIVE_S = 0.5
 _TOKEN_WITHIN_S = 5.0
 _LARGEST_COMMAND = 16 * 1024
 _MOST_PAGES = 16
 _MOST_HISTORY = 500
+_MOST_ALARMS = 50
+_NOTHING_SEEN = PointsVersion(-1, 0)
 _LOOPBACK = ("127.0.0.1", "::1", "localhost")
 _MEDIA = {
     "html": "text/html; charset=utf-8",
@@ -71,10 +73,15 @@ class _Page:
     number: int
     opened: RunView | None = None
     nominal_of: RunView | None = None
-    version: int = 0
-    generation: int = -1
+    seen: PointsVersion = _NOTHING_SEEN
+    generation: int = 0
     sent: dict[str, str] = field(default_factory=dict)
     sending: asyncio.Lock = field(default_factory=asyncio.Lock)
+
+    def forget(self) -> None:
+        """Take it that the page knows nothing, so that it is sent everything."""
+        self.sent.clear()
+        self.nominal_of = None
 
 
 class ConsoleServer:
@@ -182,7 +189,7 @@ class ConsoleServer:
             await websocket.close(WRONG_TOKEN, "wrong token")
             return
         if len(self._pages) >= _MOST_PAGES:
-            await websocket.close(1013, "too many pages are open")
+            await websocket.close(TOO_MANY_PAGES, "too many pages are open")
             return
         self._seen += 1
         page = _Page(websocket, self._seen)
@@ -218,8 +225,8 @@ class ConsoleServer:
                 ok, message = True, await self._obey(page, command)
             except Refused as refusal:
                 ok, message = False, str(refusal)
-            answer = {"type": "answer", "number": number if isinstance(number, int) else None, "do": str(command.get("do"))[:40]}
-            await _send(page, json.dumps({**answer, "ok": ok, "message": message}))
+            answer = Answer(number if isinstance(number, int) else None, str(command.get("do"))[:40], ok, message)
+            await _send(page, json_of(answer))
 
     async def _obey(self, page: _Page, command: Mapping[str, Any]) -> str:
         """Carry out one command; its answer in words. Raises Refused."""
@@ -227,6 +234,9 @@ class ConsoleServer:
         if do == "take control":
             self._controller = page
             return "this page is in control"
+        if do == "everything":
+            page.forget()
+            return "everything is sent again"
         if do == "live":
             page.opened = None
             return "the station as it is now"
@@ -267,51 +277,46 @@ class ConsoleServer:
 
     async def _show(self, page: _Page) -> None:
         """Send what changed, never more than the newest, at most 30 times a second."""
-        await _send(page, json.dumps({"type": "hello", "version": self._version, "page": page.number, "remote": self.remote}))
+        await _send(page, json_of(Hello(self._version, page.number, self.remote)))
         alive_s = 0.0
         while True:
             began_s = time.monotonic()
             await self._show_points(page)
-            for kind, content in self._told(page).items():
-                text = json.dumps({"type": kind, **content}, separators=(",", ":"))
-                if page.sent.get(kind) != text:
-                    page.sent[kind] = text
+            for message in self._newest(page):
+                text = json_of(message)
+                if page.sent.get(message.type) != text:
+                    page.sent[message.type] = text
                     await _send(page, text)
             if began_s - alive_s >= _ALIVE_S:
                 alive_s = began_s
-                await _send(page, json.dumps({"type": "alive", "now_ms": self.station.now_ms()}))
+                await _send(page, json_of(Alive(self.station.now_ms())))
             await asyncio.sleep(max(_PERIOD_S - (time.monotonic() - began_s), 0.005))
 
-    def _told(self, page: _Page) -> dict[str, dict[str, Any]]:
+    def _newest(self, page: _Page) -> Iterator[Message]:
+        """What the page is shown now, without what it certainly knows already."""
         station, view = self.station, page.opened or self.station.view
-        control = {
-            "controls": self._controller is page,
-            "taken": self._controller is not None,
-            "pages": len(self._pages),
-        }
-        told = {
-            "control": control,
-            "station": station.state(),
-            "alarms": {"fault": station.alarms.fault, "alarms": [_alarm_words(alarm) for alarm in station.alarms.newest_first()[:50]]},
-            "run": {"run": view.state() if view else None, "recorded": page.opened is not None},
-        }
+        yield Control(self._controller is page, self._controller is not None, len(self._pages))
+        yield station.state()
+        yield station.alarms.snapshot(_MOST_ALARMS)
+        yield ShownRun(view.state() if view else None, page.opened is not None)
         if _anew(page, "history version", station.history_version):
-            told["history"] = {"runs": [_row(past) for past in station.history[:_MOST_HISTORY]]}
+            yield History(station.history[:_MOST_HISTORY])
         if _anew(page, "ct version", station.ct.version):
-            told["ct"] = station.ct.described()
-        return told
+            yield station.ct.snapshot()
 
     async def _show_points(self, page: _Page) -> None:
         view = page.opened or self.station.view
         if view is None:
             return
         if page.nominal_of is not view:
-            await _send(page, await anyio.to_thread.run_sync(nominal_message, view.facts.profile))
-            page.nominal_of, page.version, page.generation = view, 0, -1
-        changed, verdict_at = view.points_since(page.version, page.generation)
-        if len(changed.bins) or changed.generation != page.generation:
-            await _send(page, points_message(changed, verdict_at))
-        page.version, page.generation = changed.version, changed.generation
+            await _send(page, await anyio.to_thread.run_sync(nominal_message, view.context.profile))
+            page.nominal_of, page.seen = view, _NOTHING_SEEN
+        if page.seen == view.newest_points:
+            return
+        changed, verdict_at = view.points_since(page.seen)
+        page.generation += changed.seen.generation != page.seen.generation  # for this page alone: runs number theirs alike
+        page.seen = changed.seen
+        await _send(page, points_message(changed, page.generation, verdict_at))
 
 
 class _Guard:
@@ -335,7 +340,7 @@ class _Guard:
 
 
 def _with_headers(send: Send) -> Send:
-    async def sending(message: Message) -> None:
+    async def sending(message: AsgiMessage) -> None:
         if message["type"] == "http.response.start":
             MutableHeaders(scope=message).update(_HEADERS)
         await send(message)
@@ -415,20 +420,3 @@ def _maybe_number(command: Mapping[str, Any], key: str) -> int | None:
     if value is not None and not isinstance(value, int):
         raise Refused(f"the command needs a whole number {key!r}")
     return value
-
-
-def _alarm_words(alarm: Alarm) -> dict[str, Any]:
-    return {
-        "number": alarm.number,
-        "severity": alarm.severity,
-        "what": alarm.what,
-        "detail": alarm.detail,
-        "count": alarm.count,
-        "since": alarm.since.strftime("%H:%M:%S"),
-        "active": alarm.active,
-        "acknowledged": alarm.acknowledged,
-    }
-
-
-def _row(past: PastRun) -> dict[str, Any]:
-    return asdict(past)

@@ -9,20 +9,21 @@ import re
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 from cmmlink.console.alarms import Alarms
 from cmmlink.console.ct_import import CtImport, InspectSurface
-from cmmlink.console.past_runs import PastRun, Recorded
-from cmmlink.console.run_view import RunFacts, RunView
+from cmmlink.console.past_runs import Recorded
+from cmmlink.console.protocol import ChosenPlan, DeviceTest, RunRow, StationState
 from cmmlink.errors import PlanError, RunError, StoreError
 from cmmlink.events import Event, RunStarted, Sink
 from cmmlink.from_plan import planned_inspection, planned_profile
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan.scan import FileDevice, Plan, load_plan
+from cmmlink.run_view import RunContext, RunView
 from drivers import DeviceError, PointBatch, PointFileError, ScanOpened, ScanSource
 from inspection import InspectionError, NominalProfile, rehearse
 
@@ -33,6 +34,7 @@ _TEST_S = 5.0
 _TEST_POINTS = 200
 _MOST_PLAN_BYTES = 50_000
 _LIST_EVERY_S = 1.0
+_UNTESTED = DeviceTest("none", "")
 
 
 class Refused(Exception):  # noqa: N818 - it is the answer, not a failure
@@ -54,7 +56,7 @@ class Records(Protocol):
     def recorder(self, plan: Plan, started: RunStarted) -> AbstractContextManager[Sink]:
         """Give the sink that writes the record of a run."""
 
-    def runs(self) -> Sequence[PastRun]:
+    def runs(self) -> Sequence[RunRow]:
         """All runs, newest first."""
 
     def opened(self, run: str) -> Recorded:
@@ -110,7 +112,7 @@ class _Work:
     operator: str = ""
     address: str = ""
     choice: Choice | None = None
-    test: dict[str, Any] = field(default_factory=lambda: {"state": "none", "message": ""})
+    test: DeviceTest = _UNTESTED
 
 
 class Station:
@@ -132,7 +134,7 @@ class Station:
         self._source: ScanSource | None = None
         self._thread: threading.Thread | None = None
         self._number = 0
-        self._history: tuple[PastRun, ...] = ()
+        self._history: tuple[RunRow, ...] = ()
         self._listed: dict[str, list[str]] = {}
         self._listed_s = -math.inf
         self._read_history()
@@ -145,25 +147,26 @@ class Station:
         return self._thread is not None and self._thread.is_alive()
 
     @property
-    def history(self) -> tuple[PastRun, ...]:
+    def history(self) -> tuple[RunRow, ...]:
         """All runs on record, newest first."""
         return self._history
 
-    def state(self) -> dict[str, Any]:
-        """The operator's choices and what may be done next, ready for JSON."""
+    def state(self) -> StationState:
+        """The operator's choices and what may be done next."""
         with self._lock:
-            work, choice = self._work, self._work.choice
-            return {
-                **self._listed_plans(),
-                "choice": None if choice is None else _described(choice),
-                "serial_number": work.serial_number,
-                "operator": work.operator,
-                "address": work.address,
-                "test": dict(work.test),
-                "running": self.running,
-                "can_start": not self.running and choice is not None and choice.plan is not None,
-                "keeps_records": self._means.records is not None,
-            }
+            work, choice, listed = self._work, self._work.choice, self._listed_plans()
+            return StationState(
+                plans=tuple(listed["plans"]),
+                ct_plans=tuple(listed["ct_plans"]),
+                choice=None if choice is None else _described(choice),
+                serial_number=work.serial_number,
+                operator=work.operator,
+                address=work.address,
+                test=work.test,
+                running=self.running,
+                can_start=not self.running and choice is not None and choice.plan is not None,
+                keeps_records=self._means.records is not None,
+            )
 
     def now_ms(self) -> float:
         """Time of day, ms since 1970."""
@@ -187,7 +190,7 @@ class Station:
             other = self._work.choice is None or self._work.choice.name != name
             self._work.choice = choice
             if other:
-                self._work.test = {"state": "none", "message": ""}
+                self._work.test = _UNTESTED
                 self._work.address = str(getattr(plan.device, "address", "")) if plan else ""
                 self._work.serial_number = (plan.part.serial_number or "") if plan else ""
                 self._work.operator = self._work.operator or ((plan.operator or "") if plan else "")
@@ -241,7 +244,7 @@ class Station:
             if self._work.choice is None or self._work.choice.plan is None:
                 raise Refused("choose a plan that can be run first")
             plan, _ = self._planned()
-            self._work.test = {"state": "testing", "message": "listening"}
+            self._work.test = DeviceTest("testing", "listening")
             self._thread = threading.Thread(target=self._listen, args=(plan,), name="device test", daemon=True)
             self._thread.start()
         return "testing the device"
@@ -264,7 +267,7 @@ class Station:
         if not 0 <= index < len(self.ct.sections):
             raise Refused("there is no such section")
         section = self.ct.sections[index]
-        view = RunView(section.facts, self._means.clock, lambda: section.facts.began)
+        view = RunView(section.context, self._means.clock, lambda: section.context.began)
         view.recall(section.started, section.ended)
         return view
 
@@ -349,7 +352,7 @@ class Station:
 
     def _new_view(self, plan: Plan, profile: NominalProfile, started: RunStarted) -> RunView:
         self._number += 1
-        facts = RunFacts(
+        facts = RunContext(
             str(self._number),
             self._work_name(),
             profile,
@@ -393,7 +396,7 @@ class Station:
         with ExitStack() as stack:
             # compiled before the device is asked for points: twenty seconds, once after installation
             rehearse(profile, plan.registration.method, plan.registration.reject_outliers)
-            view.prepared()
+            view.await_device()
             live = planned_inspection(plan, profile)
             connected = stack.enter_context(self._means.connect(plan))
             started = self.started = replace(started, device=connected.device, simulated=connected.simulated)
@@ -442,9 +445,9 @@ class Station:
         try:
             with self._means.connect(plan) as connected:
                 message = _heard(connected, self._means.clock)
-            answer = {"state": "passed", "message": message}
+            answer = DeviceTest("passed", message)
         except (DeviceError, PlanError, PointFileError) as error:
-            answer = {"state": "failed", "message": str(error)}
+            answer = DeviceTest("failed", str(error))
         with self._lock:
             self._work.test = answer
 
@@ -506,8 +509,8 @@ def _heard(connected: Connected, clock: Callable[[], float]) -> str:
     return f"{opened or connected.device}: {points} points in {took_s:.1f} s"
 
 
-def _described(choice: Choice) -> dict[str, Any]:
-    """A checked plan, ready for JSON."""
+def _described(choice: Choice) -> ChosenPlan:
+    """A checked plan as a page shows it."""
     plan, profile = choice.plan, choice.profile
     facts: list[tuple[str, str]] = []
     if plan is not None and profile is not None:
@@ -523,15 +526,15 @@ def _described(choice: Choice) -> dict[str, Any]:
         ]
         if plan.probe.tip_radius_mm:
             facts.append(("Probe", f"ball, radius {plan.probe.tip_radius_mm:g} mm"))
-    return {
-        "name": choice.name,
-        "text": choice.text,
-        "problem": choice.problem,
-        "line": choice.line,
-        "part": plan.part.name if plan else "",
-        "facts": facts,
-        "has_address": plan is not None and not isinstance(plan.device, FileDevice),
-    }
+    return ChosenPlan(
+        name=choice.name,
+        text=choice.text,
+        problem=choice.problem,
+        line=choice.line,
+        part=plan.part.name if plan else "",
+        facts=tuple(facts),
+        has_address=plan is not None and not isinstance(plan.device, FileDevice),
+    )
 
 
 def _device_words(plan: Plan) -> str:
@@ -539,10 +542,10 @@ def _device_words(plan: Plan) -> str:
     return f"file {device.file.name}" if isinstance(device, FileDevice) else f"{device.type} {device.address}"
 
 
-def _facts_of(recorded: Recorded, number: str) -> RunFacts:
+def _facts_of(recorded: Recorded, number: str) -> RunContext:
     plan = recorded.plan
     coverage_min, buffer_points = plan.registration.coverage_min, plan.buffer_points
-    return RunFacts(number, "", recorded.profile, plan.tolerance.zone, coverage_min, buffer_points, recorded.began)
+    return RunContext(number, "", recorded.profile, plan.tolerance.zone, coverage_min, buffer_points, recorded.began)
 
 
 def _short(text: str, what: str) -> str:

@@ -11,12 +11,12 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from cmmlink.words import VERDICT_WORDS
 from inspection import InspectionResult, NominalProfile, Verdict
 
 Array = NDArray[np.float64]
 
 _NOMINAL, _BAND, _GOOD, _ABOVE, _BELOW = "#3a3f45", "#dfe7ee", "#2a7fa5", "#c2410c", "#6d28d9"
-WORDS = {Verdict.CONFORM: "CONFORM", Verdict.UNCERTAIN: "NOT PROVEN", Verdict.NONCONFORM: "NOT CONFORM"}
 _BAND_SHARE = 0.06  # of the part's size: how wide the magnified tolerance band is drawn
 _MOST_WHISKERS = 1500
 
@@ -27,7 +27,7 @@ def write_picture(result: InspectionResult, nominal: NominalProfile, title: str,
     profile, strip = figure.subplots(2, 1, height_ratios=[3, 2])
     _draw_profile(profile, result, nominal)
     _draw_strip(strip, result, nominal)
-    figure.suptitle(f"{title}    {WORDS[result.verdict]}", fontsize=15, fontweight="bold")
+    figure.suptitle(f"{title}    {VERDICT_WORDS[result.verdict]}", fontsize=15, fontweight="bold")
     figure.savefig(path)
 
 

@@ -12,8 +12,8 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from cmmlink.report.picture import WORDS
 from cmmlink.stack import SectionOutcome, StackOutcome
+from cmmlink.words import VERDICT_WORDS
 from inspection import ToleranceZone
 
 Array = NDArray[np.float64]
@@ -43,7 +43,7 @@ def write_stack_picture(stack: StackOutcome, zone: ToleranceZone, title: str, pa
     _mark(axes, sections, scale)
     where = "station (mm)" if common else "station (% of the section's length)"
     axes.set(xlabel=where, ylabel="height along the normal (mm)", title=f"{len(sections)} sections; grey: nothing judged")
-    figure.suptitle(f"{title}    {WORDS[stack.verdict]}", fontsize=15, fontweight="bold")
+    figure.suptitle(f"{title}    {VERDICT_WORDS[stack.verdict]}", fontsize=15, fontweight="bold")
     figure.savefig(path)
 
 

@@ -11,10 +11,10 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 from rich.table import Table
 
 from cmmlink.events import Arrived, Counts, Event, Judged, RunStarted
+from cmmlink.words import VERDICT_WORDS
 from drivers import LinkDown, LinkUp, ScanOpened
 from inspection import InspectionResult, LiveUpdate, Rejection, ToleranceZone, Verdict
 
-WORDS = {Verdict.CONFORM: "CONFORM", Verdict.UNCERTAIN: "NOT PROVEN", Verdict.NONCONFORM: "NOT CONFORM"}
 STYLES = {Verdict.CONFORM: "bold green", Verdict.UNCERTAIN: "bold yellow", Verdict.NONCONFORM: "bold red"}
 _REPAINTS_PER_S = 8
 _WHOLE = 0.95  # of the nominal's length: below it the summary says that the rest is unknown
@@ -112,13 +112,13 @@ class LiveTable:
             return "not yet"
         verdict = self._zone.verdict(self._worst)
         provisional = "" if self._update is not None and self._update.state == "settled" else ", provisional"
-        return f"[{STYLES[verdict]}]{WORDS[verdict]}[/] so far{provisional}"
+        return f"[{STYLES[verdict]}]{VERDICT_WORDS[verdict]}[/] so far{provisional}"
 
 
 def print_summary(console: Console, result: InspectionResult | None, counts: Counts, heading: str) -> None:
     """Print the verdict, the four numbers, and what the verdict on the profile rests on."""
     verdict = Verdict.UNCERTAIN if result is None else result.verdict
-    console.print(f"[{STYLES[verdict]}]{WORDS[verdict]}[/]   {escape(heading)}".rstrip())
+    console.print(f"[{STYLES[verdict]}]{VERDICT_WORDS[verdict]}[/]   {escape(heading)}".rstrip())
     for reason in _reservations(result):
         console.print(f"  {reason}", style="yellow")
     console.print(f"received {counts.received} = judged {counts.judged} + rejected {counts.rejected}; lost {counts.lost} points")

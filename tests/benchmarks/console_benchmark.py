@@ -27,12 +27,12 @@ import numpy as np
 from numpy.typing import NDArray
 from playwright.sync_api import CDPSession, Page, sync_playwright
 
-from cmmlink.console.run_view import RunFacts, RunView
 from cmmlink.console.server import ConsoleServer
 from cmmlink.console.station import Connected, Station
 from cmmlink.events import Counts, Judged, RunStarted
 from cmmlink.from_plan import planned_inspection, planned_profile
 from cmmlink.plan.scan import Plan, load_plan
+from cmmlink.run_view import RunContext, RunView
 from drivers.source import Arrival, PointBatch
 from inspection import LiveUpdate, NominalProfile
 from tests.cmmlink.console.conftest import FLAGS
@@ -156,10 +156,10 @@ def serve(answer: Connection, rate: int, held: int, alone: bool) -> None:
         answer.send(server.address)
         while (question := answer.recv()) != "end":
             assert station.view is not None
-            received = station.view.state()["received"]
+            received = station.view.state().received
             while question == "held" and received < held:
                 time.sleep(0.05)
-                received = station.view.state()["received"]
+                received = station.view.state().received
             answer.send((resident_bytes(), f"{received:,}") if question == "memory" else f"{received:,} points held, {rate:,} points/s")
         source.stop()
         server.stop()
@@ -222,7 +222,7 @@ class Alone:
         profile = planned_profile(plan)
         self.whole = planned_inspection(plan, profile).add(source.points)
         self.source = source
-        self.view = RunView(RunFacts("1", "blade.yaml", profile, plan.tolerance.zone, 0.95, 500_000, now()), time.monotonic, now)
+        self.view = RunView(RunContext("1", "blade.yaml", profile, plan.tolerance.zone, 0.95, 500_000, now()), time.monotonic, now)
 
     def start(self) -> RunView:
         self.view(RunStarted("endurance", "", "", "benchmark", True))

@@ -48,10 +48,13 @@ function onState(kind, content) {
   soon("words");
 }
 
+// A connection begins: the station says everything anew, so that nothing heard before may stay.
 function hello(content) {
   if (told.version !== null && told.version !== content.version) location.reload();
   told.version = content.version;
   told.remote = content.remote;
+  told.run = told.station = told.control = nominal = cursor = null;
+  points.clear(0);
 }
 
 function newRun({ run, recorded }) {
@@ -71,7 +74,6 @@ function onBinary(buffer) {
 
 function onLink(state) {
   linkState = state;
-  if (state === "live") told.run = told.station = told.control = null;
   soon("words");
 }
 

@@ -18,7 +18,8 @@ from playwright.sync_api import Browser, Page, expect
 
 from cmmlink.commands import _inspect_surface
 from cmmlink.console.ct_import import Section
-from cmmlink.console.past_runs import PastRun, PastRuns, Recorded
+from cmmlink.console.past_runs import PastRuns, Recorded
+from cmmlink.console.protocol import RunRow
 from cmmlink.console.server import ConsoleServer
 from cmmlink.errors import StoreError
 from cmmlink.events import Arrived, Event, RunStarted, Sink
@@ -185,7 +186,7 @@ class FullDisk:
 
         yield record
 
-    def runs(self) -> list[PastRun]:
+    def runs(self) -> list[RunRow]:
         return []
 
     def opened(self, run: str) -> Recorded:
@@ -335,6 +336,41 @@ def test_page_says_that_it_is_stale_and_comes_back_after_a_restart(bench: Bench)
     page.locator("#plans div").click()
     expect(page.locator("#check-word")).to_contain_text("can be run")
     bench.complaints = [said for said in bench.complaints if "ERR_CONNECTION_REFUSED" not in said]
+
+
+def test_every_button_works_again_after_a_stall(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A station that did not answer for more than 2 s, and then does: no reload is needed."""
+    page = bench.page()
+    page.locator("#plans div").click()
+    expect(page.locator("#start")).to_be_enabled()
+    stalled, released, now_ms = threading.Event(), threading.Event(), bench.station.now_ms
+
+    def stall() -> float:
+        stalled.set()
+        assert released.wait(60)
+        return now_ms()
+
+    monkeypatch.setattr(bench.station, "now_ms", stall)
+    assert stalled.wait(20)
+    expect(page.locator("#banner-text")).to_contain_text("STALE")
+    for button in ("start", "end", "abort", "next", "acknowledge"):
+        expect(page.locator(f"#{button}")).to_be_disabled()
+    released.set()
+    expect(page.locator("#banner")).to_be_hidden()
+    for button in ("start", "next"):
+        expect(page.locator(f"#{button}")).to_be_enabled()
+    bench.station.alarms.raise_alarm("fault", "Link lost", "unplugged")
+    page.locator("#acknowledge").click()
+    expect(page.locator("#alarm-text")).to_have_text("No alarm")
+    page.locator("#start").click()
+    expect(page.locator("#said")).to_contain_text("started")
+    bench.device.source.put(opened(2000), *batches(measured(bench.profile, 2000, seed=1), 50)[:20])
+    expect(page.locator("#received")).to_have_text("1,000")
+    page.locator("#end").click()
+    expect(page.locator("#verdict[data-final=true]")).to_be_visible()
+    assert finished(bench).complete
+    page.locator("#next").click()
+    expect(page.locator("#serial")).to_be_focused()
 
 
 def test_no_spike_is_hidden_among_many_points(bench: Bench) -> None:
@@ -488,7 +524,7 @@ def test_surface_is_imported_with_progress_and_its_sections_opened(make_bench: M
     page.keyboard.press("Enter")
     expect(page.locator("#banner-text")).to_have_text("Section at height 16.000 mm of blade.stl")
     expect(page.locator("#verdict-word")).to_have_text("NOT CONFORM")
-    worst = bench.station.ct.sections[3].ended.facts["worst"]["deviation_mm"]
+    worst = bench.station.ct.sections[3].ended.result["worst"]["deviation_mm"]
     assert worst == pytest.approx(0.09, abs=0.015), "0.1 mm, less what the best fit takes of a stretch so long"
     assert millimetres(page.locator("#worst-value").text_content()) == pytest.approx(worst, abs=5.1e-5)
     page.keyboard.press("Escape")

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from cmmlink.console.past_runs import PastRuns
-from cmmlink.console.run_view import RunView
+from cmmlink.console.protocol import DeviceTest
 from cmmlink.console.station import Refused, Station, checked, next_serial_number
 from cmmlink.errors import PlanError
-from cmmlink.events import Event, RunStarted
+from cmmlink.events import RunStarted
+from cmmlink.extremes import Extremes, PointsVersion
 from cmmlink.from_plan import planned_profile
 from cmmlink.pipeline import RunOutcome
 from cmmlink.plan.scan import Plan, load_plan
@@ -22,6 +23,8 @@ from drivers.errors import LinkError
 from inspection import NominalProfile
 
 from .played import CLOSED, PLAN, Device, batches, means, measured, opened, write_plan
+
+UNSEEN = PointsVersion(-1, 0)
 
 
 class Bench:
@@ -61,8 +64,8 @@ def test_runs_are_recorded_listed_and_opened_as_they_were(bench: Bench) -> None:
     assert second.worst_mm == pytest.approx(0.12, abs=0.02)
     recalled = bench.station.opened(second.run).state()
     for name in ("received", "judged", "rejected", "lost", "coverage", "out_of_tolerance", "worst", "verdict", "part", "zone", "simulated"):
-        assert recalled[name] == live.state()[name], name
-    seen, recorded = live.points_since(0, -1)[0], bench.station.opened(second.run).points_since(0, -1)[0]
+        assert getattr(recalled, name) == getattr(live.state(), name), name
+    seen, recorded = live.points_since(UNSEEN)[0], bench.station.opened(second.run).points_since(UNSEEN)[0]
     np.testing.assert_array_equal(seen.bins, recorded.bins)
     np.testing.assert_array_equal(seen.extremes, recorded.extremes)
 
@@ -92,8 +95,8 @@ def test_replay_of_a_recorded_run_is_identical_and_says_so(bench: Bench) -> None
     assert bench.station.wait(60.0)
     assert bench.station.view is not None
     told = bench.station.view.state()
-    assert told["remark"] == f"Replay of run {run}: identical to the recorded result, to the last bit"
-    assert told["verdict"]["word"] == "NOT CONFORM"
+    assert told.remark == f"Replay of run {run}: identical to the recorded result, to the last bit"
+    assert told.verdict.word == "NOT CONFORM"
     assert len(bench.station.history) == 1, "a replay is no new run"
 
 
@@ -111,7 +114,7 @@ def test_aborted_run_is_recorded_as_such(bench: Bench) -> None:
     assert bench.station.wait(60.0)
     assert bench.station.history[0].state == "aborted"
     assert bench.station.history[0].verdict == "uncertain"
-    assert bench.station.state()["serial_number"] == "B-0041", "the same part is measured again"
+    assert bench.station.state().serial_number == "B-0041", "the same part is measured again"
 
 
 def test_while_a_run_is_on_nothing_else_can_be_started(bench: Bench) -> None:
@@ -130,11 +133,11 @@ def test_while_a_run_is_on_nothing_else_can_be_started(bench: Bench) -> None:
 
 
 def test_fault_in_drawing_is_an_alarm_and_loses_no_measurement(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(self: RunView, event: Event) -> None:
+    def broken(self: Extremes, *_: object) -> None:
         raise RuntimeError("drawing failed")
 
     bench.station.choose("blade.yaml")
-    monkeypatch.setattr(RunView, "_judged", broken)
+    monkeypatch.setattr(Extremes, "add", broken)
     bench.run()
     assert bench.station.outcome is not None
     assert bench.station.outcome.result is not None
@@ -147,13 +150,13 @@ def test_device_test_tells_what_it_heard_and_what_went_wrong(bench: Bench) -> No
     bench.device.source.put(opened(300), *batches(measured(bench.profile, 300, 1), 50))
     bench.station.test_device()
     assert bench.station.wait(30.0)
-    assert bench.station.state()["test"]["state"] == "passed"
-    assert bench.station.state()["test"]["message"].startswith("played scanner PL-7: 200 points in ")
+    assert bench.station.state().test.state == "passed"
+    assert bench.station.state().test.message.startswith("played scanner PL-7: 200 points in ")
     bench.device.renew()
     bench.device.source.put(LinkError("COM3 cannot be opened"))
     bench.station.test_device()
     assert bench.station.wait(30.0)
-    assert bench.station.state()["test"] == {"state": "failed", "message": "COM3 cannot be opened"}
+    assert bench.station.state().test == DeviceTest("failed", "COM3 cannot be opened")
     assert bench.station.history == (), "a test is no run"
 
 

@@ -4,7 +4,9 @@ However many points arrive, a bin keeps its two extremes, so no spike is ever hi
 room than a minute. A reader asks for the bins that changed since it last looked.
 """
 
+import threading
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,63 +15,65 @@ Array = NDArray[np.float64]
 
 BINS = 16384  # over the whole length: finer than any screen, and still a bin for every pixel at a zoom of ten
 STATION, DEVIATION, FOOT_X, FOOT_Y, NORMAL_X, NORMAL_Y, VERDICT = range(7)
+COLUMNS = 7
 _STRAIGHT_MM = 1e-7  # below this deviation the direction from foot to point is noise, and the whisker is invisible
+
+
+class PointsVersion(NamedTuple):
+    """How far a reader has seen: a version within a generation; a new generation says that everything before is void."""
+
+    generation: int
+    version: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChangedBins:
     """Bins that changed, each with its lowest and its highest point.
 
-    generation : another number than before says that everything sent earlier is void
-    version    : what to ask from next time
-    bins       : (k,) int64
-    extremes   : (k, 2, 7) lowest, highest x station, deviation, foot x, y, unit normal x, y, verdict code
+    seen     : what to ask from next time
+    bins     : (k,) int64
+    extremes : (k, 2, 7) lowest, highest x station, deviation, foot x, y, unit normal x, y, verdict code
     """
 
-    generation: int
-    version: int
+    seen: PointsVersion
     bins: NDArray[np.int64]
     extremes: Array
 
 
 class Extremes:
-    """The two extreme points in each of `BINS` bins along a profile of `length_mm`."""
+    """The two extreme points in each of `bins` bins along a profile of `length_mm`.
 
-    def __init__(self, length_mm: float, middle_mm: float, bins: int = BINS) -> None:
-        self.generation, self.version = 0, 0
+    Guarded by its own lock, which is held only while values are copied in or out. One thread adds; any thread reads.
+    """
+
+    def __init__(self, length_mm: float, middle_mm: float, generation: int = 0, bins: int = BINS) -> None:
+        self.generation = generation
         self._length, self._middle, self._count = length_mm, middle_mm, bins
-        self._extremes: Array = np.full((bins, 2, 7), np.nan)
+        self._lock = threading.Lock()
+        self._version = 0
+        self._extremes: Array = np.full((bins, 2, COLUMNS), np.nan)
         self._stamp = np.zeros(bins, dtype=np.int64)
         self._worst: Array | None = None
-
-    def clear(self) -> None:
-        """Forget every point: what follows is told anew."""
-        self.generation += 1
-        self.version += 1
-        self._extremes.fill(np.nan)
-        self._stamp.fill(0)
-        self._worst = None
 
     def add(self, station_mm: Array, deviation_mm: Array, foot_mm: Array, actual_mm: Array, verdicts: NDArray[np.int8]) -> None:
         """Take in m points; those without a deviation are passed over."""
         known = np.flatnonzero(np.isfinite(deviation_mm))
         if not len(known):
             return
-        self.version += 1
         bins = np.clip((station_mm[known] / self._length * self._count).astype(np.int64), 0, self._count - 1)
         order = np.lexsort((deviation_mm[known], bins))
         ordered = bins[order]
         first = np.flatnonzero(np.concatenate([[True], ordered[1:] != ordered[:-1]]))
         last = np.append(first[1:], len(ordered)) - 1
         touched = ordered[first]
+        changes = []
         for side, ends, sign in ((0, first, 1.0), (1, last, -1.0)):
             rows = known[order[ends]]
             held = self._extremes[touched, side, DEVIATION]
             better = ~(sign * deviation_mm[rows] >= sign * held)  # an empty bin holds NaN and takes whatever comes
-            rows = rows[better]
-            self._extremes[touched[better], side] = _described(rows, station_mm, deviation_mm, foot_mm, actual_mm, verdicts)
-            self._stamp[touched[better]] = self.version
-            self._keep_worst(self._extremes[touched[better], side])
+            points = _points_in_columns(rows[better], station_mm, deviation_mm, foot_mm, actual_mm, verdicts)
+            changes.append((side, touched[better], points))
+        self._take_over(changes)
 
     @property
     def worst(self) -> Array | None:
@@ -78,15 +82,30 @@ class Extremes:
 
     @property
     def stations_mm(self) -> Array:
-        """Stations of all points held (k,)."""
+        """Stations of all points held (k,); for the thread that adds."""
         held = self._extremes[~np.isnan(self._extremes[:, 0, DEVIATION])]
         return np.unique(held[:, :, STATION])
 
-    def changed_since(self, version: int, generation: int) -> ChangedBins:
-        """The bins that changed after `version`; all of them for a reader of another generation."""
-        asked = version if generation == self.generation else 0
-        bins = np.flatnonzero(self._stamp > asked)
-        return ChangedBins(self.generation, self.version, bins, self._extremes[bins])
+    @property
+    def newest(self) -> PointsVersion:
+        """What a reader has seen that has seen everything. Waits for nobody."""
+        return PointsVersion(self.generation, self._version)
+
+    def changed_since(self, seen: PointsVersion) -> ChangedBins:
+        """The bins that changed after what was `seen`; all of them for a reader of another generation."""
+        with self._lock:
+            asked = seen.version if seen.generation == self.generation else 0
+            bins = np.flatnonzero(self._stamp > asked)
+            return ChangedBins(self.newest, bins, self._extremes[bins])
+
+    def _take_over(self, changes: list[tuple[int, NDArray[np.int64], Array]]) -> None:
+        with self._lock:
+            self._version += 1
+            for side, bins, points in changes:
+                self._extremes[bins, side] = points
+                self._stamp[bins] = self._version
+        for _, _, points in changes:
+            self._keep_worst(points)
 
     def _keep_worst(self, candidates: Array) -> None:
         if not len(candidates):
@@ -96,7 +115,7 @@ class Extremes:
             self._worst = best.copy()
 
 
-def _described(
+def _points_in_columns(
     rows: NDArray[np.int64], station_mm: Array, deviation_mm: Array, foot_mm: Array, actual_mm: Array, verdicts: NDArray[np.int8]
 ) -> Array:
     """The seven numbers of each row (k, 7)."""

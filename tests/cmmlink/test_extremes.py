@@ -3,11 +3,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from cmmlink.console.extremes import DEVIATION, FOOT_X, FOOT_Y, NORMAL_X, NORMAL_Y, STATION, VERDICT, Extremes
-from cmmlink.console.messages import points_message
+from cmmlink.extremes import DEVIATION, FOOT_X, FOOT_Y, NORMAL_X, NORMAL_Y, STATION, VERDICT, Extremes, PointsVersion
 
 Array = NDArray[np.float64]
 LENGTH = 100.0
+UNSEEN = PointsVersion(-1, 0)
 
 
 def scanned(count: int, seed: int) -> tuple[Array, Array, Array, Array, NDArray[np.int8]]:
@@ -21,7 +21,7 @@ def scanned(count: int, seed: int) -> tuple[Array, Array, Array, Array, NDArray[
 
 
 def taken(seed: int, count: int, cuts: list[int], bins: int) -> Extremes:
-    extremes = Extremes(LENGTH, 0.0, bins)
+    extremes = Extremes(LENGTH, 0.0, bins=bins)
     for part in zip(*(np.split(column, sorted(cuts)) for column in scanned(count, seed)), strict=True):
         extremes.add(*part)
     return extremes
@@ -33,7 +33,7 @@ def test_every_bin_holds_its_lowest_and_highest_point_however_the_points_were_cu
     seed: int, count: int, cuts: list[int], bins: int
 ) -> None:
     station, deviation, *_ = scanned(count, seed)
-    changed = taken(seed, count, cuts, bins).changed_since(0, 0)
+    changed = taken(seed, count, cuts, bins).changed_since(UNSEEN)
     expected: dict[int, list[float]] = {}
     for s, d in zip(station, deviation, strict=True):
         if not np.isnan(d):
@@ -55,44 +55,30 @@ def test_worst_point_is_exact_and_described() -> None:
 
 def test_reader_is_told_only_what_changed() -> None:
     extremes = taken(1, 300, [], 64)
-    before = extremes.changed_since(0, extremes.generation)
-    assert len(extremes.changed_since(before.version, before.generation).bins) == 0
+    before = extremes.changed_since(UNSEEN)
+    assert len(extremes.changed_since(before.seen).bins) == 0
     extremes.add(np.array([50.0]), np.array([0.5]), np.array([[50.0, 0.0]]), np.array([[50.0, 0.5]]), np.array([2], dtype=np.int8))
-    after = extremes.changed_since(before.version, before.generation)
+    after = extremes.changed_since(before.seen)
     assert after.bins.tolist() == [32]
     assert after.extremes[0, 1, DEVIATION] == 0.5
 
 
-def test_cleared_extremes_are_another_generation_and_told_anew() -> None:
-    extremes = taken(1, 300, [], 64)
-    before = extremes.changed_since(0, extremes.generation)
-    extremes.clear()
-    assert extremes.worst is None
-    assert len(extremes.stations_mm) == 0
-    extremes.add(*scanned(10, 2))
-    after = extremes.changed_since(before.version, before.generation)
-    assert after.generation != before.generation
-    assert len(after.bins) == len(np.unique(after.bins)) > 0
+def test_reader_of_another_generation_is_told_everything() -> None:
+    before = taken(1, 300, [], 64).changed_since(UNSEEN)
+    anew = Extremes(LENGTH, 0.0, before.seen.generation + 1, 64)
+    assert anew.worst is None
+    assert len(anew.stations_mm) == 0
+    anew.add(*scanned(10, 2))
+    after = anew.changed_since(before.seen)
+    assert after.seen == anew.newest != before.seen
+    assert len(after.bins) == len(anew.changed_since(UNSEEN).bins) > 0
 
 
 def test_a_million_points_take_no_more_room_than_a_thousand() -> None:
-    extremes = Extremes(LENGTH, 0.0, 256)
+    extremes = Extremes(LENGTH, 0.0, bins=256)
     sizes = set()
     for seed in range(20):
         extremes.add(*scanned(50_000, seed))
         sizes.add(extremes._extremes.nbytes + extremes._stamp.nbytes)
     assert len(sizes) == 1
-    assert len(extremes.changed_since(0, 0).bins) == 256
-
-
-def test_points_message_is_laid_out_as_written_down() -> None:
-    extremes = taken(5, 40, [], 8)
-    changed = extremes.changed_since(0, 0)
-    message = points_message(changed, None)
-    k = len(changed.bins)
-    assert len(message) == 32 + 4 * k * 15
-    assert np.frombuffer(message, "<u4", 4).tolist() == [1, 0, k, 0]
-    assert np.frombuffer(message, "<u4", k, 32).tolist() == changed.bins.tolist()
-    columns = np.frombuffer(message, "<f4", 14 * k, 32 + 4 * k).reshape(14, k)
-    np.testing.assert_array_equal(columns[1], changed.extremes[:, 0, DEVIATION].astype(np.float32))
-    np.testing.assert_array_equal(columns[7], changed.extremes[:, 1, STATION].astype(np.float32))
+    assert len(extremes.changed_since(UNSEEN).bins) == 256

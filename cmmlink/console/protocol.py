@@ -1,0 +1,267 @@
+"""The messages between the station and its pages.
+
+What the station says is JSON text, told apart by `type`, and two binary messages with what is drawn. What a page says is JSON
+text, told apart by `do`; each gets one `Answer` with the same `number`. The first message of a page is its token alone.
+`Hello` opens every connection: with it everything that the station said before is void, and the station says all of it again.
+
+`declarations.py` writes this file's types and constants for the page's scripts.
+"""
+
+import json
+from dataclasses import asdict, dataclass
+from typing import Literal
+
+from cmmlink.run_state import RunState
+from cmmlink.words import VERDICT_NAMES, VERDICT_WORDS, VerdictName
+
+WRONG_TOKEN = 4401  # the station closes a page's socket with this code when the token is wrong
+TOO_MANY_PAGES = 1013
+
+# A binary message begins with these fields, little-endian; then come columns, one after the other, `rows` values each.
+# points : bin u32; of the lowest, then of the highest point in the bin the seven columns of `cmmlink.extremes`, f32. The time is
+#          when the newest verdict was given, ms since 1970, 0 for none; the number is how many bins there are. Another generation
+#          than before says that all points sent before are void.
+# nominal: station, x, y, outward normal x, y, f32; NaN in every column between two pieces. The number is the length in mm.
+HEADER = (("kind", "<u4"), ("generation", "<u4"), ("rows", "<u4"), ("flags", "<u4"), ("time_ms", "<f8"), ("number", "<f8"))
+HEADER_BYTES = 32
+POINTS, NOMINAL = 1, 2  # kinds
+CLOSED = 1  # flag of a nominal
+
+WORDS_OF_VERDICTS = {VERDICT_NAMES[verdict]: VERDICT_WORDS[verdict] for verdict in VERDICT_WORDS}
+
+
+@dataclass(frozen=True, slots=True)
+class Hello:
+    """The first message: which version serves, which of its pages this is, and whether the network can reach it."""
+
+    version: str
+    page: int
+    remote: bool
+    type: Literal["hello"] = "hello"
+
+
+@dataclass(frozen=True, slots=True)
+class Alive:
+    """A sign of life twice a second, with the station's time of day, ms since 1970."""
+
+    now_ms: float
+    type: Literal["alive"] = "alive"
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What came of a command: its number, and words for the operator."""
+
+    number: int | None
+    do: str
+    ok: bool
+    message: str
+    type: Literal["answer"] = "answer"
+
+
+@dataclass(frozen=True, slots=True)
+class Control:
+    """Whether this page controls the station, whether any page does, and how many pages are open."""
+
+    controls: bool
+    taken: bool
+    pages: int
+    type: Literal["control"] = "control"
+
+
+@dataclass(frozen=True, slots=True)
+class ChosenPlan:
+    """The plan chosen. `problem` is empty when it can be run, `line` the line it points at; `facts` are label and value."""
+
+    name: str
+    text: str
+    problem: str
+    line: int | None
+    part: str
+    facts: tuple[tuple[str, str], ...]
+    has_address: bool
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceTest:
+    """The last test of the device."""
+
+    state: Literal["none", "testing", "passed", "failed"]
+    message: str
+
+
+@dataclass(frozen=True, slots=True)
+class StationState:
+    """What the operator has chosen and entered, and what may be done next."""
+
+    plans: tuple[str, ...]
+    ct_plans: tuple[str, ...]
+    choice: ChosenPlan | None
+    serial_number: str
+    operator: str
+    address: str
+    test: DeviceTest
+    running: bool
+    can_start: bool
+    keeps_records: bool
+    type: Literal["station"] = "station"
+
+
+@dataclass(frozen=True, slots=True)
+class AlarmRow:
+    """One thing that went wrong: how often, since when (time of day), whether it still is so, whether somebody has seen it."""
+
+    number: int
+    severity: Literal["fault", "warning"]
+    what: str
+    detail: str
+    count: int
+    since: str
+    active: bool
+    acknowledged: bool
+
+
+@dataclass(frozen=True, slots=True)
+class AlarmList:
+    """The newest alarms, newest first, and whether a fault is there that is active or unseen."""
+
+    fault: bool
+    alarms: tuple[AlarmRow, ...]
+    type: Literal["alarms"] = "alarms"
+
+
+@dataclass(frozen=True, slots=True)
+class ShownRun:
+    """The run the page looks at, null before the first; `recorded` when the page opened a run, or a section, itself."""
+
+    run: RunState | None
+    recorded: bool
+    type: Literal["run"] = "run"
+
+
+@dataclass(frozen=True, slots=True)
+class RunRow:
+    """One line of the station's history. `worst_mm` is the deviation farthest from the middle of the zone."""
+
+    run: str
+    began: str
+    part: str
+    serial_number: str
+    state: str
+    received: int
+    verdict: VerdictName | None
+    worst_mm: float | None
+    worst_station_mm: float | None
+    lower_mm: float | None
+    upper_mm: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class History:
+    """The runs on record, newest first."""
+
+    runs: tuple[RunRow, ...]
+    type: Literal["history"] = "history"
+
+
+@dataclass(frozen=True, slots=True)
+class SectionRow:
+    """One judged section of a CT surface."""
+
+    height_mm: float
+    verdict: VerdictName
+    received: int
+    coverage: float
+    worst_mm: float | None
+    worst_station_mm: float | None
+    lower_mm: float
+    upper_mm: float
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceState:
+    """The CT surface that is inspected, or was inspected last."""
+
+    plan: str
+    state: Literal["none", "reading", "inspecting", "done", "failed"]
+    message: str
+    done: int
+    total: int
+    remaining_s: float | None
+    sections: tuple[SectionRow, ...]
+    type: Literal["ct"] = "ct"
+
+
+@dataclass(frozen=True, slots=True)
+class Device:
+    """A device that can be seen now. The answer to `devices` is a JSON list of them."""
+
+    address: str
+    description: str
+
+
+@dataclass(frozen=True, slots=True)
+class Choose:
+    """Choose a plan and have it checked."""
+
+    plan: str
+    do: Literal["choose"] = "choose"
+
+
+@dataclass(frozen=True, slots=True)
+class Enter:
+    """Enter what belongs to the next part; null leaves a value as it is."""
+
+    serial_number: str | None = None
+    operator: str | None = None
+    address: str | None = None
+    do: Literal["enter"] = "enter"
+
+
+@dataclass(frozen=True, slots=True)
+class Acknowledge:
+    """Mark one alarm as seen, or all."""
+
+    alarm: int | None = None
+    do: Literal["acknowledge"] = "acknowledge"
+
+
+@dataclass(frozen=True, slots=True)
+class OfRun:
+    """Look at a recorded run, or measure it again."""
+
+    run: str
+    do: Literal["open", "replay"]
+
+
+@dataclass(frozen=True, slots=True)
+class OpenSection:
+    """Look at one section of the CT surface."""
+
+    section: int
+    do: Literal["section"] = "section"
+
+
+@dataclass(frozen=True, slots=True)
+class ImportSurface:
+    """Inspect the CT surface of a plan."""
+
+    plan: str
+    do: Literal["import"] = "import"
+
+
+@dataclass(frozen=True, slots=True)
+class Plain:
+    """A command that needs no more words. `everything`: say all again that the station said since its hello."""
+
+    do: Literal["start", "end", "abort", "test", "take control", "live", "devices", "everything"]
+
+
+Message = Hello | Alive | Answer | Control | StationState | AlarmList | ShownRun | History | SurfaceState
+Command = Choose | Enter | Acknowledge | OfRun | OpenSection | ImportSurface | Plain
+
+
+def json_of(message: Message) -> str:
+    """The message as it is sent."""
+    return json.dumps(asdict(message), separators=(",", ":"))

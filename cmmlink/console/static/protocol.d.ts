@@ -1,0 +1,280 @@
+// Written by `python -m cmmlink.console.declarations`; change cmmlink/console/protocol.py, not this file.
+
+export const WRONG_TOKEN: 4401;
+export const HEADER_BYTES: 32;
+export const HEADER_AT: { readonly kind: 0; readonly generation: 4; readonly rows: 8; readonly flags: 12; readonly time_ms: 16; readonly number: 24 };
+export const POINTS: 1;
+export const NOMINAL: 2;
+export const CLOSED: 1;
+export const STATION: 0;
+export const DEVIATION: 1;
+export const FOOT_X: 2;
+export const FOOT_Y: 3;
+export const NORMAL_X: 4;
+export const NORMAL_Y: 5;
+export const VERDICT: 6;
+export const COLUMNS: 7;
+export const CONFORM: 0;
+export const UNCERTAIN: 1;
+export const NONCONFORM: 2;
+export const WORDS_OF_VERDICTS: { readonly conform: "CONFORM"; readonly uncertain: "NOT PROVEN"; readonly nonconform: "NOT CONFORM" };
+
+/** The first message: which version serves, which of its pages this is, and whether the network can reach it. */
+export interface Hello {
+  readonly version: string;
+  readonly page: number;
+  readonly remote: boolean;
+  readonly type: "hello";
+}
+
+/** A sign of life twice a second, with the station's time of day, ms since 1970. */
+export interface Alive {
+  readonly now_ms: number;
+  readonly type: "alive";
+}
+
+/** What came of a command: its number, and words for the operator. */
+export interface Answer {
+  readonly number: number | null;
+  readonly do: string;
+  readonly ok: boolean;
+  readonly message: string;
+  readonly type: "answer";
+}
+
+/** Whether this page controls the station, whether any page does, and how many pages are open. */
+export interface Control {
+  readonly controls: boolean;
+  readonly taken: boolean;
+  readonly pages: number;
+  readonly type: "control";
+}
+
+/** The plan chosen. `problem` is empty when it can be run, `line` the line it points at; `facts` are label and value. */
+export interface ChosenPlan {
+  readonly name: string;
+  readonly text: string;
+  readonly problem: string;
+  readonly line: number | null;
+  readonly part: string;
+  readonly facts: readonly (readonly [string, string])[];
+  readonly has_address: boolean;
+}
+
+/** The last test of the device. */
+export interface DeviceTest {
+  readonly state: "none" | "testing" | "passed" | "failed";
+  readonly message: string;
+}
+
+/** What the operator has chosen and entered, and what may be done next. */
+export interface StationState {
+  readonly plans: readonly string[];
+  readonly ct_plans: readonly string[];
+  readonly choice: ChosenPlan | null;
+  readonly serial_number: string;
+  readonly operator: string;
+  readonly address: string;
+  readonly test: DeviceTest;
+  readonly running: boolean;
+  readonly can_start: boolean;
+  readonly keeps_records: boolean;
+  readonly type: "station";
+}
+
+/** One thing that went wrong: how often, since when (time of day), whether it still is so, whether somebody has seen it. */
+export interface AlarmRow {
+  readonly number: number;
+  readonly severity: "fault" | "warning";
+  readonly what: string;
+  readonly detail: string;
+  readonly count: number;
+  readonly since: string;
+  readonly active: boolean;
+  readonly acknowledged: boolean;
+}
+
+/** The newest alarms, newest first, and whether a fault is there that is active or unseen. */
+export interface AlarmList {
+  readonly fault: boolean;
+  readonly alarms: readonly AlarmRow[];
+  readonly type: "alarms";
+}
+
+/** How far the registration is, how far values can still move (mm), and how many other poses fit as well. */
+export interface RegistrationState {
+  readonly state: "seeking" | "provisional" | "settled";
+  readonly can_move_mm: number | null;
+  readonly other_poses: number;
+}
+
+/** The point farthest from the middle of the zone; x and y are its place in the coordinates of the nominal. */
+export interface WorstPoint {
+  readonly station_mm: number;
+  readonly deviation_mm: number;
+  readonly x_mm: number;
+  readonly y_mm: number;
+  readonly verdict: "conform" | "uncertain" | "nonconform";
+}
+
+/** The verdict in words, whether it is final, and one line that says why it is so. */
+export interface VerdictState {
+  readonly word: "CONFORM" | "NOT PROVEN" | "NOT CONFORM";
+  readonly final: boolean;
+  readonly why: string;
+}
+
+/** The tolerance zone and the expanded uncertainty of one deviation, mm. */
+export interface ZoneLimits {
+  readonly lower_mm: number;
+  readonly upper_mm: number;
+  readonly uncertainty_mm: number;
+}
+
+/** Everything that is shown of a run in numbers and words, as it was at one moment. began : date and time of day, ISO 8601 ending : null while the run is on; message says why a run has no result, or what failed streaming : whether the device shows itself alive now expected : number of points the device announced latency_s : how long the newest judged point waited for its verdict verdict_at_ms : when the newest verdict was given, ms since 1970 */
+export interface RunState {
+  readonly number: string;
+  readonly plan: string;
+  readonly part: string;
+  readonly serial_number: string;
+  readonly operator: string;
+  readonly device: string;
+  readonly address: string;
+  readonly simulated: boolean;
+  readonly began: string;
+  readonly phase: "preparing" | "starting" | "measuring" | "ending" | "finished";
+  readonly ending: "complete" | "aborted" | "interrupted" | "failed" | null;
+  readonly message: string;
+  readonly remark: string;
+  readonly link: "connecting" | "up" | "down" | "closed";
+  readonly streaming: boolean;
+  readonly received: number;
+  readonly judged: number;
+  readonly rejected: number;
+  readonly pending: number;
+  readonly lost: number;
+  readonly damaged_bytes: number;
+  readonly rejected_by_reason: { readonly [key: string]: number };
+  readonly expected: number | null;
+  readonly rate_per_s: number;
+  readonly buffered: number;
+  readonly buffer_peak: number;
+  readonly buffer_capacity: number;
+  readonly stalls: number;
+  readonly latency_s: number | null;
+  readonly verdict_at_ms: number | null;
+  readonly registration: RegistrationState;
+  readonly coverage: number;
+  readonly coverage_min: number;
+  readonly out_of_tolerance: number;
+  readonly worst: WorstPoint | null;
+  readonly verdict: VerdictState;
+  readonly length_mm: number;
+  readonly zone: ZoneLimits;
+}
+
+/** The run the page looks at, null before the first; `recorded` when the page opened a run, or a section, itself. */
+export interface ShownRun {
+  readonly run: RunState | null;
+  readonly recorded: boolean;
+  readonly type: "run";
+}
+
+/** One line of the station's history. `worst_mm` is the deviation farthest from the middle of the zone. */
+export interface RunRow {
+  readonly run: string;
+  readonly began: string;
+  readonly part: string;
+  readonly serial_number: string;
+  readonly state: string;
+  readonly received: number;
+  readonly verdict: "conform" | "uncertain" | "nonconform" | null;
+  readonly worst_mm: number | null;
+  readonly worst_station_mm: number | null;
+  readonly lower_mm: number | null;
+  readonly upper_mm: number | null;
+}
+
+/** The runs on record, newest first. */
+export interface History {
+  readonly runs: readonly RunRow[];
+  readonly type: "history";
+}
+
+/** One judged section of a CT surface. */
+export interface SectionRow {
+  readonly height_mm: number;
+  readonly verdict: "conform" | "uncertain" | "nonconform";
+  readonly received: number;
+  readonly coverage: number;
+  readonly worst_mm: number | null;
+  readonly worst_station_mm: number | null;
+  readonly lower_mm: number;
+  readonly upper_mm: number;
+  readonly warnings: readonly string[];
+}
+
+/** The CT surface that is inspected, or was inspected last. */
+export interface SurfaceState {
+  readonly plan: string;
+  readonly state: "none" | "reading" | "inspecting" | "done" | "failed";
+  readonly message: string;
+  readonly done: number;
+  readonly total: number;
+  readonly remaining_s: number | null;
+  readonly sections: readonly SectionRow[];
+  readonly type: "ct";
+}
+
+/** Choose a plan and have it checked. */
+export interface Choose {
+  readonly plan: string;
+  readonly do: "choose";
+}
+
+/** Enter what belongs to the next part; null leaves a value as it is. */
+export interface Enter {
+  readonly serial_number?: string | null;
+  readonly operator?: string | null;
+  readonly address?: string | null;
+  readonly do: "enter";
+}
+
+/** Mark one alarm as seen, or all. */
+export interface Acknowledge {
+  readonly alarm?: number | null;
+  readonly do: "acknowledge";
+}
+
+/** Look at a recorded run, or measure it again. */
+export interface OfRun {
+  readonly run: string;
+  readonly do: "open" | "replay";
+}
+
+/** Look at one section of the CT surface. */
+export interface OpenSection {
+  readonly section: number;
+  readonly do: "section";
+}
+
+/** Inspect the CT surface of a plan. */
+export interface ImportSurface {
+  readonly plan: string;
+  readonly do: "import";
+}
+
+/** A command that needs no more words. `everything`: say all again that the station said since its hello. */
+export interface Plain {
+  readonly do: "start" | "end" | "abort" | "test" | "take control" | "live" | "devices" | "everything";
+}
+
+/** A device that can be seen now. The answer to `devices` is a JSON list of them. */
+export interface Device {
+  readonly address: string;
+  readonly description: string;
+}
+
+export type Message = Hello | Alive | Answer | Control | StationState | AlarmList | ShownRun | History | SurfaceState;
+
+export type Command = Choose | Enter | Acknowledge | OfRun | OpenSection | ImportSurface | Plain;

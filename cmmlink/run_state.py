@@ -1,0 +1,101 @@
+"""Everything that is shown of one run, as it was at one moment: immutable, and ready for the page and the terminal."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from cmmlink.events import Ending
+from cmmlink.words import VerdictName, VerdictWords
+
+Phase = Literal["preparing", "starting", "measuring", "ending", "finished"]
+LinkPhase = Literal["connecting", "up", "down", "closed"]
+
+
+@dataclass(frozen=True, slots=True)
+class RegistrationState:
+    """How far the registration is, how far values can still move (mm), and how many other poses fit as well."""
+
+    state: Literal["seeking", "provisional", "settled"]
+    can_move_mm: float | None
+    other_poses: int
+
+
+@dataclass(frozen=True, slots=True)
+class WorstPoint:
+    """The point farthest from the middle of the zone; x and y are its place in the coordinates of the nominal."""
+
+    station_mm: float
+    deviation_mm: float
+    x_mm: float
+    y_mm: float
+    verdict: VerdictName
+
+
+@dataclass(frozen=True, slots=True)
+class VerdictState:
+    """The verdict in words, whether it is final, and one line that says why it is so."""
+
+    word: VerdictWords
+    final: bool
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class ZoneLimits:
+    """The tolerance zone and the expanded uncertainty of one deviation, mm."""
+
+    lower_mm: float
+    upper_mm: float
+    uncertainty_mm: float
+
+
+@dataclass(frozen=True, slots=True)
+class RunState:
+    """Everything that is shown of a run in numbers and words, as it was at one moment.
+
+    began         : date and time of day, ISO 8601
+    ending        : null while the run is on; message says why a run has no result, or what failed
+    streaming     : whether the device shows itself alive now
+    expected      : number of points the device announced
+    latency_s     : how long the newest judged point waited for its verdict
+    verdict_at_ms : when the newest verdict was given, ms since 1970
+    """
+
+    number: str
+    plan: str
+    part: str
+    serial_number: str
+    operator: str
+    device: str
+    address: str
+    simulated: bool
+    began: str
+    phase: Phase
+    ending: Ending | Literal["failed"] | None
+    message: str
+    remark: str
+    link: LinkPhase
+    streaming: bool
+    received: int
+    judged: int
+    rejected: int
+    pending: int
+    lost: int
+    damaged_bytes: int
+    rejected_by_reason: Mapping[str, int]
+    expected: int | None
+    rate_per_s: float
+    buffered: int
+    buffer_peak: int
+    buffer_capacity: int
+    stalls: int
+    latency_s: float | None
+    verdict_at_ms: float | None
+    registration: RegistrationState
+    coverage: float
+    coverage_min: float
+    out_of_tolerance: int
+    worst: WorstPoint | None
+    verdict: VerdictState
+    length_mm: float
+    zone: ZoneLimits

@@ -1,0 +1,365 @@
+"""The newest state of one run, for whoever shows it: a sink that keeps no history, in constant memory.
+
+The run calls it and goes on at once. After every change the view publishes an immutable `RunState`; readers take the newest
+one whenever they are ready. Nothing is queued and nobody waits, so a slow reader never slows a run.
+"""
+
+import math
+import threading
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from datetime import datetime
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmmlink.events import Arrived, Counts, Ending, Event, Judged, RunStarted
+from cmmlink.extremes import DEVIATION, FOOT_X, NORMAL_X, STATION, VERDICT, ChangedBins, Extremes, PointsVersion
+from cmmlink.result_json import number, summary
+from cmmlink.run_state import LinkPhase, Phase, RegistrationState, RunState, VerdictState, WorstPoint, ZoneLimits
+from cmmlink.words import VERDICT_NAMES, VERDICT_WORDS
+from drivers import Heartbeat, LinkDown, PointBatch, ScanClosed, ScanOpened
+from inspection import LiveUpdate, NominalProfile, ToleranceZone, Verdict, coverage
+
+_COUNTED = ("received", "judged", "rejected", "lost", "damaged_bytes", "rejected_by_reason")
+_RATE_OVER_S = 1.0
+_RATE_STEP_S = 0.05
+_COVERAGE_EVERY_S = 0.25
+
+
+class Rows(Protocol):
+    """The judged points of a result: what an InspectionResult has, and what the records keep of one."""
+
+    @property
+    def station_mm(self) -> NDArray[np.float64]: ...  # noqa: D102
+    @property
+    def deviation_mm(self) -> NDArray[np.float64]: ...  # noqa: D102
+    @property
+    def foot_mm(self) -> NDArray[np.float64]: ...  # noqa: D102
+    @property
+    def actual_mm(self) -> NDArray[np.float64]: ...  # noqa: D102
+    @property
+    def verdicts(self) -> NDArray[np.int8]: ...  # noqa: D102
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ended:
+    """How a run ended: its ending, why there is no result, the result as the command line prints it, and its judged points."""
+
+    ending: Ending
+    message: str
+    result: Mapping[str, Any]
+    rows: Rows | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RunContext:
+    """What is known of a run before it begins: its number or title, its plan, and what the points are judged by."""
+
+    number: str
+    plan: str
+    profile: NominalProfile
+    zone: ToleranceZone
+    coverage_min: float
+    buffer_points: int
+    began: datetime
+
+
+class _Received(NamedTuple):
+    """How many points had been received at a moment of the run's clock."""
+
+    time_s: float
+    points: int
+
+
+class _Published(NamedTuple):
+    """A state as it is while nothing comes, and between which two moments the rate of points is to be taken."""
+
+    state: RunState
+    first: _Received
+    last: _Received
+
+
+class RunView:
+    """The newest state of one run, published after every change as an immutable snapshot.
+
+    One thread hands over the events of the run, and any thread may read. Guarded by its own lock, which is held only while
+    fields are set and a snapshot is put together; readers do not take it.
+
+    clock : the run's clock, s; now : the time of day
+    """
+
+    def __init__(self, context: RunContext, clock: Callable[[], float], now: Callable[[], datetime]) -> None:
+        self.context = context
+        self._clock, self._now = clock, now
+        self._lock = threading.Lock()
+        self._extremes = Extremes(context.profile.length_mm, context.zone.middle_mm)
+        self._started = RunStarted("", "", "", "", False)
+        self._phase: Phase = "preparing"
+        self._counts = Counts()
+        self._link: LinkPhase = "connecting"
+        self._expected: int | None = None
+        self._device_name = ""
+        self._received: deque[_Received] = deque()
+        self._alive_s = -math.inf
+        self._latency_s = math.nan
+        self._verdict_at: datetime | None = None
+        self._update: LiveUpdate | None = None
+        self._out = 0
+        self._coverage, self._coverage_s = 0.0, -math.inf
+        self._ended: Ended | None = None
+        self._failure = self._remark = ""
+        self._published = self._snapshot()
+
+    def __call__(self, event: Event) -> None:
+        """Take one event of the run."""
+        if isinstance(event, RunStarted):
+            self._set_started(event)
+        elif isinstance(event, Arrived):
+            self._take_arrival(event)
+        elif isinstance(event, Judged):
+            self._take_verdicts(event)
+        else:
+            self._end(Ended(event.ending, event.message, summary(event.result, event.counts), event.result), event.counts)
+
+    def recall(self, started: RunStarted, ended: Ended) -> None:
+        """Show a run as the records hold it."""
+        self._set_started(started)
+        self._end(ended, Counts(**{name: ended.result[name] for name in _COUNTED if name in ended.result}))
+
+    def await_device(self) -> None:
+        """Note that everything is ready, and that the device is asked for points from now on."""
+        with self._lock:
+            if self._phase == "preparing":
+                self._phase = "starting"
+            self._publish()
+
+    def fail(self, message: str) -> None:
+        """Note that the run broke off before it could give a result."""
+        with self._lock:
+            self._failure, self._phase, self._link = message, "finished", "closed"
+            self._publish()
+
+    def remark(self, words: str) -> None:
+        """Set what the operator should read beside the verdict."""
+        with self._lock:
+            self._remark = words
+            self._publish()
+
+    def end_soon(self) -> None:
+        """Note that the operator ended or aborted the run; what was received is still being judged."""
+        with self._lock:
+            if self._phase != "finished":
+                self._phase = "ending"
+            self._publish()
+
+    @property
+    def over(self) -> bool:
+        """Whether the run has come to its end."""
+        return self._published.state.phase == "finished"
+
+    def state(self) -> RunState:
+        """The newest state. Waits for nobody; only the rate and the sign of life depend on when it is asked for."""
+        published, now_s = self._published, self._clock()
+        streaming = published.state.streaming and now_s - self._alive_s < _RATE_OVER_S
+        return replace(published.state, streaming=streaming, rate_per_s=_rate_per_s(published, now_s))
+
+    @property
+    def newest_points(self) -> PointsVersion:
+        """What a reader of the points has seen that has seen everything. Waits for nobody."""
+        return self._extremes.newest
+
+    def points_since(self, seen: PointsVersion) -> tuple[ChangedBins, datetime | None]:
+        """The bins that changed after what was `seen`, and when the newest verdict in them was given."""
+        verdict_at = self._verdict_at
+        return self._extremes.changed_since(seen), verdict_at
+
+    def _set_started(self, started: RunStarted) -> None:
+        with self._lock:
+            self._started = started
+            self._publish()
+
+    def _take_arrival(self, event: Arrived) -> None:
+        arrival = event.arrival
+        if isinstance(arrival, (PointBatch, Heartbeat)):
+            self._alive_s = event.time_s
+        link: LinkPhase = "down" if isinstance(arrival, LinkDown) else "closed" if isinstance(arrival, ScanClosed) else "up"
+        begins = link != "down" and self._phase in ("preparing", "starting")
+        opened = isinstance(arrival, ScanOpened)
+        if link == self._link and not begins and not opened:
+            return  # most arrivals change nothing that is shown
+        with self._lock:
+            self._link = link
+            if begins and self._phase != "ending":
+                self._phase = "measuring"
+            if isinstance(arrival, ScanOpened):
+                self._expected, self._device_name = arrival.expected, " ".join(filter(None, (arrival.device, arrival.serial_number)))
+            self._publish()
+
+    def _take_verdicts(self, event: Judged) -> None:
+        update, counts = event.update, event.counts
+        anew = update.first == 0  # all points were judged once more: what was shown before is void
+        extremes = self._empty_extremes() if anew else self._extremes
+        extremes.add(update.station_mm, update.deviation_mm, update.foot_mm, update.actual_mm, update.verdicts)
+        out = int(np.count_nonzero(update.verdicts == Verdict.NONCONFORM)) + (0 if anew else self._out)
+        covered, covered_s = self._coverage, self._coverage_s
+        if event.time_s - covered_s > _COVERAGE_EVERY_S:
+            covered, covered_s = coverage(extremes.stations_mm, self.context.profile), event.time_s
+        self._note_received(event.time_s, counts.received)
+        with self._lock:
+            self._extremes, self._out, self._coverage, self._coverage_s = extremes, out, covered, covered_s
+            self._update, self._counts, self._latency_s = update, counts, event.age_s
+            if counts.judged:
+                self._verdict_at = self._now()
+            self._publish()
+
+    def _end(self, ended: Ended, counts: Counts) -> None:
+        """Replace everything provisional by the result."""
+        rows, extremes = ended.rows, self._extremes
+        if rows is not None:
+            extremes = self._empty_extremes()
+            extremes.add(rows.station_mm, rows.deviation_mm, rows.foot_mm, rows.actual_mm, rows.verdicts)
+        with self._lock:
+            self._phase, self._ended, self._counts, self._extremes = "finished", ended, counts, extremes
+            self._link = "down" if ended.ending == "interrupted" else "closed"
+            self._coverage, self._out = ended.result["coverage"], ended.result["out_of_tolerance"]
+            if rows is not None:
+                self._verdict_at = self._now()
+            self._publish()
+
+    def _empty_extremes(self) -> Extremes:
+        context = self.context
+        return Extremes(context.profile.length_mm, context.zone.middle_mm, self._extremes.generation + 1)
+
+    def _note_received(self, time_s: float, count: int) -> None:
+        if self._received and time_s - self._received[-1].time_s < _RATE_STEP_S:
+            return
+        self._received.append(_Received(time_s, count))
+        while len(self._received) > 2 and time_s - self._received[0].time_s > _RATE_OVER_S:
+            self._received.popleft()
+
+    def _publish(self) -> None:
+        """Replace the snapshot; called with the lock held."""
+        self._published = self._snapshot()
+
+    def _snapshot(self) -> _Published:
+        first = self._received[0] if self._received else _Received(0.0, 0)
+        last = self._received[-1] if self._received else first
+        return _Published(self._state(), first, last)
+
+    def _state(self) -> RunState:
+        context, started, counts, ended, zone = self.context, self._started, self._counts, self._ended, self.context.zone
+        return RunState(
+            number=context.number,
+            plan=context.plan,
+            part=started.part,
+            serial_number=started.serial_number,
+            operator=started.operator,
+            device=self._device_name or started.device,
+            address=started.device,
+            simulated=started.simulated,
+            began=context.began.isoformat(timespec="seconds"),
+            phase=self._phase,
+            ending="failed" if self._failure else ended.ending if ended else None,
+            message=self._failure or (ended.message if ended else ""),
+            remark=self._remark,
+            link=self._link,
+            streaming=self._phase in ("measuring", "ending") and self._link == "up",
+            received=counts.received,
+            judged=counts.judged,
+            rejected=counts.rejected,
+            pending=counts.pending,
+            lost=counts.lost,
+            damaged_bytes=counts.damaged_bytes,
+            rejected_by_reason=dict(counts.rejected_by_reason),
+            expected=self._expected,
+            rate_per_s=0.0,
+            buffered=counts.buffered,
+            buffer_peak=counts.buffer_peak,
+            buffer_capacity=context.buffer_points,
+            stalls=counts.stalls,
+            latency_s=number(self._latency_s),
+            verdict_at_ms=self._verdict_at.timestamp() * 1e3 if self._verdict_at else None,
+            registration=self._registration(),
+            coverage=self._coverage,
+            coverage_min=context.coverage_min,
+            out_of_tolerance=self._out,
+            worst=_worst_point(self._extremes.worst),
+            verdict=self._verdict(),
+            length_mm=context.profile.length_mm,
+            zone=ZoneLimits(zone.lower_mm, zone.upper_mm, zone.uncertainty_mm),
+        )
+
+    def _registration(self) -> RegistrationState:
+        found = self._ended.result["registration"] if self._ended else None
+        if found is not None:
+            return RegistrationState("settled", 0.0, len(found.get("other_poses", [])))
+        if self._update is None:
+            return RegistrationState("seeking", None, 0)
+        return RegistrationState(self._update.state, number(self._update.can_move_mm), 0)
+
+    def _verdict(self) -> VerdictState:
+        if self._failure:
+            return VerdictState(VERDICT_WORDS[Verdict.UNCERTAIN], True, "the run broke off")
+        if self._ended is not None:
+            verdict = Verdict[self._ended.result["verdict"].upper()]
+            return VerdictState(VERDICT_WORDS[verdict], True, _reason_of(self._ended, verdict, self.context.coverage_min))
+        return self._verdict_so_far()
+
+    def _verdict_so_far(self) -> VerdictState:
+        unproven = VERDICT_WORDS[Verdict.UNCERTAIN]
+        if self._phase == "preparing":
+            return VerdictState(unproven, False, "preparing the inspection")
+        provisional = self._update is None or self._update.state != "settled"
+        if self._out:
+            why = f"{_points(self._out)} out so far" + (", provisional" if provisional else "")
+            return VerdictState(VERDICT_WORDS[Verdict.NONCONFORM], False, why)
+        if not self._counts.judged:
+            seeking = self._update is not None and self._update.state == "seeking"
+            return VerdictState(unproven, False, "seeking the part" if seeking else "waiting for points")
+        return VerdictState(unproven, False, f"{self._coverage:.0%} measured, none out so far")
+
+
+def _rate_per_s(published: _Published, now_s: float) -> float:
+    """Points per second over the last second; it falls to zero when nothing comes."""
+    first, last = published.first, published.last
+    if published.state.phase == "finished" or last.time_s <= first.time_s:
+        return 0.0
+    return round((last.points - first.points) / max(last.time_s - first.time_s, now_s - last.time_s), 1)
+
+
+def _worst_point(worst: NDArray[np.float64] | None) -> WorstPoint | None:
+    if worst is None:
+        return None
+    x, y = worst[FOOT_X : FOOT_X + 2] + worst[DEVIATION] * worst[NORMAL_X : NORMAL_X + 2]
+    verdict = VERDICT_NAMES[Verdict(int(worst[VERDICT]))]
+    return WorstPoint(float(worst[STATION]), float(worst[DEVIATION]), float(x), float(y), verdict)
+
+
+def _reason_of(ended: Ended, verdict: Verdict, coverage_min: float) -> str:
+    """One line under the final verdict."""
+    result = ended.result
+    if result["registration"] is None:
+        if ended.ending == "interrupted" and result["received"]:
+            return "cut short; Replay judges what was received"
+        return "no part found" if result["received"] else "no point was received"
+    if verdict is Verdict.NONCONFORM:
+        places = f", {len(result['stretches'])} places" if len(result["stretches"]) > 1 else ""
+        return f"{_points(result['out_of_tolerance'])} out of tolerance{places}"
+    if verdict is Verdict.CONFORM:
+        return f"all {_points(result['judged'])} within tolerance"
+    if ended.ending != "complete":
+        return "the scan was aborted" if ended.ending == "aborted" else "the scan was cut short"
+    if not result["judged"]:
+        return "no point could be judged"
+    if result["coverage"] < coverage_min:
+        return f"only {result['coverage']:.1%} measured, {coverage_min:.1%} needed"
+    if outliers := result["rejected_by_reason"].get("outlier"):
+        return f"{_points(outliers)} rejected as outliers, not judged"
+    return "too close to a limit for the uncertainty"
+
+
+def _points(count: int) -> str:
+    return f"{count:,} point{'s' if count != 1 else ''}"
