@@ -8,7 +8,8 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-VerdictWord = Literal["conform", "nonconform", "uncertain"]
+from cmmlink.words import VerdictName
+
 State = Literal["complete", "interrupted", "aborted", "running", "damaged"]
 
 
@@ -59,7 +60,7 @@ class Zone(_Json):
 class Inspected(_Json):
     """What was found. Without a result (nothing could be registered) the counts stand beside nulls, and the verdict is uncertain."""
 
-    verdict: VerdictWord = Field(description="the verdict on the profile; uncertain: neither conformity nor nonconformity is proven")
+    verdict: VerdictName = Field(description="the verdict on the profile; uncertain: neither conformity nor nonconformity is proven")
     received: int = Field(description="the points that came through the link whole; always judged + rejected")
     judged: int = Field(description="the points with a verdict")
     rejected: int = Field(description="the points that cannot be judged")
@@ -137,7 +138,7 @@ class SectionInspected(Inspected):
 class StackInspected(_Json):
     """The result of `ct`: the surface, and its sections."""
 
-    verdict: VerdictWord = Field(description="the verdict of the worst section; at best uncertain where sections are missing")
+    verdict: VerdictName = Field(description="the verdict of the worst section; at best uncertain where sections are missing")
     complete: bool = Field(description="whether every section that was asked for was inspected")
     mesh: str = Field(description="the file of the surface")
     mesh_kind: str = Field(description="the format of that file, like binary STL")
@@ -175,7 +176,7 @@ class RunLine(_Json):
     serial_number: str | None = Field(description="the serial number of the part, empty where none was given")
     state: State = Field(description="how the run ended; running: it is being recorded just now; damaged: its records were altered")
     received: int | None = Field(description="the points received; null while the run goes on")
-    verdict: VerdictWord | None = Field(description="the verdict; null where there is none")
+    verdict: VerdictName | None = Field(description="the verdict; null where there is none")
 
 
 class Runs(_Json):
@@ -237,7 +238,7 @@ class Shown(_Json):
     ended: str | None = Field(description="date and time of the end; null while the run goes on")
     message: str | None = Field(description="what ended the run early, empty where nothing did")
     received: int | None = Field(description="the points received; null while the run goes on")
-    verdict: VerdictWord | None = Field(description="the verdict; null where there is none")
+    verdict: VerdictName | None = Field(description="the verdict; null where there is none")
     result: Inspected | None = Field(description="the recorded result")
     chain_sha256: str = Field(description="the hash of the run's last record; empty while the run goes on")
     recorded: Kept = Field(description="how much was recorded")
