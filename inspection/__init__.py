@@ -6,18 +6,19 @@ This is the front door: an application imports what `__all__` lists and none of 
 from inspection import synthetic
 from inspection.coarse import register_coarse
 from inspection.curve import NurbsCurve
-from inspection.deviations import Deviations, Method, profile_error_mm
+from inspection.deviations import Deviations, deviations, profile_error_mm
 from inspection.errors import InspectionError, NominalError, RegistrationError
 from inspection.fine import register, register_fine
 from inspection.kernels import while_compiling
-from inspection.live import FitName, LiveInspection, LiveUpdate, State, rehearse
+from inspection.live import LiveInspection, LiveUpdate, State, rehearse
+from inspection.methods import Method
 from inspection.minimum_zone import MinimumZone, fit_minimum_zone
 from inspection.nominal import Material, NominalProfile, discretize
-from inspection.profile_error import deviations
 from inspection.registration import Registration
 from inspection.result import NOT_JUDGED, InspectionResult, Rejection, Stretch, coverage
 from inspection.rigid import RigidTransform
 from inspection.section import SectionPlane
+from inspection.terms import FitName
 from inspection.tolerance import ToleranceZone, Verdict
 
 __all__ = [

@@ -1,22 +1,22 @@
 """Algorithm 3 of Hari Ganesh & Samuel (2022), and what a partial scan needs beyond it.
 
-Published: the oriented bounding boxes are brought together, the flip chosen by their diagonal points, and the result is tuned
-on dominant points. Added: arc-length weights, so that the axes do not depend on how densely points lie; and for scans that
-cover only a part of the profile, the turning angle as a function of arc length slid along that of the nominal
-(Arkin et al. 1991; Wolfson 1990), in both scan directions.
+Published: the oriented bounding boxes are brought together, their diagonal points choose between the two ways round, and the
+result is tuned on dominant points. Added: arc-length weights, so that the axes do not depend on how densely points lie. Added
+for scans that cover only a part of the profile: their turning angle as a function of arc length is slid along that of the
+nominal, in both scan directions (Arkin et al. 1991; Wolfson 1990).
 """
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike, NDArray
 
+from inspection.deviations import check_points
 from inspection.errors import RegistrationError
 from inspection.frame import Frame, arc_length_weights, dominant_points, principal_frame
 from inspection.kernels import project, strides
 from inspection.nominal import NominalProfile
-from inspection.profile_error import checked_points
 from inspection.registration import Registration
-from inspection.rigid import RigidTransform, best_motion, rotated
+from inspection.rigid import RigidTransform, best_motion, rotate
 
 Array = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ def register_coarse(points_mm: ArrayLike, nominal: NominalProfile) -> Registrati
 
     Raises RegistrationError for fewer than 8 points or points all in one place.
     """
-    points = registrable(points_mm)
+    points = check_registrable(points_mm)
     poses = coarse_poses(points, nominal)
     scores = [trimmed_mean_square(points, pose, nominal) for pose in poses]
     pose = poses[int(np.argmin(scores))]
@@ -49,38 +49,38 @@ def register_coarse(points_mm: ArrayLike, nominal: NominalProfile) -> Registrati
     )
 
 
-def registrable(points_mm: ArrayLike) -> Array:
-    """Points (m, 2), checked to be enough and not all in one place."""
-    points = checked_points(points_mm)
+def check_registrable(points_mm: ArrayLike) -> Array:
+    """Points as a finite float array (m, 2). Raises RegistrationError for fewer than 8 points or points all in one place."""
+    points = check_points(points_mm)
     if len(points) < FEWEST_POINTS:
         raise RegistrationError(f"{len(points)} points: a registration needs at least {FEWEST_POINTS}")
-    if (points[0] == points[-1]).all() and (points == points[0]).all():  # the second look takes long
+    if (points[0] == points[-1]).all() and (points == points[0]).all():  # two steps, because the full comparison is slow
         raise RegistrationError(f"all {len(points)} points coincide at ({points[0, 0]:g}, {points[0, 1]:g})")
     return points
 
 
 def coarse_poses(points_mm: Array, nominal: NominalProfile) -> list[RigidTransform]:
-    """Candidate poses, the published one first: boxes both ways round, then the best shifts of the turning angle."""
+    """Candidate poses: those of the boxes, the published one first, then those at the best shifts of the turning angle."""
     points = points_mm[:: max(1, len(points_mm) // _MOST_POINTS)]
-    scanned = in_scan_order(points)
+    scanned = is_in_scan_order(points)
     weights = arc_length_weights(points, nominal.curve.closed) if scanned else None
     nominal_frame = principal_frame(nominal.points_mm, arc_length_weights(nominal.points_mm, nominal.curve.closed))
     poses = list(align_boxes(principal_frame(points, weights), nominal_frame))
-    poses[0] = tuned_on_dominant_points(points, poses[0], nominal)
+    poses[0] = tune_on_dominant_points(points, poses[0], nominal)
     return poses + (_signature_poses(points, nominal) if scanned else [])
 
 
-def in_scan_order(points_mm: Array) -> bool:
-    """Whether neighbours in the sequence are neighbours in space, as on a scan: a shuffled set has no arc length."""
+def is_in_scan_order(points_mm: Array) -> bool:
+    """Whether neighbours in the sequence are neighbours in space, as on a scan. Points in any other order have no arc length."""
     steps = np.hypot(*np.diff(points_mm, axis=0).T)
     return bool(np.median(steps) < 0.1 * np.hypot(*np.ptp(points_mm, axis=0)))
 
 
 def align_boxes(measured: Frame, nominal: Frame) -> tuple[RigidTransform, RigidTransform]:
-    """The two motions that bring the measured box onto the nominal one, box centre to box centre; the likelier one first.
+    """The two motions that bring the measured box onto the nominal one, box centre to box centre, the likelier one first.
 
-    Of the two proper rotations the diagonal points decide: the extents of the boxes about their means, compared directly
-    and turned by half a turn.
+    Which one that is the diagonal points decide: the extents of the measured box about its mean are compared with those of the
+    nominal box as they are, and after half a turn.
     """
     extents, reference = measured.diagonal_points_mm, nominal.diagonal_points_mm
     turned = -np.roll(extents, 2)
@@ -93,8 +93,8 @@ def align_boxes(measured: Frame, nominal: Frame) -> tuple[RigidTransform, RigidT
     return (poses[0], poses[1]) if straight else (poses[1], poses[0])
 
 
-def tuned_on_dominant_points(points_mm: Array, pose: RigidTransform, nominal: NominalProfile) -> RigidTransform:
-    """Best motion of the points nearest to the nominal's dominant points, taken only where it lowers the mean square distance."""
+def tune_on_dominant_points(points_mm: Array, pose: RigidTransform, nominal: NominalProfile) -> RigidTransform:
+    """The pose after the best motion of the points nearest to the nominal's dominant points, or as it was if that fits no better."""
     dominant = nominal.points_mm[dominant_points(nominal.points_mm, nominal.curve.closed)]
     moved = pose.apply(points_mm)
     if len(dominant) < 2:
@@ -119,18 +119,18 @@ def trimmed_mean_square(points_mm: Array, pose: RigidTransform, nominal: Nominal
 def _signature_poses(points_mm: Array, nominal: NominalProfile) -> list[RigidTransform]:
     """Poses at the best matches of the scan's turning angle with the nominal's, forwards and backwards."""
     step = nominal.length_mm / _SIGNATURE_STEPS
-    clean = _without_spikes(points_mm)
+    clean = _drop_spikes(points_mm)
     poses: list[RigidTransform] = []
     for scan in (clean, clean[::-1]):
         even = _even_walk(scan, step)
         if len(even) > 2 * _CHORD_STEPS:
-            poses += _best_shifts(even[: _SIGNATURE_STEPS + 1], nominal, step)
+            poses += _poses_at_best_shifts(even[: _SIGNATURE_STEPS + 1], nominal, step)
     return poses
 
 
-def _best_shifts(scan: Array, nominal: NominalProfile, step: float) -> list[RigidTransform]:
-    """Poses at the lowest variances of the difference in direction, over all shifts of the scan along the nominal."""
-    reference = _even_nominal(nominal, step, len(scan))
+def _poses_at_best_shifts(scan: Array, nominal: NominalProfile, step: float) -> list[RigidTransform]:
+    """Poses at those shifts of the scan along the nominal at which the difference of their directions varies least."""
+    reference = _even_nominal_points(nominal, step, len(scan))
     along_nominal, along_scan = _chord_directions(reference), _chord_directions(scan)
     if len(along_scan) > len(along_nominal):
         scan = scan[: len(reference)]
@@ -144,12 +144,12 @@ def _best_shifts(scan: Array, nominal: NominalProfile, step: float) -> list[Rigi
     for shift in chosen:
         angle = float(difference[shift].mean())
         target = reference[shift : shift + len(scan)]
-        poses.append(RigidTransform(angle, target.mean(axis=0) - rotated(scan, angle).mean(axis=0)))
+        poses.append(RigidTransform(angle, target.mean(axis=0) - rotate(scan, angle).mean(axis=0)))
     return poses
 
 
-def _even_nominal(nominal: NominalProfile, step: float, window: int) -> Array:
-    """Nominal points every `step` of arc length; a closed profile is continued by one window."""
+def _even_nominal_points(nominal: NominalProfile, step: float, window: int) -> Array:
+    """Nominal points every `step` of arc length. A closed profile goes on past its seam by `window` points."""
     station = np.arange(_SIGNATURE_STEPS + (window if nominal.curve.closed else 1)) * step
     known = np.append(nominal.station_mm, nominal.length_mm) if nominal.curve.closed else nominal.station_mm
     points = np.vstack([nominal.points_mm, nominal.points_mm[:1]]) if nominal.curve.closed else nominal.points_mm
@@ -159,12 +159,13 @@ def _even_nominal(nominal: NominalProfile, step: float, window: int) -> Array:
 
 
 def _chord_directions(points_mm: Array) -> Array:
+    """Directions in rad, without jumps, of the chords that span four steps each."""
     chords = points_mm[_CHORD_STEPS:] - points_mm[:-_CHORD_STEPS]
     return np.asarray(np.unwrap(np.arctan2(chords[:, 1], chords[:, 0])))
 
 
-def _without_spikes(points_mm: Array) -> Array:
-    """Points that stay near the median of their seven neighbours in scan order; single spikes would bend the turning angle."""
+def _drop_spikes(points_mm: Array) -> Array:
+    """Points that stay near the median of the seven around them in scan order, because single spikes would bend the turning angle."""
     if len(points_mm) < 2 * FEWEST_POINTS:
         return points_mm
     padded = np.vstack([np.repeat(points_mm[:1], 3, axis=0), points_mm, np.repeat(points_mm[-1:], 3, axis=0)])
@@ -173,7 +174,7 @@ def _without_spikes(points_mm: Array) -> Array:
 
 
 def _even_walk(points_mm: Array, step: float) -> Array:
-    """Points (k, 2) about one `step` apart along the scan; noise between them does not lengthen the walk."""
+    """Points (k, 2) about one `step` apart along the scan, so that noise between them does not lengthen the walk."""
     corners = points_mm[strides(points_mm, step)]
     travelled = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
     even = np.arange(0.0, travelled[-1], step)

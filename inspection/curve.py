@@ -15,7 +15,7 @@ from inspection.errors import NominalError
 Array = NDArray[np.float64]
 
 _GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)
-_CORNER_SINE = 1e-6  # a turn of the tangent below this angle (rad) is round-off in the control points, not a corner
+_CORNER_SINE = 1e-6  # rad; a smaller turn of the tangent is round-off in the control points, not a corner
 _CLOSURE = 1e-9  # allowed gap of a closed curve, as a fraction of its size
 
 
@@ -74,9 +74,9 @@ class NurbsCurve:
         """Curve through points (m, 2) in order, centripetal parameter scaled to [0, 1] (Lee 1989).
 
         `closed` joins the last point to the first, smoothly, or with a corner there (`corner_at_seam`: a sharp trailing edge).
-        A last point equal to the first is understood as that join. Raises NominalError for too few or coinciding neighbours.
+        A last point equal to the first is taken as that join. Raises NominalError for too few or coinciding neighbours.
         """
-        points = _distinct_neighbours(np.array(points_mm, dtype=np.float64), degree, closed)
+        points = _check_neighbours(np.array(points_mm, dtype=np.float64), degree, closed)
         steps = np.sqrt(np.linalg.norm(np.diff(points, axis=0), axis=1))
         parameter = np.concatenate([[0.0], np.cumsum(steps)])
         parameter /= parameter[-1]
@@ -90,7 +90,7 @@ class NurbsCurve:
 
     def derivatives(self, u: ArrayLike, order: int) -> Array:
         """Point and derivatives by u up to `order`: (order + 1, m, 2). At a corner the side of larger u counts."""
-        parameter = self._inside(np.atleast_1d(np.asarray(u, dtype=np.float64)))
+        parameter = self._bring_inside(np.atleast_1d(np.asarray(u, dtype=np.float64)))
         result = np.zeros((order + 1, len(parameter), 2))
         weight = np.zeros((order + 1, len(parameter)))
         for nu in range(min(order, self.degree) + 1):
@@ -112,11 +112,12 @@ class NurbsCurve:
 
     def station_mm(self, u: ArrayLike) -> Array:
         """Arc length (m,) from the start of the curve to the parameters u (m,)."""
-        parameter = self._inside(np.atleast_1d(np.asarray(u, dtype=np.float64)))
+        parameter = self._bring_inside(np.atleast_1d(np.asarray(u, dtype=np.float64)))
         piece = np.clip(np.searchsorted(self._borders, parameter, side="right") - 1, 0, len(self._borders) - 2)
         return np.asarray(self._border_stations_mm[piece] + _arc_length(self, self._borders[piece], parameter))
 
-    def _inside(self, u: Array) -> Array:
+    def _bring_inside(self, u: Array) -> Array:
+        """Parameters (m,) wrapped into the domain of a closed curve. Raises ValueError for those outside that of an open one."""
         start, end = self.domain
         if self.closed:
             return np.where((u >= start) & (u <= end), u, start + np.mod(u - start, end - start))
@@ -156,8 +157,8 @@ class NurbsCurve:
                 raise NominalError(f"a closed curve must end where it begins: the gap is {np.hypot(*(last - first)):.6g} mm")
 
 
-def _distinct_neighbours(points: Array, degree: int, closed: bool) -> Array:
-    """Points with the closing point in place (closed) and checked: enough of them, no two neighbours alike."""
+def _check_neighbours(points: Array, degree: int, closed: bool) -> Array:
+    """The points, with the first one repeated at the end of a closed curve. Raises NominalError for too few or coinciding ones."""
     if points.ndim != 2 or points.shape[1] != 2 or not np.all(np.isfinite(points)):
         raise NominalError(f"points must be finite (m, 2), got shape {points.shape}")
     if closed and len(points) and not np.array_equal(points[0], points[-1]):
@@ -176,6 +177,7 @@ def _distinct_neighbours(points: Array, degree: int, closed: bool) -> Array:
 
 
 def _speed(curve: NurbsCurve, u: Array) -> Array:
+    """Arc length per unit of the parameter, in the shape of u."""
     first = curve.derivatives(u.ravel(), 1)[1]
     return np.asarray(np.hypot(first[:, 0], first[:, 1]).reshape(u.shape))
 
@@ -188,7 +190,10 @@ def _arc_length(curve: NurbsCurve, start: Array, end: Array) -> Array:
 
 
 def _arc_length_table(curve: NurbsCurve) -> tuple[Array, Array]:
-    """Split every knot span until halving changes its arc length by no more than round-off; cumulative lengths."""
+    """Parameters (b,) that cut the curve finely enough for Gauss-Legendre to be exact to round-off, and the arc lengths up to them (b,).
+
+    Every knot span is halved until that changes its arc length by no more than round-off.
+    """
     start, end = curve.domain
     spans = np.unique(np.clip(curve.knots, start, end))
     left, right = spans[:-1], spans[1:]
@@ -228,18 +233,19 @@ def _corners(curve: NurbsCurve) -> Array:
         candidates = np.concatenate([[start], candidates])
     if not candidates.size:
         return candidates
-    before = _unit(curve.derivatives(left_of(candidates, curve), 1)[1])
-    after = _unit(curve.derivatives(candidates, 1)[1])
+    before = unit_vectors(curve.derivatives(left_limit(candidates, curve), 1)[1])
+    after = unit_vectors(curve.derivatives(candidates, 1)[1])
     sine = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
     cosine = (before * after).sum(axis=1)
     return np.asarray(candidates[(np.abs(sine) > _CORNER_SINE) | (cosine < 0)])
 
 
-def left_of(u: Array, curve: NurbsCurve) -> Array:
-    """Parameters that belong to the span before u (m,), so that derivatives there are left-hand ones."""
+def left_limit(u: Array, curve: NurbsCurve) -> Array:
+    """Parameters in the span before u (m,), as close to u as can be, so that derivatives there are left-hand ones."""
     start, end = curve.domain
     return np.where(u <= start, end, np.where(u >= end, end, np.nextafter(u, -np.inf)))
 
 
-def _unit(vectors: Array) -> Array:
+def unit_vectors(vectors: Array) -> Array:
+    """Vectors (m, 2) scaled to length one."""
     return np.asarray(vectors / np.hypot(vectors[:, 0], vectors[:, 1])[:, None])

@@ -1,13 +1,25 @@
-"""What a method of projection says about each actual point."""
+"""Signed deviation of every point from the nominal profile, by the method of choice.
+
+exact      the closest point of the curve itself
+circle     projection on the osculating circle of the nearest sample (third order; Hu & Wallner 2005 is a relative)
+chord      projection on the polygon of the samples
+pcp        pole circle projection, equations 2 and 3 of Hari Ganesh & Samuel (2022), the circle on the point's side
+veaw       Voronoi edge assisted weighting, equations 4 to 6 there, angles at the end of the shared Voronoi edge
+inversion  point inversion started at the nearest sample, the published method's comparison
+"""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import get_args
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+
+from inspection.inversion import INSIDE, OPEN_END, invert_points
+from inspection.kernels import Feet, project, project_on_samples
+from inspection.methods import Method
+from inspection.nominal import NominalProfile
 
 Array = NDArray[np.float64]
-Method = Literal["exact", "circle", "chord", "pcp", "veaw", "inversion"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -20,8 +32,8 @@ class Deviations:
     station_mm   : (m,) arc length of the foot from the start of the curve
     normal       : (m, 2) unit direction in which the deviation grows
     curvature    : (m,) 1/mm of the nominal at the foot, positive where it turns left; 0 at corners and ends
-    beyond_end   : (m,) the foot is an end of an open profile, so the sign is not reliable: kept out of fit and verdict
-    at_vertex    : (m,) the foot is an end or a corner, to which the distance is that to a point
+    beyond_end   : (m,) the foot is an end of an open profile: the sign is then not reliable, and the point is kept out of fit and verdict
+    at_vertex    : (m,) the foot is an end or a corner, so that the deviation is the distance from a point
     """
 
     deviation_mm: Array
@@ -51,9 +63,66 @@ class Deviations:
 
 
 def profile_error_mm(deviations: Deviations) -> float:
-    """Width of the smallest equally disposed zone that holds all points: 2 * max |deviation|, beyond-end points left out.
+    """Width of the smallest equally disposed zone that holds all points: 2 * max |deviation|. Points beyond an end are left out.
 
     Not the range max - min; a report shows both.
     """
     inside = deviations.deviation_mm[~deviations.beyond_end]
     return 2.0 * float(np.abs(inside).max(initial=0.0))
+
+
+def deviations(points_mm: ArrayLike, nominal: NominalProfile, method: Method = "exact", tip_radius_mm: float = 0.0) -> Deviations:
+    """Signed deviations of points (m, 2) given in the nominal's coordinates.
+
+    tip_radius_mm : the points are centres of a probing ball of this radius; deviation = distance of the centre - radius
+                    along the normal at the foot. Raises ValueError when the ball does not fit into the profile's hollows.
+    """
+    points = check_points(points_mm)
+    check_tip_radius(tip_radius_mm, nominal)
+    check_method(method)
+    feet = feet_on(points, nominal, method)
+    return Deviations(
+        deviation_mm=nominal.outward * feet.distance_mm - tip_radius_mm,
+        foot_mm=feet.foot_mm,
+        parameter=feet.parameter,
+        station_mm=feet.station_mm,
+        normal=nominal.outward * feet.gradient,
+        curvature=feet.curvature,
+        beyond_end=feet.vertex == OPEN_END,
+        at_vertex=feet.vertex != INSIDE,
+    )
+
+
+def feet_on(points_mm: Array, nominal: NominalProfile, method: Method) -> Feet:
+    """Feet of points (m, 2) on the nominal by a method. Points that are not finite give NaN."""
+    if method == "exact":
+        return project(points_mm, nominal.grid)
+    if method == "inversion":
+        return invert_points(points_mm, nominal)
+    return project_on_samples(points_mm, nominal.grid, nominal.sample_table, method)
+
+
+def check_method(method: str) -> None:
+    """Raise ValueError when there is no such method of projection."""
+    if method not in get_args(Method):
+        raise ValueError(f"method must be one of {', '.join(get_args(Method))}, not {method!r}")
+
+
+def check_points(points_mm: ArrayLike) -> Array:
+    """Points as a finite float array (m, 2). Raises ValueError naming the first bad row."""
+    points = np.asarray(points_mm, dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] != 2:
+        raise ValueError(f"points must have shape (m, 2), got {points.shape}")
+    if not np.isfinite(points).all():
+        bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+        raise ValueError(f"point {bad[0] + 1} is not finite: {points[bad[0]]}")
+    return points
+
+
+def check_tip_radius(tip_radius_mm: float, nominal: NominalProfile) -> None:
+    """Raise ValueError when a ball of this radius cannot touch the whole profile."""
+    if not 0 <= tip_radius_mm < nominal.smallest_concave_radius_mm:
+        raise ValueError(
+            f"tip radius {tip_radius_mm:g} mm: must be zero or more and below the nominal's smallest concave radius, "
+            f"{nominal.smallest_concave_radius_mm:.4g} mm"
+        )

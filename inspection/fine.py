@@ -12,18 +12,19 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inspection.coarse import coarse_poses, registrable, trimmed_mean_square
-from inspection.deviations import Method
+from inspection.coarse import check_registrable, coarse_poses, trimmed_mean_square
+from inspection.deviations import feet_on
+from inspection.inversion import OPEN_END
 from inspection.kernels import Fit, OutlierLimit, PoseFit, project
+from inspection.methods import Method
 from inspection.nominal import NominalProfile
-from inspection.profile_error import feet_on
-from inspection.projection import OPEN_END
 from inspection.registration import Registration
 from inspection.rigid import RigidTransform, best_motion
 
 Array = NDArray[np.float64]
 Scheme = Literal["gauss-newton", "icp"]
 
+MISFIT = 0.02  # rms above this share of the nominal's size is no registration of the same part
 _MOST_STEPS = 60
 _ICP_MOST_STEPS = 2000
 _ICP_TOLERANCE = 1e-6  # relative change of the mean square; the paper states none
@@ -31,10 +32,10 @@ _OUTLIER_MADS = 6.0  # median absolute deviations beyond which Tukey's weight is
 _ROBUST_STEPS = 40
 _SETTLED_WEIGHTS_MM = 1e-6
 _SCOUTS = 400  # points that rank coarse poses
-_CLOSE_RMS = 3.0  # poses whose rms is within this factor are told apart by all points only: few points and 80 % of them miss an edge
+_CLOSE_RMS = 3.0  # poses within this factor of the best rms are compared on all points: the trimmed score of 400 points can miss an edge
 _SCOUT_STEPS = 12  # a pose from which more are needed is not the one sought
-_EQUAL_RMS = 1.1  # rivals whose rms is within this factor of the best fit as well
-_SAME_POSE = 0.01  # of the part's size: poses closer than this are one
+_EQUAL_RMS = 1.1  # other poses within this factor of the best rms are rivals
+_SAME_POSE = 0.01  # of the size of the part; two poses that are closer than this are one
 
 
 def register(
@@ -46,32 +47,33 @@ def register(
     robust: bool = False,
     gross_mm: float = 0.0,
 ) -> Registration:
-    """Coarse then fine registration of section points (m, 2): every coarse pose is refined on a few points, those near the best on all.
+    """Coarse then fine registration of section points (m, 2).
 
-    Poses of symmetric parts that fit equally well are reported as `rivals`. `robust` finds gross outliers first and leaves
-    them out, see register_fine. Raises RegistrationError for too few points.
+    Every coarse pose is refined on a few points; those near the best of them are refined on all points. Poses of symmetric parts
+    that fit equally well are reported as `rivals`. `robust` finds gross outliers first and leaves them out, see register_fine.
+    Raises RegistrationError for too few points.
     """
-    points = registrable(points_mm)
+    points = check_registrable(points_mm)
     ranked = ranked_poses(points, nominal, tip_radius_mm)
     close = [pose for rms, pose in ranked if rms <= _CLOSE_RMS * ranked[0][0]]
     refined = [register_fine(points, nominal, pose, method, scheme, tip_radius_mm, robust, gross_mm) for pose in close]
     best = min(refined, key=lambda fit: fit.rms_mm)
-    others = _distinct([(fit.rms_mm, fit.nominal_from_section) for fit in refined], points)[1:]
+    others = _drop_equal_poses([(fit.rms_mm, fit.nominal_from_section) for fit in refined], points)[1:]
     return replace(best, rivals=tuple(pose for rms, pose in others if rms <= _EQUAL_RMS * best.rms_mm))
 
 
 def ranked_poses(points_mm: ArrayLike, nominal: NominalProfile, tip_radius_mm: float = 0.0) -> list[tuple[float, RigidTransform]]:
-    """Distinct poses refined on a few of the points, best first, each with the rms of its nearer 80 %.
+    """Distinct poses refined on a few of the points, best first, each with the rms of the nearer 80 % of them.
 
-    The ratio of the first two says how far the points determine the pose.
+    The ratio of the first two says how clearly the points determine the pose.
     """
-    points = registrable(points_mm)
+    points = check_registrable(points_mm)
     few = points[:: max(1, len(points) // _SCOUTS)]
-    return _distinct([_scout(few, nominal, pose, tip_radius_mm) for pose in _promising(few, points, nominal)], points)
+    return _drop_equal_poses([_scout_pose(few, nominal, pose, tip_radius_mm) for pose in _promising_poses(few, points, nominal)], points)
 
 
-def _distinct(scored: list[tuple[float, RigidTransform]], points: Array) -> list[tuple[float, RigidTransform]]:
-    """Poses best first, without those that bring the points to the same place as a better one."""
+def _drop_equal_poses(scored: list[tuple[float, RigidTransform]], points: Array) -> list[tuple[float, RigidTransform]]:
+    """The poses, best first, without those that bring the points (m, 2) to the same place as a better one."""
     corners = np.array([points.min(axis=0), points.max(axis=0)])
     apart = _SAME_POSE * np.hypot(*np.ptp(points, axis=0))
     distinct: list[tuple[float, RigidTransform]] = []
@@ -81,16 +83,16 @@ def _distinct(scored: list[tuple[float, RigidTransform]], points: Array) -> list
     return distinct
 
 
-def _promising(few: Array, points: Array, nominal: NominalProfile) -> list[RigidTransform]:
-    """Coarse poses worth refining: those near the best of them, at most six."""
+def _promising_poses(few: Array, points: Array, nominal: NominalProfile) -> list[RigidTransform]:
+    """The six best coarse poses."""
     poses = coarse_poses(points, nominal)
     scores = np.array([trimmed_mean_square(few, pose, nominal) for pose in poses])
     order = np.argsort(scores, kind="stable")[:6]
     return [poses[i] for i in order]
 
 
-def _scout(few: Array, nominal: NominalProfile, pose: RigidTransform, tip_radius_mm: float) -> tuple[float, RigidTransform]:
-    refined = _pose(_pose_fit(few, nominal, "exact", tip_radius_mm).settle(_start(pose), _SCOUT_STEPS))
+def _scout_pose(few: Array, nominal: NominalProfile, pose: RigidTransform, tip_radius_mm: float) -> tuple[float, RigidTransform]:
+    refined = _pose_of(_pose_fit(few, nominal, "exact", tip_radius_mm).settle(_pose_numbers(pose), _SCOUT_STEPS))
     off = np.sort(np.abs(nominal.outward * project(refined.apply(few), nominal.grid).distance_mm - tip_radius_mm))
     return float(np.sqrt((off[: max(1, int(0.8 * len(off)))] ** 2).mean())), refined
 
@@ -109,11 +111,11 @@ def register_fine(
 
     method : how deviations are found; with "pcp" or "veaw" Gauss-Newton may not settle (`converged` says so), "icp" is theirs;
              Gauss-Newton takes "inversion" for "exact"
-    robust : detect points farther than 6 median absolute deviations by Tukey weights, then fit the others by least squares
-             (weights alone would bias the pose where form error is systematic); `outliers` of the result says which
-    gross_mm : nearer points are no outliers, however small the deviations of the others are
+    robust : find points farther than 6 median absolute deviations by Tukey weights, then fit the others by least squares, because
+             weights alone would bias the pose where form error is systematic; `outliers` of the result says which were found
+    gross_mm : points nearer than this are no outliers, however small the deviations of the others are
     """
-    points = registrable(points_mm)
+    points = check_registrable(points_mm)
     pose = start.nominal_from_section if isinstance(start, Registration) else start
     if scheme == "icp":
         return _icp(points, nominal, pose, method, tip_radius_mm)
@@ -121,9 +123,9 @@ def register_fine(
         raise ValueError(f"scheme must be gauss-newton or icp, not {scheme!r}")
     fit, outliers = _pose_fit(points, nominal, method, tip_radius_mm), np.zeros(len(points), dtype=bool)
     if robust:
-        outliers = fit.outliers(_start(pose), OutlierLimit(_OUTLIER_MADS, float(gross_mm), _SETTLED_WEIGHTS_MM), _ROBUST_STEPS)
+        outliers = fit.outliers(_pose_numbers(pose), OutlierLimit(_OUTLIER_MADS, float(gross_mm), _SETTLED_WEIGHTS_MM), _ROBUST_STEPS)
         fit = _pose_fit(points[~outliers], nominal, method, tip_radius_mm)
-    found = fit.settle(_start(pose), _MOST_STEPS)
+    found = fit.settle(_pose_numbers(pose), _MOST_STEPS)
     return _registration(found, found.steps, found.settled, outliers)
 
 
@@ -141,21 +143,21 @@ def _icp(points: Array, nominal: NominalProfile, pose: RigidTransform, method: M
         previous = now
         touched = moved - (nominal.outward * deviation)[:, None] * feet.gradient
         pose = best_motion(moved[used], touched[used]).after(pose)
-    here = _pose_fit(points, nominal, method, tip_radius_mm).settle(_start(pose), 0)
+    here = _pose_fit(points, nominal, method, tip_radius_mm).settle(_pose_numbers(pose), 0)
     return _registration(here, iteration, converged, np.zeros(len(points), dtype=bool))
 
 
 def _pose_fit(points: Array, nominal: NominalProfile, method: Method, tip_radius_mm: float) -> PoseFit:
-    return PoseFit(points, nominal.grid, nominal.samples, method, nominal.outward, tip_radius_mm)
+    return PoseFit(points, nominal.grid, nominal.sample_table, method, nominal.outward, tip_radius_mm)
 
 
-def _start(pose: RigidTransform) -> tuple[float, float, float]:
+def _pose_numbers(pose: RigidTransform) -> tuple[float, float, float]:
     return (pose.rotation_rad, float(pose.translation_mm[0]), float(pose.translation_mm[1]))
 
 
-def _pose(fit: Fit) -> RigidTransform:
+def _pose_of(fit: Fit) -> RigidTransform:
     return RigidTransform(fit.pose[0], np.array(fit.pose[1:]))
 
 
 def _registration(fit: Fit, iterations: int, converged: bool, outliers: NDArray[np.bool_]) -> Registration:
-    return Registration(_pose(fit), math.sqrt(fit.mean_square), iterations, converged, fit.covariance, fit.centre_mm, (), outliers)
+    return Registration(_pose_of(fit), math.sqrt(fit.mean_square), iterations, converged, fit.covariance, fit.centre_mm, (), outliers)

@@ -1,8 +1,8 @@
 """The minimum zone: the pose with the smallest largest deviation (Chebyshev), with its certificate.
 
 ISO 1101 judges form by the minimum zone, not by least squares. At each step the deviations are linearised in the three
-unknowns of the pose and the smallest zone of the linear problem is found by linear programming within a trust region; at
-most four active points and their multipliers prove the last one optimal (the linearisation, hence the optimum, is local).
+unknowns of the pose, and linear programming finds the smallest zone of the linear problem within a trust region. At most four
+active points and their multipliers prove the last zone optimal. The linearisation is local, and so is the optimum.
 """
 
 from dataclasses import dataclass
@@ -11,18 +11,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linprog
 
-from inspection.coarse import registrable
-from inspection.deviations import Deviations, Method
+from inspection.coarse import check_registrable
+from inspection.deviations import Deviations, deviations
 from inspection.fine import register
+from inspection.methods import Method
 from inspection.nominal import NominalProfile
-from inspection.profile_error import deviations
 from inspection.registration import Registration
-from inspection.rigid import RigidTransform, about
+from inspection.rigid import RigidTransform, rotation_about
 
 Array = NDArray[np.float64]
 
 _MOST_PROGRAMS = 50
-_WORKING_SHARE = 0.3  # points below this share of the largest deviation cannot become active in one step (checked after it)
+_WORKING_SHARE = 0.3  # of the largest deviation; the program begins with the points above it and adds those its solution violates
 _STANDSTILL_MM = 1e-10
 _MULTIPLIER = 1e-9
 
@@ -32,9 +32,11 @@ class MinimumZone:
     """The smallest zone, and why no smaller one exists nearby.
 
     nominal_from_section : pose of the fit
-    zone_mm              : its width, 2 * max |deviation - middle_mm|
-    active               : (a,) indices of the points that hold it; their multipliers (a,) are positive and sum to 1, and the
-                           gradients of their deviations, weighted by multiplier and sign, add up to zero
+    zone_mm              : width of the zone, 2 * max |deviation - middle_mm|
+    middle_mm            : middle of the zone
+    active               : (a,) indices of the points that hold the zone
+    multipliers          : (a,) of those points, positive, with the sum 1; the gradients of their deviations, weighted by
+                           multiplier and sign, add up to zero
     programs             : linear programs solved
     converged            : the last step moved no point by more than 1e-10 mm
     """
@@ -58,14 +60,14 @@ def fit_minimum_zone(
 ) -> MinimumZone:
     """Minimum zone of section points (m, 2), begun at `start` or at their best fit. Points beyond open ends take no part.
 
-    middle_mm : middle of the tolerance zone the deviations are held against; zero for an equally disposed zone
+    middle_mm : middle of the tolerance zone that the deviations are held against; zero for an equally disposed zone
     """
-    points = registrable(points_mm)
+    points = check_registrable(points_mm)
     begin = register(points, nominal, method, tip_radius_mm=tip_radius_mm) if start is None else start
     pose = begin.nominal_from_section if isinstance(begin, Registration) else begin
     moved = pose.apply(points)
     d = deviations(moved, nominal, method, tip_radius_mm)
-    trust = 1.0 * float(np.abs(d.deviation_mm[~d.beyond_end] - middle_mm).max(initial=0.0))
+    trust = _half_zone(d, middle_mm)
     active, multipliers = np.empty(0, dtype=np.int64), np.empty(0)
     programs, converged = 0, False
     while programs < _MOST_PROGRAMS and not converged:
@@ -73,7 +75,7 @@ def fit_minimum_zone(
         programs += 1
         reach = np.hypot(*(moved - centre).T).max()
         moves = float(np.hypot(step[0], step[1]) + abs(step[2]) * reach)
-        trial = about(centre, step[2], step[:2]).after(pose)
+        trial = rotation_about(centre, step[2], step[:2]).after(pose)
         trial_moved = trial.apply(points)
         trial_d = deviations(trial_moved, nominal, method, tip_radius_mm)
         now, then = _half_zone(d, middle_mm), _half_zone(trial_d, middle_mm)
@@ -88,13 +90,15 @@ def fit_minimum_zone(
 
 
 def _half_zone(d: Deviations, middle_mm: float) -> float:
+    """The largest distance of a deviation from the middle of the zone."""
     return float(np.abs(d.deviation_mm[~d.beyond_end] - middle_mm).max(initial=0.0))
 
 
 def _linear_step(points: Array, d: Deviations, middle_mm: float, trust_mm: float) -> tuple[Array, Array, float, NDArray[np.int64], Array]:
-    """Solve min t with |e + J p| <= t over points that may become active, adding those the solution violates.
+    """Solve min t with |e + J p| <= t, beginning with few points and adding those that the solution violates.
 
-    Returns centre, step (3,), promised half zone, active points and their multipliers.
+    Gives the centre (2,) of the points, the step (3,) about it, the half zone that the linear problem promises, the active
+    points and their multipliers.
     """
     rows_all = np.flatnonzero(~d.beyond_end)
     x, g, e = points[rows_all], d.normal[rows_all], d.deviation_mm[rows_all] - middle_mm

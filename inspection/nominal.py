@@ -4,21 +4,21 @@ The curve is cut at its corners into smooth pieces; every piece is sampled up to
 corner is two samples at one place, each with the tangent of its own piece.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields
 from itertools import pairwise
-from typing import Literal, TypedDict
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from inspection.curve import NurbsCurve, left_of
-from inspection.deviations import Method
+from inspection.curve import NurbsCurve, left_limit
 from inspection.errors import NominalError
 from inspection.foot_grid import FootGrid, build_foot_grid
-from inspection.sample_table import SampleTable, pack_samples
-from inspection.spacing import LocalPoles, spaced_parameters
-from inspection.voronoi import SitePoles, site_poles
+from inspection.methods import Method
+from inspection.sample_table import ProfileSamples, SampleTable, pack_samples
+from inspection.spacing import LocalPoles, space_out
+from inspection.voronoi import site_poles
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -31,51 +31,23 @@ _MOST_SAMPLES = 400_000  # a refinement beyond this is a step limit set too smal
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class NominalProfile:
-    """The nominal profile: the exact curve and n samples of it with their poles.
+class NominalProfile(ProfileSamples):
+    """The nominal profile: the samples of an exact curve, the curve, and what is looked up on them.
 
-    curve, material : the curve, and on which side of its direction of travel the material lies
-    parameter       : (n,) curve parameter of each sample, rising within a piece
-    points_mm       : (n, 2)
-    tangent, normal : (n, 2) unit vectors; the normal is the tangent turned left
-    curvature       : (n,) 1/mm, positive where the curve turns left
-    station_mm      : (n,) arc length from the start of the curve
-    speed           : (n,) mm of arc length per unit of the parameter
-    next_site, previous_site : (n,) neighbours within the piece (around the seam where that is smooth), -1 at its ends
-    twin            : (n,) the sample of the adjoining piece at the same corner, -1 elsewhere
-    is_open_end     : (n,) the two ends of an open curve
-    poles           : left and right poles of every sample
-    tree, grid, samples : where the nearest sample and the closest point of the curve are looked up; the samples, packed
-    unmet           : samples, other than ends and corners, whose pole angle stays below the limit at the smallest step
+    curve        : the exact curve
+    material     : the side of the curve, seen along its direction, on which the material lies
+    unmet        : samples, other than ends and corners, whose pole angle stays below the limit at the smallest step
+    tree         : finds the nearest sample
+    grid         : finds the closest point of the curve
+    sample_table : the samples packed for the compiled methods
     """
 
     curve: NurbsCurve
     material: Material
-    parameter: Array
-    points_mm: Array
-    tangent: Array
-    normal: Array
-    curvature: Array
-    station_mm: Array
-    speed: Array
-    next_site: Index
-    previous_site: Index
-    twin: Index
-    is_open_end: NDArray[np.bool_]
-    poles: SitePoles
     unmet: int
     tree: cKDTree
     grid: FootGrid
-    samples: SampleTable
-
-    def __post_init__(self) -> None:
-        for name in self.__slots__:
-            value = getattr(self, name)
-            if isinstance(value, np.ndarray):
-                value.setflags(write=False)
-
-    def __len__(self) -> int:
-        return len(self.parameter)
+    sample_table: SampleTable
 
     @property
     def outward(self) -> float:
@@ -86,6 +58,11 @@ class NominalProfile:
     def length_mm(self) -> float:
         """Arc length of the curve."""
         return self.curve.length_mm
+
+    @property
+    def size_mm(self) -> float:
+        """Diagonal of the box, along the axes, around the samples."""
+        return float(np.hypot(*np.ptp(self.points_mm, axis=0)))
 
     @property
     def smallest_concave_radius_mm(self) -> float:
@@ -109,19 +86,19 @@ def discretize(
     pole_angle_min_deg : refine next to samples whose two poles are seen under a smaller angle (the paper: 178)
     step_min           : never split a step of less than twice this fraction of the parameter range (the paper: 1e-4)
     material           : the side of the curve, seen along its direction, on which the material lies
-    accuracy_mm        : choose the samples by curvature instead, as few as keep the error of `method` below this, for
-                         points nearer than half the local pole radius and a tenth of the size. With spacing h,
-                         curvature k, its change k' and pole radius r the error is at most |k'| h^3 / 48 for circle,
-                         |k| h^2 / 8 for chord, (3/8) |1/r - k| h^2 + (1/2) |k'| h^3 for pcp and veaw on the profile
-                         (at corners and sharp edges r falls to zero: no spacing bounds those two there).
-                         `exact` and `inversion` are exact at any spacing. The paper's two limits are then not
-                         applied: they bound no error.
+    accuracy_mm        : instead of all that, the fewest samples that keep the error of `method` below this, for points
+                         nearer than half the local pole radius and a tenth of the size. With spacing h, curvature k, its
+                         change k' and pole radius r the error is at most |k'| h^3 / 48 for circle, |k| h^2 / 8 for chord,
+                         and (3/8) |1/r - k| h^2 + (1/2) |k'| h^3 for pcp and veaw on the profile. At corners and sharp
+                         edges r falls to zero, so that no spacing bounds the error of those two there. `exact` and
+                         `inversion` are exact at any spacing. The pole angle and the smallest step are not used, because
+                         they bound no error.
 
     The pole angle alone bounds no error; with the defaults it is the even starting step that does. Raises NominalError.
     """
     if accuracy_mm is not None:
         grid = build_foot_grid(curve)
-        return _profile(curve, material, _accurate(curve, grid, accuracy_mm, method), grid)
+        return _profile(curve, material, _evaluate(curve, _accurate_parameters(curve, accuracy_mm, method)), grid)
     if samples < 8 or not 0 < pole_angle_min_deg < 180 or not 0 < step_min < 1 or material not in ("left", "right"):
         raise NominalError(
             f"need samples >= 8, 0 < pole_angle_min_deg < 180, 0 < step_min < 1, material left or right; "
@@ -131,22 +108,29 @@ def discretize(
     pieces = _even_parameters(curve, samples)
     smallest = step_min * (curve.domain[1] - curve.domain[0])
     while True:
-        profile = _profile(curve, material, pieces, grid)
-        below = (profile.poles.angle_deg < pole_angle_min_deg) & (profile.next_site >= 0) & (profile.previous_site >= 0)
+        found = _evaluate(curve, pieces)
+        below = (found.poles.angle_deg < pole_angle_min_deg) & (found.next_site >= 0) & (found.previous_site >= 0)
         refined = _refine(pieces, below, smallest)
         if sum(map(len, refined)) == sum(map(len, pieces)):
-            return replace(profile, unmet=int(below.sum()))
+            return _profile(curve, material, found, grid, int(below.sum()))
         if sum(map(len, refined)) > _MOST_SAMPLES:
             raise NominalError(f"more than {_MOST_SAMPLES} samples needed; choose a larger step_min than {step_min:g}")
         pieces = refined
 
 
-def _accurate(curve: NurbsCurve, grid: FootGrid, accuracy_mm: float, method: Method) -> list[Array]:
-    """Parameters of the fewest samples that meet the accuracy; poles are read off a first, even discretisation."""
+def _profile(curve: NurbsCurve, material: Material, samples: ProfileSamples, grid: FootGrid, unmet: int = 0) -> NominalProfile:
+    """The profile of these samples."""
+    sampled = {field.name: getattr(samples, field.name) for field in fields(samples)}
+    tree, table = cKDTree(samples.points_mm), pack_samples(samples, curve)
+    return NominalProfile(**sampled, curve=curve, material=material, unmet=unmet, tree=tree, grid=grid, sample_table=table)
+
+
+def _accurate_parameters(curve: NurbsCurve, accuracy_mm: float, method: Method) -> list[Array]:
+    """Parameters of the fewest samples that meet the accuracy. The poles are those of an even discretisation made first."""
     if not 0 < accuracy_mm < np.inf:
         raise NominalError(f"the accuracy must be a positive number, not {accuracy_mm:g} mm")
     even = _even_parameters(curve, _SCOUT_SAMPLES)
-    scout = _profile(curve, "left", even, grid)
+    scout = _evaluate(curve, even)
     u, curvature, poles_there = scout.parameter, scout.curvature, scout.poles
     sides = ((poles_there.left_curvature, curvature), (poles_there.right_curvature, -curvature))
     farthest = _FARTHEST * float(np.hypot(*np.ptp(scout.points_mm, axis=0)))
@@ -157,21 +141,22 @@ def _accurate(curve: NurbsCurve, grid: FootGrid, accuracy_mm: float, method: Met
 
     def poles(at: Array) -> LocalPoles:
         wrapped = np.where(at > end, at - (end - start), at)
-        return LocalPoles(*(np.interp(wrapped, u[order], values[order]) for values in (radius, _widest(pole_error))))
+        return LocalPoles(*(np.interp(wrapped, u[order], values[order]) for values in (radius, _neighbourhood_maximum(pole_error))))
 
-    pieces = [spaced_parameters(curve, piece[0], piece[-1], accuracy_mm, method, poles) for piece in even]
+    pieces = [space_out(curve, piece[0], piece[-1], accuracy_mm, method, poles) for piece in even]
     if sum(map(len, pieces)) > _MOST_SAMPLES:
         raise NominalError(f"{method} needs more than {_MOST_SAMPLES} samples for {accuracy_mm:g} mm; choose circle or exact")
     return pieces
 
 
 def _pole_error(pole_curvature: Array, curvature: Array, farthest_mm: float) -> Array:
-    """Error of a pole circle per squared spacing, for points up to half the pole radius off and no farther than told."""
+    """Error of a pole circle per squared spacing (n,), for points nearer than half the pole radius and than `farthest_mm`."""
     excess = np.abs(pole_curvature - curvature)
     return np.asarray(3 / 8 * excess + 0.5 / np.maximum(pole_curvature, 0.5 / farthest_mm) * excess**2 / 8)
 
 
-def _widest(values: Array) -> Array:
+def _neighbourhood_maximum(values: Array) -> Array:
+    """The largest of each value (n,) and its two neighbours."""
     return np.maximum(values, np.maximum(np.roll(values, 1), np.roll(values, -1)))
 
 
@@ -197,8 +182,8 @@ def _refine(pieces: list[Array], below: NDArray[np.bool_], smallest: float) -> l
     return refined
 
 
-def _profile(curve: NurbsCurve, material: Material, pieces: list[Array], grid: FootGrid) -> NominalProfile:
-    """Evaluate the curve at the parameters and take the poles from the Voronoi diagram of the samples."""
+def _evaluate(curve: NurbsCurve, pieces: list[Array]) -> ProfileSamples:
+    """The samples at the parameters of each piece, with their poles from the Voronoi diagram of all of them."""
     smooth_loop = curve.closed and not curve.corners.size
     u = pieces[0][:-1] if smooth_loop else np.concatenate([np.append(piece[:-1], _last_of(piece, curve)) for piece in pieces])
     following, previous, twin, is_open_end = _neighbours(
@@ -213,50 +198,30 @@ def _profile(curve: NurbsCurve, material: Material, pieces: list[Array], grid: F
     at_end = (following < 0) | (previous < 0)
     curvature = (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / (speed * speed * speed)
     is_straight = np.abs(curvature) * np.hypot(*np.ptp(point, axis=0)) < _STRAIGHT
-    fields: _Fields = {
-        "curve": curve,
-        "parameter": u,
-        "points_mm": point,
-        "tangent": tangent,
-        "normal": normal,
-        "curvature": curvature,
-        "station_mm": curve.station_mm(u),
-        "speed": speed,
-        "next_site": following,
-        "previous_site": previous,
-        "twin": twin,
-        "is_open_end": is_open_end,
-        "poles": site_poles(point, normal, following, at_end, is_straight),
-    }
-    return NominalProfile(material=material, unmet=0, tree=cKDTree(point), grid=grid, samples=pack_samples(**fields), **fields)
-
-
-class _Fields(TypedDict):
-    """What a profile and its packed samples share."""
-
-    curve: NurbsCurve
-    parameter: Array
-    points_mm: Array
-    tangent: Array
-    normal: Array
-    curvature: Array
-    station_mm: Array
-    speed: Array
-    next_site: Index
-    previous_site: Index
-    twin: Index
-    is_open_end: NDArray[np.bool_]
-    poles: SitePoles
+    return ProfileSamples(
+        parameter=u,
+        points_mm=point,
+        tangent=tangent,
+        normal=normal,
+        curvature=curvature,
+        station_mm=curve.station_mm(u),
+        speed=speed,
+        next_site=following,
+        previous_site=previous,
+        twin=twin,
+        is_open_end=is_open_end,
+        poles=site_poles(point, normal, following, at_end, is_straight),
+    )
 
 
 def _last_of(piece: Array, curve: NurbsCurve) -> Array:
-    """The parameter of a piece's end, on the side of the piece; wrapped into the domain."""
+    """The parameter of a piece's end as that of a left-hand limit, wrapped into the domain."""
     start, end = curve.domain
-    return left_of(np.asarray(piece[-1] if piece[-1] <= end else piece[-1] - (end - start)), curve)
+    return left_limit(np.asarray(piece[-1] if piece[-1] <= end else piece[-1] - (end - start)), curve)
 
 
 def _neighbours(lengths: list[int], closed: bool, smooth_loop: bool) -> tuple[Index, Index, Index, NDArray[np.bool_]]:
-    """Next and previous sample within the piece, the twin across a corner, and which samples are ends of an open curve."""
+    """For n samples in pieces of these lengths: next_site, previous_site, twin and is_open_end of `ProfileSamples`."""
     n = sum(lengths)
     following, previous, twin = np.arange(1, n + 1), np.arange(-1, n - 1), np.full(n, -1)
     is_open_end = np.zeros(n, dtype=bool)

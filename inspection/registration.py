@@ -18,14 +18,14 @@ class Registration:
     rms_mm               : root mean square deviation at that pose, over the points the fit used
     iterations           : steps taken by the fine registration; 0 for a coarse or given pose
     converged            : the last step moved no point by more than the stated limit
-    covariance           : (3, 3) of the pose (x, y in mm, rotation in rad about `centre_mm`) from the scatter of the
-                           deviations taken as independent: where they are form error, above all on a part of a profile,
-                           the pose is less certain (`LiveUpdate.can_move_mm` reckons with that). Zero for a given pose. A
-                           motion that changes no deviation (a circle's rotation) has the size of the part as its
-                           standard deviation
-    centre_mm            : (2,) in nominal coordinates
+    covariance           : (3, 3) of the pose (x, y in mm, rotation in rad about `centre_mm`), from the scatter of the deviations
+                           as if they were independent. Where they are form error, above all on a part of a profile, the pose
+                           is less certain than that (`LiveUpdate.can_move_mm` takes it into account). Zero for a given pose.
+                           A motion that changes no deviation (a circle's rotation) has the size of the part as its standard
+                           deviation
+    centre_mm            : (2,) centre of the points, in nominal coordinates
     rivals               : other poses that fit as well, on symmetric parts: the points cannot tell which one is true
-    outliers             : (m,) points left out of the fit as outliers, all False unless a robust fit was asked for
+    outliers             : (m,) points left out of the fit as outliers; all False unless a robust fit was asked for
     """
 
     nominal_from_section: RigidTransform
@@ -42,6 +42,6 @@ class Registration:
             array.setflags(write=False)
 
 
-def given_pose(nominal_from_section: RigidTransform, points: int) -> Registration:
-    """A pose known beforehand (a datum), for a set of that many points."""
+def datum_registration(nominal_from_section: RigidTransform, points: int) -> Registration:
+    """The registration of that many points whose pose is known beforehand."""
     return Registration(nominal_from_section, float("nan"), 0, True, np.zeros((3, 3)), np.zeros(2), (), np.zeros(points, dtype=bool))

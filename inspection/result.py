@@ -6,7 +6,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from inspection.deviations import Method
+from inspection.methods import Method
 from inspection.nominal import NominalProfile
 from inspection.registration import Registration
 from inspection.tolerance import ToleranceZone, Verdict

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
-_ANGLE_GRID, _SHIFT_GRID = 2.0**40, 2.0**30  # steps per rad and per mm: 0.9e-12 rad and 0.9e-9 mm, and exact in binary
+_ANGLE_GRID, _SHIFT_GRID = 2.0**40, 2.0**30  # steps per rad and per mm, exact in binary: 0.9e-12 rad and 0.9e-9 mm
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,21 +36,21 @@ class RigidTransform:
         return cls(0.0, np.zeros(2))
 
     def apply(self, points_mm: ArrayLike) -> Array:
-        """Moved points (m, 2). Written out by element, so that a point's result does not depend on its batch."""
+        """Moved points (m, 2), worked out element by element, so that a point's result does not depend on its batch."""
         points = np.asarray(points_mm, dtype=np.float64)
-        turned = rotated(points, self.rotation_rad)
-        turned[:, 0] += self.translation_mm[0]  # by column: a row of two is numpy's slow case
+        turned = rotate(points, self.rotation_rad)
+        turned[:, 0] += self.translation_mm[0]  # column by column, because numpy is slow on rows of two
         turned[:, 1] += self.translation_mm[1]
         return turned
 
-    def rounded(self) -> "RigidTransform":
-        """The motion to within a picometre in a metre, free of the last bits, in which processors and their libraries differ."""
+    def snap_to_grid(self) -> "RigidTransform":
+        """The motion on a grid of 2**-40 rad and 2**-30 mm: without the last bits, in which processors and their libraries differ."""
         angle, shift = round(self.rotation_rad * _ANGLE_GRID) / _ANGLE_GRID, np.round(self.translation_mm * _SHIFT_GRID) / _SHIFT_GRID
         return RigidTransform(angle, shift)
 
     def inverse(self) -> "RigidTransform":
-        """The motion back."""
-        return RigidTransform(-self.rotation_rad, -rotated(self.translation_mm[None], -self.rotation_rad)[0])
+        """The motion that undoes this one."""
+        return RigidTransform(-self.rotation_rad, -rotate(self.translation_mm[None], -self.rotation_rad)[0])
 
     def after(self, first: "RigidTransform") -> "RigidTransform":
         """The motion that makes `first` and then this one."""
@@ -58,7 +58,7 @@ class RigidTransform:
         return RigidTransform(float(np.arctan2(np.sin(angle), np.cos(angle))), self.apply(first.translation_mm[None])[0])
 
 
-def rotated(vectors: Array, angle_rad: float) -> Array:
+def rotate(vectors: Array, angle_rad: float) -> Array:
     """Vectors (m, 2) turned anticlockwise about the origin."""
     c, s = math.cos(angle_rad), math.sin(angle_rad)
     turned = np.empty((len(vectors), 2))
@@ -68,9 +68,9 @@ def rotated(vectors: Array, angle_rad: float) -> Array:
     return turned
 
 
-def about(centre_mm: Array, angle_rad: float, shift_mm: Array) -> RigidTransform:
+def rotation_about(centre_mm: Array, angle_rad: float, shift_mm: Array) -> RigidTransform:
     """Rotation about a centre (2,), then a shift (2,)."""
-    return RigidTransform(angle_rad, centre_mm + shift_mm - rotated(centre_mm[None], angle_rad)[0])
+    return RigidTransform(angle_rad, centre_mm + shift_mm - rotate(centre_mm[None], angle_rad)[0])
 
 
 def best_motion(source_mm: Array, target_mm: Array) -> RigidTransform:
@@ -78,4 +78,4 @@ def best_motion(source_mm: Array, target_mm: Array) -> RigidTransform:
     from_mean, to_mean = source_mm.mean(axis=0), target_mm.mean(axis=0)
     a, b = source_mm - from_mean, target_mm - to_mean
     angle = float(np.arctan2((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum(), (a * b).sum()))
-    return about(from_mean, angle, to_mean - from_mean)
+    return rotation_about(from_mean, angle, to_mean - from_mean)

@@ -1,10 +1,11 @@
-"""The samples of a nominal profile packed for the compiled methods of the paper, with a search tree for the nearest one."""
+"""The samples of a nominal profile: as arrays, and packed for the compiled methods that look at samples only."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
+from inspection.box_tree import box_tree
 from inspection.curve import NurbsCurve
 from inspection.kernels import LEAF
 from inspection.voronoi import SitePoles
@@ -14,12 +15,51 @@ Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class ProfileSamples:
+    """n samples of a curve with their neighbours and poles.
+
+    parameter       : (n,) curve parameter of each sample, rising within a piece
+    points_mm       : (n, 2)
+    tangent, normal : (n, 2) unit vectors; the normal is the tangent turned left
+    curvature       : (n,) 1/mm, positive where the curve turns left
+    station_mm      : (n,) arc length from the start of the curve
+    speed           : (n,) mm of arc length per unit of the parameter
+    next_site, previous_site : (n,) neighbours within the piece (around the seam where that is smooth), -1 at its ends
+    twin            : (n,) the sample of the adjoining piece at the same corner, -1 elsewhere
+    is_open_end     : (n,) the two ends of an open curve
+    poles           : left and right poles of every sample
+    """
+
+    parameter: Array
+    points_mm: Array
+    tangent: Array
+    normal: Array
+    curvature: Array
+    station_mm: Array
+    speed: Array
+    next_site: Index
+    previous_site: Index
+    twin: Index
+    is_open_end: NDArray[np.bool_]
+    poles: SitePoles
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+
+    def __len__(self) -> int:
+        return len(self.parameter)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class SampleTable:
     """Packed tables of n samples for `kernels.project_on_samples`.
 
     samples  : (n, SAMPLE_WIDTH)
     links    : (n, LINK_WIDTH)
-    boxes    : (2 q, 4) binary tree of bounding boxes: node 1 is the root, leaf q + i holds the samples from i LEAF on; low x, y, high x, y
+    boxes    : (2 q, 4) search tree over the samples, see `box_tree`; its leaf i holds the samples from i LEAF on
     starts   : (b,) a sample near each of b even steps of the parameter
     domain   : (start, end, length_mm, 1 when closed)
     """
@@ -36,48 +76,21 @@ class SampleTable:
 
     @property
     def flat(self) -> tuple[Array, Index, Array, Index, Array]:
-        """The tables as compiled loops take them: one dimension each."""
+        """The tables as compiled loops take them, with one dimension each."""
         return self.samples.reshape(-1), self.links.reshape(-1), self.boxes.reshape(-1), self.starts, self.domain
 
 
-def pack_samples(
-    *,
-    points_mm: Array,
-    tangent: Array,
-    normal: Array,
-    curvature: Array,
-    parameter: Array,
-    station_mm: Array,
-    speed: Array,
-    poles: SitePoles,
-    next_site: Index,
-    previous_site: Index,
-    twin: Index,
-    is_open_end: NDArray[np.bool_],
-    curve: NurbsCurve,
-) -> SampleTable:
-    """Tables of the samples of a nominal profile, whose fields these are."""
+def pack_samples(samples: ProfileSamples, curve: NurbsCurve) -> SampleTable:
+    """Tables of the samples of a curve."""
+    s, poles, u = samples, samples.poles, samples.parameter
     sides = (poles.left, poles.right, poles.left_curvature, poles.right_curvature, poles.edge_left_mm, poles.edge_right_mm)
-    samples = np.column_stack([points_mm, tangent, normal, curvature, parameter, station_mm, speed, *sides])
-    links = np.column_stack([next_site, previous_site, twin, is_open_end]).astype(np.int64)
+    rows = np.column_stack([s.points_mm, s.tangent, s.normal, s.curvature, s.parameter, s.station_mm, s.speed, *sides])
+    links = np.column_stack([s.next_site, s.previous_site, s.twin, s.is_open_end]).astype(np.int64)
     start, end = curve.domain
-    order = np.argsort(parameter, kind="stable")
-    middles = start + (np.arange(len(parameter)) + 0.5) / len(parameter) * (end - start)
-    nearest = np.minimum(np.searchsorted(parameter[order], middles), len(parameter) - 1)
+    order = np.argsort(u, kind="stable")
+    middles = start + (np.arange(len(u)) + 0.5) / len(u) * (end - start)
+    nearest = np.minimum(np.searchsorted(u[order], middles), len(u) - 1)
     domain = np.array([start, end, curve.length_mm, float(curve.closed)])
-    return SampleTable(samples, links, _boxes(points_mm), order[nearest], domain)
-
-
-def _boxes(points_mm: Array) -> Array:
-    leaves = -(-len(points_mm) // LEAF)
-    q = 1 << max(0, (leaves - 1).bit_length())
-    boxes = np.full((2 * q, 4), np.inf)
-    boxes[:, 2:] = -np.inf
-    first = np.arange(0, len(points_mm), LEAF)
-    boxes[q : q + leaves, :2] = np.minimum.reduceat(points_mm, first)
-    boxes[q : q + leaves, 2:] = np.maximum.reduceat(points_mm, first)
-    while q > 1:
-        children = boxes[q : 2 * q].reshape(q // 2, 2, 4)
-        boxes[q // 2 : q] = np.hstack([children[:, :, :2].min(axis=1), children[:, :, 2:].max(axis=1)])
-        q //= 2
-    return boxes
+    first = np.arange(0, len(u), LEAF)
+    boxes = np.hstack([np.minimum.reduceat(s.points_mm, first), np.maximum.reduceat(s.points_mm, first)])
+    return SampleTable(rows, links, box_tree(boxes), order[nearest], domain)

@@ -1,6 +1,6 @@
-"""The plane of a section: machine points in space to section points in the plane and their height above it."""
+"""The plane of a section in machine coordinates."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,11 +15,13 @@ class SectionPlane:
     origin_mm : (3,) a point of the plane, origin of the section's coordinates
     x_axis    : (3,) the section's x direction (its part along the plane; any length)
     normal    : (3,) perpendicular to the plane (any length); y is normal cross x
+    packed    : (12,) origin, x axis, y axis and normal, as `kernels.take_in` takes them
     """
 
     origin_mm: Array
     x_axis: Array
     normal: Array
+    packed: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         origin, x, n = (np.array(value, dtype=np.float64) for value in (self.origin_mm, self.x_axis, self.normal))
@@ -31,25 +33,14 @@ class SectionPlane:
         x = x - (x @ n) * n
         if not np.linalg.norm(x) > 1e-9:
             raise ValueError("the section's x axis must not be zero or parallel to its normal")
-        for name, value in (("origin_mm", origin), ("x_axis", x / np.linalg.norm(x)), ("normal", n)):
+        x = x / np.linalg.norm(x)
+        packed = np.concatenate([origin, x, np.cross(n, x), n])
+        for name, value in (("origin_mm", origin), ("x_axis", x), ("normal", n), ("packed", packed)):
             value.setflags(write=False)
             object.__setattr__(self, name, value)
 
-    @property
-    def packed(self) -> Array:
-        """Origin, x axis, y axis and normal (12,), as `kernels.take_in` takes them."""
-        return np.concatenate([self.origin_mm, self.x_axis, np.cross(self.normal, self.x_axis), self.normal])
-
-    def to_section(self, points_mm: ArrayLike) -> tuple[Array, Array]:
-        """Section points (m, 2) and heights above the plane (m,) of machine points (m, 3)."""
-        p = np.asarray(points_mm, dtype=np.float64) - self.origin_mm
-        x, n = self.x_axis, self.normal
-        y = np.cross(n, x)
-        along = [p[:, 0] * axis[0] + p[:, 1] * axis[1] + p[:, 2] * axis[2] for axis in (x, y, n)]
-        return np.column_stack(along[:2]), along[2]
-
     def to_machine(self, points_mm: ArrayLike, height_mm: float = 0.0) -> Array:
-        """Machine points (m, 3) of section points (m, 2)."""
+        """Machine points (m, 3) of section points (m, 2) at a height above the plane. The way there is `kernels.take_in`."""
         p = np.asarray(points_mm, dtype=np.float64)
         y = np.cross(self.normal, self.x_axis)
         return np.asarray(self.origin_mm + p[:, :1] * self.x_axis + p[:, 1:] * y + height_mm * self.normal)

@@ -7,9 +7,9 @@ the pole radius r there, the methods' errors are bounded by (METHOD; Hu & Wallne
     chord        |k| h^2 / 8
     pcp, veaw    (3/8) |1/r - k| h^2 + (1/2) |k'| h^3, and d (1/r - k)^2 h^2 / 8 at the distance d from the profile
 
-and they presume that the nearest sample lies on the branch of the foot: the spacing stays below the smaller pole radius, so
-that this holds for points nearer than half of it (a thin edge wants dense samples). `exact` and `inversion` solve on the
-curve itself: no spacing limits their accuracy.
+They presume that the nearest sample lies on the branch of the foot. The spacing therefore stays below the smaller pole radius,
+so that this holds for points nearer than half of it; a thin edge wants dense samples. `exact` and `inversion` solve on the
+curve itself, so that no spacing limits their accuracy.
 """
 
 from collections.abc import Callable
@@ -18,41 +18,44 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from inspection.curve import NurbsCurve, left_of
-from inspection.deviations import Method
+from inspection.curve import NurbsCurve, left_limit
+from inspection.methods import Method
 
 Array = NDArray[np.float64]
 
 _GRID_PER_SPAN = 64
 _FEWEST = 64  # samples of a whole profile, however flat
-_TURN = 0.25  # most radians the profile may turn from one sample to the next, for the bounds' leading terms to hold
-_SAFETY = 0.7  # of the bound: room for what a step's unevenness and the terms left out of the bound add
+_TURN = 0.25  # rad; largest turn from one sample to the next, so that the leading terms of the bounds hold
+_SAFETY = 0.7  # of the accuracy; the rest is room for uneven steps and for the terms that the bounds leave out
 _SLOPE = 0.15  # mm by which the step may grow per mm of arc length
-_FINEST = 1e-5  # of the length: a sharp edge would ask for ever shorter steps
+_FINEST = 1e-5  # of the length; without it a sharp edge would ask for ever shorter steps
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LocalPoles:
     """What a spacing must know of the poles at g places.
 
-    radius_mm : (g,) smaller of the two pole radii
-    pole_error : (g,) error of a pole circle per h^2, 1/mm: the larger of (3/8) K + d K^2 / 8 of the two sides, K = |1/r - k| there,
-                the second term for points as far off as d
+    radius_mm  : (g,) smaller of the two pole radii
+    pole_error : (g,) error of a pole circle per h^2, in 1/mm, for points no farther off than d. With K = |1/r - k| it is
+                 (3/8) K + d K^2 / 8 of the side on which that is larger
     """
 
     radius_mm: Array
     pole_error: Array
 
 
-def spaced_parameters(
+def space_out(
     curve: NurbsCurve, low: float, high: float, accuracy_mm: float, method: Method, poles: Callable[[Array], LocalPoles]
 ) -> Array:
-    """Rising parameters from low to high of one smooth piece, as few as meet the accuracy; `poles` knows them at any."""
+    """The fewest rising parameters from low to high of one smooth piece that meet the accuracy.
+
+    `poles(u)` gives the local poles at parameters u.
+    """
     u = _grid(curve, low, high)
     station = np.concatenate([[0.0], np.cumsum(np.abs(_steps_mm(curve, u)))])
     limit = _largest_step_mm(curve, u, accuracy_mm, method, poles)
-    limit = np.minimum(limit, _beside_jumps(curve, u, station, accuracy_mm) if method == "circle" else np.inf)
-    limit = np.minimum(np.maximum(_narrowed(limit, station), _FINEST * curve.length_mm), curve.length_mm / _FEWEST)
+    limit = np.minimum(limit, _limits_beside_jumps(curve, u, station, accuracy_mm) if method == "circle" else np.inf)
+    limit = np.minimum(np.maximum(_smooth_limits(limit, station), _FINEST * curve.length_mm), curve.length_mm / _FEWEST)
     count = np.concatenate([[0.0], np.cumsum(np.diff(station) * (1 / limit[1:] + 1 / limit[:-1]) / 2)])
     steps = max(2, int(np.ceil(count[-1])))
     even = np.interp(np.linspace(0.0, count[-1], steps + 1), count, u)
@@ -70,6 +73,7 @@ def _grid(curve: NurbsCurve, low: float, high: float) -> Array:
 
 
 def _steps_mm(curve: NurbsCurve, u: Array) -> Array:
+    """Distances (g - 1,) between neighbouring places."""
     points = curve.point(np.minimum(u, curve.domain[1]) if not curve.closed else u)
     return np.asarray(np.hypot(*np.diff(points, axis=0).T))
 
@@ -85,7 +89,8 @@ def curvature_and_change(curve: NurbsCurve, u: Array) -> tuple[Array, Array]:
 
 
 def _largest_step_mm(curve: NurbsCurve, u: Array, accuracy_mm: float, method: Method, poles: Callable[[Array], LocalPoles]) -> Array:
-    before, after = curvature_and_change(curve, left_of(_wrapped(u, curve), curve)), curvature_and_change(curve, u)
+    """The largest step (g,) that meets the accuracy at each place by the bounds of the method, neighbours disregarded."""
+    before, after = curvature_and_change(curve, left_limit(_wrap(u, curve), curve)), curvature_and_change(curve, u)
     k, change = (np.maximum(np.abs(a), np.abs(b)) for a, b in zip(before, after, strict=True))  # both sides of every knot
     tau = _SAFETY * accuracy_mm
     tiny = np.finfo(float).tiny
@@ -101,15 +106,16 @@ def _largest_step_mm(curve: NurbsCurve, u: Array, accuracy_mm: float, method: Me
     return np.minimum(limit, np.minimum(np.sqrt(tau / (2 * np.maximum(local.pole_error, tiny))), np.cbrt(tau / np.maximum(change, tiny))))
 
 
-def _wrapped(u: Array, curve: NurbsCurve) -> Array:
+def _wrap(u: Array, curve: NurbsCurve) -> Array:
+    """Parameters (g,) brought back into the domain of a closed curve."""
     start, end = curve.domain
     return np.where(u > end, u - (end - start), u) if curve.closed else u
 
 
-def _beside_jumps(curve: NurbsCurve, u: Array, station: Array, accuracy_mm: float) -> Array:
-    """Step limits (g,) near knots where the curvature jumps: there the circle of one side is used on the other."""
-    wrapped = _wrapped(u, curve)
-    jump = np.abs(curve.curvature(wrapped) - curve.curvature(left_of(wrapped, curve)))
+def _limits_beside_jumps(curve: NurbsCurve, u: Array, station: Array, accuracy_mm: float) -> Array:
+    """Step limits (g,) near knots where the curvature jumps, because there the circle of one side is used on the other."""
+    wrapped = _wrap(u, curve)
+    jump = np.abs(curve.curvature(wrapped) - curve.curvature(left_limit(wrapped, curve)))
     jump[[0, -1]] = jump[[0, -1]] if curve.closed and not curve.corners.size else 0.0
     limit = np.full(len(u), np.inf)
     for index in np.flatnonzero(jump > 1e-9):
@@ -119,8 +125,8 @@ def _beside_jumps(curve: NurbsCurve, u: Array, station: Array, accuracy_mm: floa
     return limit
 
 
-def _narrowed(limit: Array, station: Array) -> Array:
-    """Every limit reduced to what its neighbourhood allows: a step may not leap over a place that needs a shorter one."""
+def _smooth_limits(limit: Array, station: Array) -> Array:
+    """The limits (g,), each reduced to what its neighbours allow, so that no step leaps over a place that needs a shorter one."""
     result = limit.copy()
     for index in range(1, len(result)):
         result[index] = min(result[index], result[index - 1] + _SLOPE * (station[index] - station[index - 1]))

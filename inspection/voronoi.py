@@ -57,8 +57,8 @@ def site_poles(
     is_end    : (n,) ends and corners: their pole directions are plus and minus the normal, whatever the cell says
     is_straight : (n,) sites of straight parts: what lies out in the box is at infinity there
     """
-    site_of, cells = _distinct(sites_mm)  # (n,), (c, 2)
-    diagram = Voronoi(np.vstack([cells, _box(cells)]))
+    site_of, cells = _distinct_cells(sites_mm)  # (n,), (c, 2)
+    diagram = Voronoi(np.vstack([cells, _box_places(cells)]))
     ridges = np.asarray(diagram.ridge_points, dtype=np.int64)  # (r, 2) pairs of cells
     ends = np.asarray(diagram.ridge_vertices, dtype=np.int64)  # (r, 2) vertices, -1 at infinity
     inner = np.all(ends >= 0, axis=1)
@@ -72,7 +72,7 @@ def site_poles(
     return SitePoles(left, right, _inverse(left_radius), _inverse(right_radius), angle, edge_left, edge_right)
 
 
-def _distinct(sites_mm: Array) -> tuple[NDArray[np.int64], Array]:
+def _distinct_cells(sites_mm: Array) -> tuple[NDArray[np.int64], Array]:
     """Cell of every site (n,), and the places of the cells (c, 2)."""
     grain = _SAME_PLACE * np.hypot(*np.ptp(sites_mm, axis=0))
     owner = np.arange(len(sites_mm))
@@ -82,7 +82,7 @@ def _distinct(sites_mm: Array) -> tuple[NDArray[np.int64], Array]:
     return np.asarray(site_of), sites_mm[first]
 
 
-def _box(sites_mm: Array) -> Array:
+def _box_places(sites_mm: Array) -> Array:
     low, high = sites_mm.min(axis=0), sites_mm.max(axis=0)
     turn = 2 * np.pi * np.arange(_BOX_SITES) / _BOX_SITES
     return np.asarray((low + high) / 2 + BOX_SCALE * np.hypot(*(high - low)) * np.column_stack([np.cos(turn), np.sin(turn)]))
@@ -109,10 +109,10 @@ def _poles(
     corner = by_cell[np.repeat(start[site_of], counts) + within]
     reach = vertices[corner] - sites_mm[site]  # (pairs, 2) from site to vertex
     radius = np.hypot(reach[:, 0], reach[:, 1])
-    farthest = _first_per_site(site, radius, np.ones(len(site), dtype=bool), n)
-    opposite = _first_per_site(site, radius, (reach * reach[farthest[site]]).sum(axis=1) < 0, n)
+    farthest = _farthest_per_site(site, radius, np.ones(len(site), dtype=bool), n)
+    opposite = _farthest_per_site(site, radius, (reach * reach[farthest[site]]).sum(axis=1) < 0, n)
     side = (reach * normal[site]).sum(axis=1) > 0
-    on_left, on_right = _first_per_site(site, radius, side, n), _first_per_site(site, radius, ~side, n)
+    on_left, on_right = _farthest_per_site(site, radius, side, n), _farthest_per_site(site, radius, ~side, n)
     angle = _angle_deg(reach[farthest], reach[opposite])
     angle[opposite < 0] = 0.0
     left_far = (on_left < 0) | (is_straight & at_box[corner[on_left]])
@@ -122,7 +122,7 @@ def _poles(
     return left, right, np.where(left_far, np.inf, radius[on_left]), np.where(right_far, np.inf, radius[on_right]), angle
 
 
-def _first_per_site(site: NDArray[np.int64], radius: Array, chosen: NDArray[np.bool_], n: int) -> NDArray[np.int64]:
+def _farthest_per_site(site: NDArray[np.int64], radius: Array, chosen: NDArray[np.bool_], n: int) -> NDArray[np.int64]:
     """Row of the largest radius among the chosen rows of each site (n,); -1 where a site has none."""
     rows = np.flatnonzero(chosen)
     rows = rows[np.lexsort((-radius[rows], site[rows]))]

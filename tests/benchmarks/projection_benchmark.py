@@ -176,7 +176,7 @@ def methods_table(rounds: int) -> Iterator[str]:
     yield "|---|---|---|---|"
     for method, numpy_way in plain.items():
         ways: dict[str, Callable[[Array], object]] = {
-            "compiled": partial(project_on_samples, grid=grid, table=nominal.samples, method=method, threads=1),
+            "compiled": partial(project_on_samples, grid=grid, table=nominal.sample_table, method=method, threads=1),
             "numpy": partial(numpy_way, nominal=nominal),
             "exact": partial(project, grid=grid, threads=1),
         }

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inspection.curve import NurbsCurve
+from inspection.inversion import INSIDE, choose_feet, dot, feet_on_vertices
 from inspection.kernels import Feet
 from inspection.nominal import NominalProfile
-from inspection.projection import INSIDE, dot, merged, on_vertices
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -30,7 +30,7 @@ def exact(points_mm: Array, nominal: NominalProfile) -> Feet:
     u, vertex, site = parameter[best], at_end[best], site[best]
     vertex &= nominal.is_open_end[site] | _in_normal_cone(points_mm, site, nominal)
     inside = _at_parameters(points_mm, u, nominal.curve)
-    return merged(vertex, on_vertices(points_mm, site, nominal), inside) if vertex.any() else inside
+    return choose_feet(vertex, feet_on_vertices(points_mm, site, nominal), inside) if vertex.any() else inside
 
 
 def _candidates(points_mm: Array, nominal: NominalProfile) -> tuple[Index, Index]:

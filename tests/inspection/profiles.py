@@ -6,13 +6,14 @@ The other airfoils are read from coordinate files beside the checkout, because s
 """
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
 
-from inspection import NurbsCurve
+from inspection import Material, NominalProfile, NurbsCurve, discretize
 
 Array = NDArray[np.float64]
 
@@ -159,6 +160,30 @@ EVERY: dict[str, Callable[[], NurbsCurve]] = {
     "MH42 sharp": lambda: sharp_airfoil("mh42"),
     "SC(2)-0714": lambda: airfoil("sc20714"),
 }
+FILES = ("ag35", "clarky", "dae11", "e387", "fx63137", "goe227", "goe404", "mh42", "naca65410", "rae2822", "s1223_hires", "sc20714")
+SECTIONS = tuple(f"{camber}{thickness:02d}" for camber in ("00", "24", "44", "65") for thickness in (6, 9, 12, 15, 21))
+
+
+@cache
+def curve_of(name: str) -> NurbsCurve:
+    """One of EVERY, an airfoil of FILES, or a section of SECTIONS (blunt where its thickness is 9 %)."""
+    if name in EVERY:
+        return EVERY[name]()
+    return airfoil(name) if name in FILES else naca(name, sharp=name[2:] != "09")
+
+
+@cache
+def nominal_of(name: str, samples: int = 2000, material: Material = "left") -> NominalProfile:
+    """A nominal whose smallest step is the starting step, so that it has about that many samples."""
+    return discretize(curve_of(name), samples=samples, step_min=1.0 / samples, material=material)
+
+
+def moved_curve(curve: NurbsCurve, rotation_deg: float, translation_mm: tuple[float, float]) -> NurbsCurve:
+    """The curve turned about the origin, then moved."""
+    control = rotated(curve.control_points_mm, rotation_deg, translation_mm)
+    if curve.closed and curve.knots[0] == curve.domain[0]:
+        control[-1] = control[0]
+    return NurbsCurve(curve.degree, control, curve.knots.copy(), None if curve.weights is None else curve.weights.copy(), curve.closed)
 
 
 def left_normal(curve: NurbsCurve, u: Array) -> Array:

@@ -3,9 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from inspection.curve import unit_vectors
+from inspection.inversion import INSIDE, choose_feet, dot, feet_on_vertices, nearest_sites
 from inspection.kernels import Feet
 from inspection.nominal import NominalProfile
-from inspection.projection import INSIDE, dot, merged, nearest_sites, on_vertices, unit
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -43,7 +44,7 @@ def veaw(points_mm: Array, nominal: NominalProfile) -> Feet:
     left_other, gradient_other = _on_pole_circle(points_mm, nominal, other)
     left = weight * left_site + (1 - weight) * left_other
     gradient = weight[:, None] * gradient_site + (1 - weight)[:, None] * gradient_other
-    return _from_sites(points_mm, nominal, site, faces_none, left, unit(gradient))
+    return _from_sites(points_mm, nominal, site, faces_none, left, unit_vectors(gradient))
 
 
 def chord(points_mm: Array, nominal: NominalProfile) -> Feet:
@@ -128,7 +129,7 @@ def _from_sites(
         station_mm=_on_curve(nominal.station_mm[site] + travel, 0.0, nominal.length_mm, nominal.curve.closed),
         vertex=np.full(len(site), INSIDE, dtype=np.uint8),
     )
-    return merged(faces_none, on_vertices(points_mm, site, nominal), near) if faces_none.any() else near
+    return choose_feet(faces_none, feet_on_vertices(points_mm, site, nominal), near) if faces_none.any() else near
 
 
 def _on_curve(value: Array, start: float, end: float, closed: bool) -> Array:

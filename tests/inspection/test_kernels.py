@@ -19,18 +19,9 @@ from inspection.kernels import SAMPLE_METHODS, Feet, project, project_on_samples
 from tests.inspection import profiles
 from tests.inspection import projections_reference as reference
 from tests.inspection.oracle import Closest, closest_point
-from tests.inspection.profiles import Array
+from tests.inspection.profiles import Array, curve_of
 
 FIELDS = Feet._fields
-FILES = ("ag35", "clarky", "dae11", "e387", "fx63137", "goe227", "goe404", "mh42", "naca65410", "rae2822", "s1223_hires", "sc20714")
-SECTIONS = tuple(f"{camber}{thickness:02d}" for camber in ("00", "24", "44", "65") for thickness in (6, 9, 12, 15, 21))
-
-
-@cache
-def curve_of(name: str) -> NurbsCurve:
-    if name in profiles.EVERY:
-        return profiles.EVERY[name]()
-    return profiles.airfoil(name) if name in FILES else profiles.naca(name, sharp=name[2:] != "09")
 
 
 @cache
@@ -89,7 +80,7 @@ def test_closest_point_of_every_profile(name: str) -> None:
     assert_closest(project(points, grid_of(name)), closest_point(curve, points), points, curve)
 
 
-@pytest.mark.parametrize("name", FILES + SECTIONS)
+@pytest.mark.parametrize("name", profiles.FILES + profiles.SECTIONS)
 def test_closest_point_of_airfoils(name: str) -> None:
     curve = curve_of(name)
     points = scattered(curve, np.random.default_rng(32), 40)
@@ -218,10 +209,7 @@ def test_moving_curve_and_points_together_moves_the_feet(name: str, angle: float
     points = profiles.offset_points(
         curve, profiles.inner_parameters(curve, 150, np.random.default_rng(39)), np.random.default_rng(40).uniform(-1, 1, 150)
     )
-    control = profiles.rotated(curve.control_points_mm, angle, shift)
-    if curve.closed and curve.knots[0] == curve.domain[0]:
-        control[-1] = control[0]
-    there = NurbsCurve(curve.degree, control, curve.knots.copy(), None if curve.weights is None else curve.weights.copy(), curve.closed)
+    there = profiles.moved_curve(curve, angle, shift)
     a, b = project(points, grid_of(name)), project(profiles.rotated(points, angle, shift), build_foot_grid(there))
     assert np.abs(a.distance_mm - b.distance_mm).max() < 2e-12
     assert np.abs(profiles.rotated(a.foot_mm, angle, shift) - b.foot_mm).max() < 1e-10
@@ -231,7 +219,7 @@ def test_moving_curve_and_points_together_moves_the_feet(name: str, angle: float
 def test_veaw_is_finite_where_its_two_directions_cancel() -> None:
     square = discretize(profiles.square(40.0), samples=400, step_min=0.5)
     ends = np.vstack([square.poles.edge_left_mm, square.poles.edge_right_mm])
-    feet = project_on_samples(ends[np.isfinite(ends).all(axis=1)], square.grid, square.samples, "veaw")
+    feet = project_on_samples(ends[np.isfinite(ends).all(axis=1)], square.grid, square.sample_table, "veaw")
     for field in FIELDS:
         assert np.isfinite(getattr(feet, field)).all(), field
 
@@ -254,7 +242,7 @@ def test_the_nearest_sample_is_the_nearest_of_coarse_ones_as_well() -> None:
         nominal = discretize(curve, samples=int(rng.integers(8, 40)), step_min=0.5)
         centre, size = nominal.points_mm.mean(axis=0), np.hypot(*np.ptp(nominal.points_mm, axis=0))
         points = centre + rng.uniform(-1, 1, (1500, 2)) * size
-        table, u = nominal.samples, project(points, nominal.grid).parameter
+        table, u = nominal.sample_table, project(points, nominal.grid).parameter
         begin = np.clip((u - table.domain[0]) / (table.domain[1] - table.domain[0]) * len(table.starts), 0, len(table.starts) - 1)
         samples, links, boxes, starts, _ = table.flat
         stack = np.empty(64, dtype=np.int64)
@@ -360,7 +348,7 @@ def test_compiled_method_is_the_plain_one(name: str, method: str) -> None:
         nominal = discretize(curve_of(name), samples=samples, step_min=0.9 / samples, pole_angle_min_deg=90.0)
         points = scattered(curve_of(name), np.random.default_rng(42), 150)
         wanted = plain[method](points, nominal)
-        found = project_on_samples(points, grid_of(name), nominal.samples, method)
+        found = project_on_samples(points, grid_of(name), nominal.sample_table, method)
         for field in FIELDS:
             assert np.abs(getattr(found, field) - getattr(wanted, field)).max() < 1e-11, (samples, field)
         assert np.array_equal(found.vertex, wanted.vertex)
@@ -368,7 +356,7 @@ def test_compiled_method_is_the_plain_one(name: str, method: str) -> None:
 
 @pytest.mark.parametrize("method", SAMPLE_METHODS)
 def test_no_bit_of_a_compiled_method_depends_on_the_batch(method: str) -> None:
-    table = discretize(curve_of("P3"), samples=500, step_min=1e-3).samples
+    table = discretize(curve_of("P3"), samples=500, step_min=1e-3).sample_table
     points = scattered(curve_of("P3"), np.random.default_rng(43), 400)
     whole = project_on_samples(points, grid_of("P3"), table, method)
     cut = [project_on_samples(part, grid_of("P3"), table, method) for part in np.array_split(points, 37)]

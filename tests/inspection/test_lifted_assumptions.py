@@ -6,38 +6,30 @@ motion can explain, which linear algebra on the true normals gives without the i
 the motion, here below 0.1 um for form errors of 20 um.
 """
 
-from functools import cache
-
 import numpy as np
 import pytest
 
 from inspection import (
     LiveInspection,
+    Method,
     NominalProfile,
     Registration,
     Rejection,
     RigidTransform,
     ToleranceZone,
     deviations,
-    discretize,
     register,
     register_coarse,
     register_fine,
 )
 from inspection.coarse import align_boxes
-from inspection.deviations import Method
 from inspection.frame import principal_frame
 from inspection.synthetic import SyntheticScan, even_stations, form_error_mm, scan
 from tests.inspection import profiles
-from tests.inspection.profiles import Array
+from tests.inspection.profiles import Array, nominal_of
 
 POSE = RigidTransform(2.3, np.array([40.0, -70.0]))
 SECOND_ORDER_MM = 1e-4
-
-
-@cache
-def nominal_of(name: str) -> NominalProfile:
-    return discretize(profiles.EVERY[name](), samples=2000, step_min=5e-4)
 
 
 def made(nominal: NominalProfile, station_mm: Array, seed: int) -> SyntheticScan:

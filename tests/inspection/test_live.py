@@ -1,6 +1,5 @@
 """Live inspection: the same points in any batches, honest counts, and what provisional means."""
 
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,6 @@ from inspection import (
     InspectionResult,
     LiveInspection,
     NominalProfile,
-    NurbsCurve,
     RegistrationError,
     Rejection,
     RigidTransform,
@@ -18,27 +16,16 @@ from inspection import (
     ToleranceZone,
     Verdict,
     deviations,
-    discretize,
     fit_minimum_zone,
     register,
     register_fine,
 )
 from tests.inspection import profiles
 from tests.inspection.oracle import closest_point
-from tests.inspection.profiles import Array
+from tests.inspection.profiles import Array, curve_of, nominal_of
 
 ZONE = ToleranceZone(-0.05, 0.05, 0.005)
 PLANE = SectionPlane(np.array([5.0, 6.0, 7.0]), np.array([1.0, 1.0, 0.0]), np.array([0.0, 0.3, 1.0]))
-
-
-@cache
-def curve_of(name: str) -> NurbsCurve:
-    return profiles.EVERY[name]()
-
-
-@cache
-def nominal_of(name: str) -> NominalProfile:
-    return discretize(curve_of(name), samples=2000, step_min=5e-4)
 
 
 def surface(name: str, count: int, seed: int, defect_mm: float = 0.0) -> tuple[Array, Array]:
@@ -259,7 +246,7 @@ def test_a_scan_that_is_mostly_unusable_is_not_fitted_anew_at_every_block(monkey
         fits.append(1)
         return register_fine(*arguments, **options)
 
-    monkeypatch.setattr("inspection.live.register_fine", counted)
+    monkeypatch.setattr("inspection.pose_track.register_fine", counted)
     points, _ = surface("P3", 20_000, 2)
     points[np.random.default_rng(5).random(20_000) < 0.55] = np.nan
     live = LiveInspection(nominal_of("P3"), ToleranceZone(-0.1, 0.1))

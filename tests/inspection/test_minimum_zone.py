@@ -1,26 +1,14 @@
 """The minimum zone: parts built so that the answer is known, certificates checked by hand, and no better pose nearby."""
 
-from functools import cache
-
 import numpy as np
 import pytest
 
-from inspection import MinimumZone, NominalProfile, NurbsCurve, RigidTransform, deviations, discretize, fit_minimum_zone, register
+from inspection import MinimumZone, NurbsCurve, RigidTransform, deviations, discretize, fit_minimum_zone, register
 from tests.inspection import profiles
 from tests.inspection.oracle import closest_point
-from tests.inspection.profiles import Array
+from tests.inspection.profiles import Array, curve_of, nominal_of
 
 NAMES = ("P1", "P2", "P3", "NACA 2412 sharp", "GOE404", "MH42")
-
-
-@cache
-def curve_of(name: str) -> NurbsCurve:
-    return profiles.EVERY[name]()
-
-
-@cache
-def nominal_of(name: str) -> NominalProfile:
-    return discretize(curve_of(name), samples=2000, step_min=5e-4)
 
 
 def gradients(normal: Array, place: Array) -> Array:

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
 from inspection import (
-    NominalProfile,
     NurbsCurve,
     Registration,
     RegistrationError,
@@ -23,20 +22,10 @@ from inspection import (
 from inspection.rigid import best_motion
 from tests.inspection import profiles
 from tests.inspection.oracle import closest_point
-from tests.inspection.profiles import Array
+from tests.inspection.profiles import Array, curve_of, nominal_of
 
 FIVE = ("P1", "P2", "P3", "GOE404", "MH42")
 ASYMMETRIC = (*FIVE, "NACA 2412 sharp", "NACA 4412 blunt")
-
-
-@cache
-def curve_of(name: str) -> NurbsCurve:
-    return profiles.EVERY[name]()
-
-
-@cache
-def nominal_of(name: str, samples: int = 2000) -> NominalProfile:
-    return discretize(curve_of(name), samples=samples, step_min=1.0 / samples)
 
 
 def measured(name: str, count: int, seed: int, *, noise_mm: float = 0.01, start: float = 0.0, coverage: float = 1.0) -> Array:

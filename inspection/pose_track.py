@@ -1,0 +1,95 @@
+"""The provisional pose of a scan that still runs: sought on the points so far, then refined with every further block."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inspection.deviations import deviations
+from inspection.errors import RegistrationError
+from inspection.fine import MISFIT, ranked_poses, register_fine
+from inspection.kernels import GrowingSums
+from inspection.registration import Registration
+from inspection.result import NOT_JUDGED
+from inspection.rigid import RigidTransform, rotation_about
+from inspection.scan_rows import ScanRows
+from inspection.terms import Terms
+
+Array = NDArray[np.float64]
+
+_CLEARLY_BETTER = 0.5  # of the next best pose's rms
+_CORRELATION = 0.125  # share of the length over which form error is taken as one independent value: two to four waves around
+_PRIOR_SHARE = 1 / 6  # of the zone's width: standard deviation of the form error expected where nothing is measured yet
+_PLACES = 16  # every so many samples of the nominal are asked how far a deviation there may still move
+
+
+class PoseTrack:
+    """Normal equations that grow about a pose fitted before, so that every block refines the pose at constant cost."""
+
+    def __init__(self, registration: Registration, points_mm: Array, terms: Terms) -> None:
+        nominal = terms.nominal
+        self.registration = registration
+        self._terms, self._start, self._centre = terms, self.pose, registration.centre_mm
+        self._expected_form_mm = _PRIOR_SHARE * (terms.zone.upper_mm - terms.zone.lower_mm)
+        self._places, self._normals = nominal.points_mm[::_PLACES], nominal.outward * nominal.normal[::_PLACES]
+        reach = float(np.hypot(*(self._places - self._centre).T).max())
+        self._sums = GrowingSums(self._centre, reach, nominal.length_mm)
+        d = deviations(self.pose.apply(points_mm), nominal, tip_radius_mm=terms.tip_radius_mm)
+        part = np.where(d.beyond_end, np.int8(NOT_JUDGED), np.int8(0))
+        self._sums.add(d.foot_mm, d.normal, d.deviation_mm, d.station_mm, part)
+        self._can_move_mm: float | None = None  # asked for at most once a batch, and only batches that end a block change it
+
+    @property
+    def pose(self) -> RigidTransform:
+        """Where the points lie at this moment."""
+        return self.registration.nominal_from_section
+
+    def refine(self, rows: ScanRows, first: int, stop: int) -> None:
+        """Take in a block of rows judged at this track's pose."""
+        block = slice(first, stop)
+        self._sums.add(rows.foot[block], rows.normal[block], rows.deviation[block], rows.station[block], rows.verdicts[block])
+        self._sums.move()
+        x, y, angle = self._sums.motion.tolist()
+        pose = rotation_about(self._centre, angle, np.array([x, y])).after(self._start)
+        self.registration = replace(self.registration, nominal_from_section=pose)
+        self._can_move_mm = None
+
+    def refit(self, points_mm: Array) -> "PoseTrack":
+        """A track about the pose that fits all points (m, 2) so far, started at this one's."""
+        return _fit_track(points_mm, self.pose, self._terms)
+
+    def can_move_mm(self) -> float:
+        """How far the remaining uncertainty of the pose (95 %) can still shift any deviation on the profile.
+
+        What changes from point to point is noise, independent at every point. The rest is form error, one value for every
+        eighth of the length: a scan of a few such patches is trusted no more than its patches, less those that the pose
+        itself used up. Where nothing is measured yet, form error of a sixth of the zone's width is expected.
+        """
+        if self._can_move_mm is not None:
+            return self._can_move_mm
+        sums = self._sums
+        patches = max(sums.covered / _CORRELATION, 1.0)
+        form = max(sums.mean_square - sums.noise, 0.0) * patches / max(patches - 3.0, 0.5)
+        form = max(form, self._expected_form_mm**2 * (1 - sums.covered))
+        self._can_move_mm = 2.0 * sums.spread_mm(self._places, self._normals, sums.noise + form * sums.count / patches)
+        return self._can_move_mm
+
+
+def seek_pose(points_mm: Array, terms: Terms) -> PoseTrack | None:
+    """A track from the one pose that fits the points (m, 2) clearly better than any other, None where there is no such pose."""
+    try:
+        poses = ranked_poses(points_mm, terms.nominal, terms.tip_radius_mm)
+    except RegistrationError:
+        return None
+    largest_rms = MISFIT * terms.nominal.size_mm
+    scores = [score for score, _ in poses]
+    clear = len(poses) == 1 or scores[0] < _CLEARLY_BETTER * scores[1]
+    if not clear or scores[0] > largest_rms:
+        return None
+    track = _fit_track(points_mm, poses[0][1], terms)
+    return track if track.can_move_mm() < largest_rms else None
+
+
+def _fit_track(points_mm: Array, start: RigidTransform, terms: Terms) -> PoseTrack:
+    registration = register_fine(points_mm, terms.nominal, start, tip_radius_mm=terms.tip_radius_mm)
+    return PoseTrack(registration, points_mm, terms)
