@@ -97,7 +97,7 @@ def measure(server: Connection, seconds: float, endure: bool) -> None:
         samples = [sample(session, server)]
         step_s = min(30.0, seconds / 4)
         gaps: list[float] = []
-        before = page.evaluate("figures().bytes")
+        before = page.evaluate("timing().bytes")
         for _ in range(round(seconds / step_s)):
             gaps += page.evaluate(FRAMES, step_s)
             samples.append(sample(session, server))
@@ -106,7 +106,7 @@ def measure(server: Connection, seconds: float, endure: bool) -> None:
 
 
 def show_frames(page: Page, gaps: list[float], before: int, seconds: float) -> None:
-    figures = page.evaluate("figures()")
+    figures = page.evaluate("timing()")
     gap = np.array(gaps)
     p50, p99 = np.percentile(gap, [50, 99])
     print(f"{'frames per second':<20} {1000 * len(gap) / gap.sum():.1f}; gap p50 {p50:.1f}, p99 {p99:.1f} ms")

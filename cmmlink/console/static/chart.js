@@ -1,92 +1,141 @@
-// Run chart: the worst deviation of the last parts (or of a surface's sections), with their own limits; the verdict by shape.
+// Run chart: the worst deviation of the last parts (or of a surface's sections), each with its own limits; the verdict by shape.
 
-import { INK, Sheet, mark, signed } from "./sheet.js";
+import { signed } from "./numbers.js";
+import { middleOf } from "./points.js";
+import { INK, Sheet, mark, ring } from "./sheet.js";
+
+/** @import { RunRow } from "./protocol.js" */
+/** @import { Pen } from "./sheet.js" */
+/** @typedef {{ worst_mm: number, lower_mm: number, upper_mm: number, verdict: RunRow["verdict"], label: string }} Entry */
+/** @typedef {Pick<RunRow, "worst_mm" | "lower_mm" | "upper_mm" | "verdict"> & { label: string }} Candidate */
+/** @typedef {{ px: (place: number) => number, py: (deviation: number) => number, left: number, bottom: number, width: number }} Scale */
 
 const FEWEST = 20;
+const LABEL_LETTERS = 10;
 
 export class Chart {
-  constructor(element, large) {
-    this.large = large;
+  /**
+   * @param {HTMLElement} element
+   * @param {boolean} isLarge
+   */
+  constructor(element, isLarge) {
+    this.isLarge = isLarge;
+    /** @type {Entry[]} */
+    this.entries = [];
     this.sheet = new Sheet(element, () => this.draw());
-    this.runs = [];
   }
 
-  // In the order of drawing: the newest part, or the highest section, last.
-  show(runs) {
-    this.runs = runs.filter((run) => run.worst_mm !== null);
+  /**
+   * Show runs or sections in the order of drawing: the newest, or the highest, last. Those without a result are left out.
+   * @param {Candidate[]} candidates
+   */
+  show(candidates) {
+    this.entries = candidates.flatMap(({ worst_mm, lower_mm, upper_mm, verdict, label }) => (
+      worst_mm === null || lower_mm === null || upper_mm === null ? [] : [{ worst_mm, lower_mm, upper_mm, verdict, label }]
+    ));
     this.draw();
   }
 
   draw() {
-    const { sheet, runs } = this, pen = sheet.pen("ground");
-    if (!sheet.width) return;
-    const left = sheet.text * 4.4, right = sheet.width - sheet.text, top = sheet.text * 0.6, bottom = sheet.height - sheet.text * (this.large ? 2 : 0.6);
-    if (!runs.length) {
-      pen.fillStyle = INK.soft;
-      pen.textAlign = "center";
-      pen.textBaseline = "middle";
-      pen.fillText("no part was measured yet", sheet.width / 2, sheet.height / 2);
-      return;
-    }
-    const values = runs.flatMap((run) => [run.worst_mm, run.lower_mm, run.upper_mm]);
-    const low = Math.min(...values), high = Math.max(...values), room = (high - low) * 0.12 || 0.01;
-    this.places = Math.max(FEWEST, runs.length);
-    const px = (k) => left + ((k + 0.5) / this.places) * (right - left);
-    const py = (value) => bottom - ((value - low + room) / (high - low + 2 * room)) * (bottom - top);
-    this.limits(pen, px, py, left);
-    pen.strokeStyle = INK.faint;
-    pen.lineWidth = 1.5;
-    pen.beginPath();
-    runs.forEach((run, k) => pen[k ? "lineTo" : "moveTo"](px(k), py(run.worst_mm)));
-    pen.stroke();
-    runs.forEach((run, k) => this.point(pen, run, px(k), py(run.worst_mm), k === runs.length - 1));
-    if (this.large) this.serials(pen, px, bottom);
+    if (!this.sheet.width) return;
+    const { entries } = this, pen = this.sheet.pen("ground"), last = entries.at(-1);
+    if (!last) return this.drawNothing(pen);
+    const scale = this.scale();
+    this.drawLimits(pen, scale, last);
+    this.drawLine(pen, entries.map((entry, k) => [scale.px(k), scale.py(entry.worst_mm)]), INK.faint);
+    entries.forEach((entry, k) => this.drawPoint(pen, entry, scale.px(k), scale.py(entry.worst_mm)));
+    ring(pen, scale.px(entries.length - 1), scale.py(last.worst_mm), this.size + 4, 1.5);
+    if (this.isLarge) this.drawLabels(pen, scale);
   }
 
-  limits(pen, px, py, left) {
-    const half = px(1) - px(0);
+  get size() {
+    return this.isLarge ? 6 : 4;
+  }
+
+  /** @returns {Scale} */
+  scale() {
+    const { width, height, text } = this.sheet, foot = this.isLarge ? 2 : 0.6;
+    const left = text * 4.4, right = width - text, top = text * 0.6, bottom = height - text * foot;
+    const values = this.entries.flatMap((entry) => [entry.worst_mm, entry.lower_mm, entry.upper_mm]);
+    const low = Math.min(...values), high = Math.max(...values), room = (high - low) * 0.12 || 0.01;
+    const step = (right - left) / Math.max(FEWEST, this.entries.length);
+    return {
+      left, bottom, width: step,
+      px: (place) => left + (place + 0.5) * step,
+      py: (deviation) => bottom - ((deviation - low + room) / (high - low + 2 * room)) * (bottom - top),
+    };
+  }
+
+  /** @param {Pen} pen */
+  drawNothing(pen) {
+    pen.fillStyle = INK.soft;
+    pen.textAlign = "center";
+    pen.textBaseline = "middle";
+    pen.fillText("no part was measured yet", this.sheet.width / 2, this.sheet.height / 2);
+  }
+
+  /**
+   * The tolerance zone of each entry; the limits of the last one by number.
+   * @param {Pen} pen
+   * @param {Scale} scale
+   * @param {Entry} last
+   */
+  drawLimits(pen, { px, py, left, width }, last) {
     pen.fillStyle = INK.band;
-    this.runs.forEach((run, k) => {
-      const [from, to] = [Math.round(px(k) - half / 2), Math.round(px(k) + half / 2)];
-      pen.fillRect(from, py(run.upper_mm), to - from, py(run.lower_mm) - py(run.upper_mm));
+    this.entries.forEach((entry, k) => {
+      const from = Math.round(px(k) - width / 2), to = Math.round(px(k) + width / 2);
+      pen.fillRect(from, py(entry.upper_mm), to - from, py(entry.lower_mm) - py(entry.upper_mm));
     });
     pen.fillStyle = INK.soft;
     pen.textAlign = "right";
     pen.textBaseline = "middle";
-    const last = this.runs.at(-1);
     for (const limit of [last.upper_mm, last.lower_mm]) pen.fillText(signed(limit, 3), left - 6, py(limit));
-    pen.strokeStyle = INK.faint;
-    pen.beginPath();
-    pen.moveTo(left, py(0));
-    pen.lineTo(px(this.places - 0.5), py(0));
-    pen.stroke();
+    const places = Math.max(FEWEST, this.entries.length);
+    this.drawLine(pen, [[left, py(0)], [px(places - 0.5), py(0)]], INK.faint);
   }
 
-  point(pen, run, x, y, newest) {
-    const size = this.large ? 6 : 4;
-    if (run.verdict === "nonconform") mark(pen, run.worst_mm > (run.lower_mm + run.upper_mm) / 2 ? "over" : "under", x, y, size + 1);
-    else if (run.verdict === "conform") {
-      pen.fillStyle = INK.in;
-      pen.beginPath();
-      pen.arc(x, y, size - 0.5, 0, 7);
-      pen.fill();
-    } else mark(pen, "unsure", x, y, size);
-    if (!newest) return;
-    pen.strokeStyle = INK.text;
+  /**
+   * @param {Pen} pen
+   * @param {number[][]} places
+   * @param {string} ink
+   */
+  drawLine(pen, places, ink) {
+    pen.strokeStyle = ink;
     pen.lineWidth = 1.5;
     pen.beginPath();
-    pen.arc(x, y, size + 4, 0, 7);
+    for (const [x, y] of places) pen.lineTo(x, y);
     pen.stroke();
   }
 
-  serials(pen, px, bottom) {
-    const { sheet, runs } = this;
-    const every = Math.ceil((sheet.text * 6) / (px(1) - px(0)));
+  /**
+   * @param {Pen} pen
+   * @param {Entry} entry
+   * @param {number} x
+   * @param {number} y
+   */
+  drawPoint(pen, entry, x, y) {
+    if (entry.verdict === "nonconform") {
+      const isOver = entry.worst_mm > middleOf(entry);
+      mark(pen, isOver ? "over" : "under", x, y, this.size + 1);
+    } else if (entry.verdict === "conform") {
+      pen.fillStyle = INK.in;
+      pen.beginPath();
+      pen.arc(x, y, this.size - 0.5, 0, 2 * Math.PI);
+      pen.fill();
+    } else mark(pen, "not-proven", x, y, this.size);
+  }
+
+  /**
+   * @param {Pen} pen
+   * @param {Scale} scale
+   */
+  drawLabels(pen, { px, bottom, width }) {
+    const every = Math.ceil((this.sheet.text * 6) / width), last = this.entries.length - 1;
     pen.fillStyle = INK.soft;
     pen.textAlign = "center";
     pen.textBaseline = "top";
-    runs.forEach((run, k) => {
-      if ((runs.length - 1 - k) % every === 0) pen.fillText((run.label ?? (run.serial_number || run.run)).slice(-10), px(k), bottom + 6);
+    this.entries.forEach(({ label }, k) => {
+      if ((last - k) % every === 0) pen.fillText(label.slice(-LABEL_LETTERS), px(k), bottom + 6);
     });
   }
 }

@@ -1,51 +1,77 @@
 // The CT view: choose the plan of a surface, have its sections inspected, look at each of them.
 
 import { Chart } from "./chart.js";
-import { byId, count, put } from "./panels.js";
-import { digitsFor, signed } from "./sheet.js";
+import { buttonOf, byId, fillBar, put } from "./dom.js";
 import { List } from "./list.js";
-import { Table, cell, verdictCell } from "./table.js";
+import { count } from "./numbers.js";
+import { Table, cell, verdictCell, worstCells } from "./table.js";
 
-export class Ct {
-  // does: { inspect(plan), open(place) }
-  constructor(does) {
-    this.list = new List(byId("ct-plans"), does.inspect);
-    this.table = new Table(byId("sections"), row, (_, place) => does.open(place));
+/** @import { SurfaceState, SectionRow } from "./protocol.js" */
+
+const STARTED = 0.03; // of the bar, while the number of sections is not known
+
+export class CtView {
+  /**
+   * @param {(plan: string) => void} inspect
+   * @param {(place: number) => void} open
+   */
+  constructor(inspect, open) {
+    this.list = new List(byId("ct-plans"), inspect);
+    /** @type {Table<SectionRow>} */
+    this.table = new Table(byId("sections"), rowOf, (_, place) => open(place));
     this.chart = new Chart(byId("chart-ct"), true);
-    byId("import-ct").addEventListener("click", () => this.list.pointed && does.inspect(this.list.pointed));
-    byId("open-section").addEventListener("click", () => this.table.openChosen());
+    this.plan = "";
+    this.isBad = false;
+    this.shown = "";
+    buttonOf("import-ct").addEventListener("click", () => this.list.choosePointed());
+    buttonOf("open-section").addEventListener("click", () => this.table.openChosen());
   }
 
-  showPlans(plans, running) {
+  /**
+   * @param {readonly string[]} plans
+   * @param {boolean} isRunning
+   */
+  showPlans(plans, isRunning) {
     byId("tab-ct").hidden = !plans.length;
-    byId("import-ct").disabled = running;
-    this.list.show(plans, this.plan, this.failed);
+    buttonOf("import-ct").disabled = isRunning;
+    this.list.show(plans, this.plan, this.isBad);
   }
 
+  /** @param {SurfaceState} ct */
   show(ct) {
-    [this.plan, this.failed] = [ct.plan, ct.state === "failed"];
-    const { state, done, total, message } = ct;
-    byId("ct-bar").hidden = state !== "inspecting" && state !== "reading";
-    byId("ct-bar").firstElementChild.style.width = `${total ? (100 * done) / total : 3}%`;
-    const left = ct.remaining_s === null ? "" : `, about ${ct.remaining_s} s left`;
-    put("ct-words", { none: "", reading: "reading the surface \u2026", inspecting: `${done} of ${total}${left}`, done: `${done} of ${total}`, failed: "" }[state]);
-    byId("ct-message").dataset.state = state;
-    put("ct-message", message && `${state === "failed" ? "\u2715 " : ""}${message}`);
-    byId("open-section").disabled = !ct.sections.length;
-    const told = JSON.stringify(ct.sections);
-    if (told === this.told) return;
-    this.told = told;
-    this.table.show(ct.sections, Math.min(this.table.at, Math.max(ct.sections.length - 1, 0)));
-    this.chart.show(ct.sections.map((section) => ({ ...section, label: section.height_mm.toFixed(1) })));
+    this.plan = ct.plan;
+    this.isBad = ct.state === "failed";
+    byId("ct-bar").hidden = ct.state !== "inspecting" && ct.state !== "reading";
+    fillBar("ct-bar", ct.total ? ct.done / ct.total : STARTED);
+    put("ct-words", progressWords(ct));
+    byId("ct-message").dataset.state = ct.state;
+    put("ct-message", this.isBad ? `\u2715 ${ct.message}` : ct.message);
+    buttonOf("open-section").disabled = !ct.sections.length;
+    this.showSections(ct.sections);
+  }
+
+  /** @param {readonly SectionRow[]} sections */
+  showSections(sections) {
+    const shown = JSON.stringify(sections);
+    if (shown === this.shown) return;
+    this.shown = shown;
+    this.table.show(sections, Math.min(this.table.at, Math.max(sections.length - 1, 0)));
+    this.chart.show(sections.map((section) => ({ ...section, label: section.height_mm.toFixed(1) })));
   }
 }
 
-function row(section) {
-  const zone = { lower_mm: section.lower_mm, upper_mm: section.upper_mm };
-  const worst = section.worst_mm === null ? "" : signed(section.worst_mm, digitsFor(zone));
-  const station = section.worst_station_mm === null ? "" : section.worst_station_mm.toFixed(2);
-  const numbers = [section.height_mm.toFixed(3), count(section.received), worst, station, `${(100 * section.coverage).toFixed(1)} %`];
-  const notes = cell(section.warnings.join("; "));
+/** @param {SurfaceState} ct */
+function progressWords({ state, done, total, remaining_s }) {
+  if (state === "reading") return "reading the surface \u2026";
+  if (state === "done") return `${done} of ${total}`;
+  if (state !== "inspecting") return "";
+  return `${done} of ${total}${remaining_s === null ? "" : `, about ${remaining_s} s left`}`;
+}
+
+/** @param {SectionRow} section */
+function rowOf(section) {
+  const numbers = [section.height_mm.toFixed(3), count(section.received)].map((words) => cell(words, "number"));
+  const coverage = cell(`${(100 * section.coverage).toFixed(1)} %`, "number"), notes = cell(section.warnings.join("; "));
   notes.title = section.warnings.join("\n");
-  return [verdictCell(section.verdict), ...numbers.map((words) => cell(words, "number")), notes];
+  return [verdictCell(section.verdict), ...numbers, ...worstCells(section), coverage, notes];
 }

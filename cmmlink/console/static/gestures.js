@@ -1,25 +1,76 @@
-// Mouse and keys of a drawing: zoom, pan, read-out. The same for both drawings, and everything the mouse does the keys do too.
+// Mouse and keys of a drawing: zoom, pan, read-out. Both drawings have the same, and all that the mouse does the keys do too.
+
+/** @import { Cursor, Drawing, Place } from "./drawing.js" */
+/** @import { HeldPoint } from "./points.js" */
 
 const ZOOM = 1.25;
-const STEP_PX = 4;
+const STEP_PX = 4; // shortest step of the read-out
+const REACH_PX = 600; // farthest that the next point is looked for
+const PAN_PX = 60;
 
-// onCursor(point or null): the point that both drawings read out.
+/** Steps in pixels to the right and down. @type {Readonly<Record<string, Place>>} */
+const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+
+/**
+ * Let mouse and keys act on a drawing.
+ * @param {Drawing} drawing
+ * @param {(cursor: Cursor | null) => void} onCursor hears which point both drawings read out
+ * @param {() => HeldPoint | null} worstPoint
+ */
 export function listen(drawing, onCursor, worstPoint) {
+  /** @type {Cursor | null} */
+  let cursor = null;
+  const read = (/** @type {HeldPoint | null} */ point) => {
+    cursor = point && { ...point, by: drawing.name };
+    onCursor(cursor);
+  };
+  listenToMouse(drawing, read);
+
+  const place = () => (cursor ? drawing.place(cursor) : drawing.middle);
+  const jump = (/** @type {HeldPoint | null} */ point) => {
+    if (!point) return;
+    read(point);
+    drawing.reveal(point);
+  };
+  /** @type {Readonly<Record<string, () => void>>} */
+  const keys = {
+    "+": () => drawing.zoom(1 / ZOOM, place()),
+    "=": () => drawing.zoom(1 / ZOOM, place()),
+    "-": () => drawing.zoom(ZOOM, place()),
+    "0": () => drawing.fit(),
+    w: () => jump(worstPoint()),
+  };
+  const actOf = (/** @type {KeyboardEvent} */ event) => {
+    const arrow = ARROWS[event.key];
+    if (!arrow) return keys[event.key.toLowerCase()];
+    const [dx, dy] = arrow;
+    return event.shiftKey ? () => drawing.pan(dx * PAN_PX, dy * PAN_PX) : () => jump(nextPoint(drawing, cursor, place(), arrow));
+  };
+  drawing.element.addEventListener("keydown", (event) => {
+    const act = actOf(event);
+    if (!act || !drawing.isReady || event.ctrlKey || event.metaKey || event.altKey) return;
+    event.preventDefault();
+    event.stopPropagation();
+    act();
+  });
+}
+
+/**
+ * @param {Drawing} drawing
+ * @param {(point: HeldPoint | null) => void} read
+ */
+function listenToMouse(drawing, read) {
   const { element } = drawing;
-  let dragged = null, cursor = null;
+  /** @type {Place | null} */
+  let dragged = null;
+  /** @type {(event: MouseEvent) => Place} */
   const placeOf = (event) => {
     const box = element.getBoundingClientRect();
     return [event.clientX - box.left, event.clientY - box.top];
   };
-  const read = (point) => {
-    cursor = point && { ...point, by: drawing.name };
-    onCursor(cursor);
-  };
-  const middle = () => (cursor ? drawing.place(cursor) : [drawing.sheet.width / 2, drawing.sheet.height / 2]);
-
   element.addEventListener("wheel", (event) => {
     event.preventDefault();
-    if (drawing.nominal) drawing.zoom(event.deltaY > 0 ? ZOOM : 1 / ZOOM, ...placeOf(event));
+    if (drawing.isReady) drawing.zoom(event.deltaY > 0 ? ZOOM : 1 / ZOOM, placeOf(event));
   }, { passive: false });
   element.addEventListener("pointerdown", (event) => {
     dragged = placeOf(event);
@@ -28,51 +79,29 @@ export function listen(drawing, onCursor, worstPoint) {
   element.addEventListener("pointerup", () => (dragged = null));
   element.addEventListener("pointermove", (event) => {
     const place = placeOf(event);
-    if (!drawing.nominal) return;
+    if (!drawing.isReady) return;
     if (dragged && event.buttons) {
       drawing.pan(dragged[0] - place[0], dragged[1] - place[1]);
       dragged = place;
-    } else read(drawing.nearest(...place));
+    } else read(drawing.nearest(place));
   });
   element.addEventListener("pointerleave", () => read(null));
   element.addEventListener("dblclick", () => drawing.fit());
   element.addEventListener("blur", () => read(null));
-
-  const step = (event, dx, dy) => {
-    const far = 60;
-    if (event.shiftKey) return drawing.pan(dx * far, dy * far);
-    const [x, y] = middle();
-    let next = null;
-    for (let reach = STEP_PX; reach < 600 && !moved(next, cursor); reach *= 2) next = drawing.nearest(x + dx * reach, y + dy * reach);
-    if (next) {
-      read(next);
-      drawing.reveal(next);
-    }
-  };
-  const keys = {
-    "+": () => drawing.zoom(1 / ZOOM, ...middle()),
-    "=": () => drawing.zoom(1 / ZOOM, ...middle()),
-    "-": () => drawing.zoom(ZOOM, ...middle()),
-    "0": () => drawing.fit(),
-    ArrowLeft: (event) => step(event, -1, 0),
-    ArrowRight: (event) => step(event, 1, 0),
-    ArrowUp: (event) => step(event, 0, -1),
-    ArrowDown: (event) => step(event, 0, 1),
-    w: () => {
-      const worst = worstPoint();
-      if (worst) {
-        read(worst);
-        drawing.reveal(worst);
-      }
-    },
-  };
-  element.addEventListener("keydown", (event) => {
-    const act = keys[event.key] ?? keys[event.key.toLowerCase()];
-    if (!act || !drawing.nominal || event.ctrlKey || event.metaKey || event.altKey) return;
-    event.preventDefault();
-    event.stopPropagation();
-    act(event);
-  });
 }
 
-const moved = (next, cursor) => next && (!cursor || next.bin !== cursor.bin || next.side !== cursor.side);
+/**
+ * The next point in a direction: farther and farther away, until it is another than the one that is read out.
+ * @param {Drawing} drawing
+ * @param {Cursor | null} cursor
+ * @param {Place} from
+ * @param {Place} step
+ */
+function nextPoint(drawing, cursor, from, step) {
+  let next = null;
+  for (let reach = STEP_PX; reach < REACH_PX; reach *= 2) {
+    next = drawing.nearest([from[0] + step[0] * reach, from[1] + step[1] * reach]);
+    if (next && (next.bin !== cursor?.bin || next.side !== cursor.side)) break;
+  }
+  return next;
+}

@@ -1,42 +1,47 @@
 // The history view: the station's runs, one of them chosen to be opened, replayed or exported.
 
 import { Chart } from "./chart.js";
-import { byId, count } from "./panels.js";
-import { Table, cell, verdictCell } from "./table.js";
-import { digitsFor, signed } from "./sheet.js";
+import { buttonOf, byId, put } from "./dom.js";
+import { count } from "./numbers.js";
+import { Table, cell, verdictCell, worstCells } from "./table.js";
+
+/** @import { RunRow } from "./protocol.js" */
+/** @typedef {"open" | "replay" | "export"} Act */
 
 const SHOWN = 20;
+/** @type {Act[]} */
 const ACTS = ["open", "replay", "export"];
 
 export class History {
-  // does: { open(run), replay(run), export(run) }
-  constructor(does) {
-    this.does = does;
+  /** @param {Record<Act, (run: string) => void>} acts what can be done with a run */
+  constructor(acts) {
+    this.acts = acts;
     this.charts = [new Chart(byId("chart-large"), true), new Chart(byId("chart-small"), false)];
-    this.table = new Table(byId("runs"), row, (run) => does.open(run.run));
-    for (const what of ACTS) byId(`${what}-run`).addEventListener("click", () => this.act(what));
+    /** @type {Table<RunRow>} */
+    this.table = new Table(byId("runs"), rowOf, ({ run }) => acts.open(run));
+    for (const act of ACTS) buttonOf(`${act}-run`).addEventListener("click", () => this.act(act));
   }
 
-  act(what) {
-    if (this.table.chosen) this.does[what](this.table.chosen.run);
+  /** @param {Act} act */
+  act(act) {
+    if (this.table.chosen) this.acts[act](this.table.chosen.run);
   }
 
+  /** @param {readonly RunRow[]} runs newest first */
   show(runs) {
     byId("no-runs").hidden = runs.length > 0;
     byId("runs").hidden = !runs.length;
-    for (const what of ACTS) byId(`${what}-run`).disabled = !runs.length;
+    for (const act of ACTS) buttonOf(`${act}-run`).disabled = !runs.length;
     this.table.show(runs);
-    const last = runs.slice(0, SHOWN);
-    for (const chart of this.charts) chart.show([...last].reverse());
+    const last = runs.slice(0, SHOWN), entries = last.map((run) => ({ ...run, label: run.serial_number || run.run })).reverse();
+    for (const chart of this.charts) chart.show(entries);
     const bad = last.filter((run) => run.verdict === "nonconform").length;
-    byId("chart-words").textContent = runs.length ? `${last.length} parts, ${bad} not conform; newest at the right` : "";
+    put("chart-words", runs.length ? `${last.length} parts, ${bad} NOT CONFORM; newest at the right` : "");
   }
 }
 
-function row(run) {
-  const zone = { lower_mm: run.lower_mm, upper_mm: run.upper_mm };
-  const worst = run.worst_mm === null ? "" : signed(run.worst_mm, digitsFor(zone));
-  const station = run.worst_station_mm === null ? "" : run.worst_station_mm.toFixed(2);
+/** @param {RunRow} run */
+function rowOf(run) {
   const words = [run.part, run.serial_number, run.began.replace("T", " ").slice(0, 19), run.state];
-  return [verdictCell(run.verdict), ...words.map((word) => cell(word)), ...[count(run.received), worst, station].map((word) => cell(word, "number"))];
+  return [verdictCell(run.verdict), ...words.map((word) => cell(word)), cell(count(run.received), "number"), ...worstCells(run)];
 }

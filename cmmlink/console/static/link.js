@@ -1,77 +1,102 @@
-// The socket to the station: token first, then messages both ways; comes back by itself when the server does.
+// The socket to the station: token first, then messages both ways. It comes back by itself when the server does.
+
+import { WRONG_TOKEN } from "./protocol.js";
+
+/** @import { Answer, Command, Message } from "./protocol.js" */
+/** @typedef {"connecting" | "live" | "stale" | "away" | "refused"} LinkState */
+/** @typedef {Pick<Answer, "ok" | "message">} Outcome of a command */
+/**
+ * @typedef {object} Handlers
+ * @property {(message: Message) => void} onMessage
+ * @property {(buffer: ArrayBuffer) => void} onBinary
+ * @property {(state: LinkState) => void} onLink
+ */
 
 const FIRST_WAIT_MS = 400;
 const LONGEST_WAIT_MS = 3000;
 const STALE_AFTER_MS = 2000;
 
+export const OUT_OF_REACH = "the station cannot be reached";
+
 export class Link {
-  // told: { onState(kind, content), onBinary(buffer), onLink(state) }
-  constructor(token, told) {
+  /**
+   * @param {string} token
+   * @param {Handlers} handlers
+   */
+  constructor(token, handlers) {
     this.token = token;
-    this.told = told;
+    this.handlers = handlers;
     this.number = 0;
+    /** @type {Map<number, (outcome: Outcome) => void>} */
     this.waiting = new Map();
-    this.pause = FIRST_WAIT_MS;
+    this.waitMs = FIRST_WAIT_MS;
     this.heardAt = 0;
+    /** @type {LinkState} */
     this.state = "connecting";
-    this.open();
+    this.socket = this.open();
     setInterval(() => this.look(), 250);
   }
 
   open() {
     const socket = new WebSocket(`ws://${location.host}/live`);
     socket.binaryType = "arraybuffer";
-    this.socket = socket;
-    this.openedAt = performance.now();
     socket.onopen = () => socket.send(JSON.stringify({ token: this.token }));
     socket.onmessage = (message) => this.take(message.data);
-    socket.onclose = (event) => this.lost(event.code);
+    socket.onclose = (event) => this.lose(event.code);
+    return socket;
   }
 
+  /** @param {ArrayBuffer | string} data */
   take(data) {
     this.heardAt = performance.now();
-    if (this.state !== "live") {
-      this.pause = FIRST_WAIT_MS;
-      this.turn("live");
-    }
-    if (data instanceof ArrayBuffer) return this.told.onBinary(data);
+    this.waitMs = FIRST_WAIT_MS;
+    this.turn("live");
+    if (data instanceof ArrayBuffer) return this.handlers.onBinary(data);
+    /** @type {Message} */
     const message = JSON.parse(data);
-    if (message.type === "answer") this.answered(message);
-    this.told.onState(message.type, message);
+    if (message.type === "answer") this.settle(message);
+    this.handlers.onMessage(message);
   }
 
-  lost(code) {
-    for (const refuse of this.waiting.values()) refuse({ ok: false, message: "the station cannot be reached" });
+  /** @param {number} code */
+  lose(code) {
+    for (const settle of this.waiting.values()) settle({ ok: false, message: OUT_OF_REACH });
     this.waiting.clear();
-    if (code === 4401) return this.turn("refused");
+    if (code === WRONG_TOKEN) return this.turn("refused");
     this.turn("away");
-    setTimeout(() => this.open(), this.pause);
-    this.pause = Math.min(this.pause * 1.5, LONGEST_WAIT_MS);
+    setTimeout(() => (this.socket = this.open()), this.waitMs);
+    this.waitMs = Math.min(this.waitMs * 1.5, LONGEST_WAIT_MS);
   }
 
   look() {
     if (this.state === "live" && performance.now() - this.heardAt > STALE_AFTER_MS) this.turn("stale");
   }
 
+  /** @param {LinkState} state */
   turn(state) {
     if (state === this.state) return;
     this.state = state;
-    this.told.onLink(state);
+    this.handlers.onLink(state);
   }
 
-  // Gives a promise of { ok, message }.
-  ask(what, more = {}) {
+  /**
+   * Send a command.
+   * @param {Command} command
+   * @returns {Promise<Outcome>}
+   */
+  ask(command) {
+    if (this.socket.readyState !== WebSocket.OPEN) return Promise.resolve({ ok: false, message: OUT_OF_REACH });
     const number = ++this.number;
     return new Promise((resolve) => {
-      if (this.socket.readyState !== WebSocket.OPEN) return resolve({ ok: false, message: "the station cannot be reached" });
       this.waiting.set(number, resolve);
-      this.socket.send(JSON.stringify({ do: what, number, ...more }));
+      this.socket.send(JSON.stringify({ number, ...command }));
     });
   }
 
-  answered(message) {
-    const resolve = this.waiting.get(message.number);
-    this.waiting.delete(message.number);
-    if (resolve) resolve(message);
+  /** @param {Answer} answer */
+  settle(answer) {
+    const number = answer.number ?? -1;
+    this.waiting.get(number)?.(answer);
+    this.waiting.delete(number);
   }
 }

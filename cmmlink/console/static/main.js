@@ -1,168 +1,190 @@
 // The page: what the station says, put on the screen; what the operator does, sent to the station.
 
-import { Ct } from "./ct.js";
-import { Figures } from "./figures.js";
+import { showAlarms, toggleAlarmList } from "./alarms.js";
+import { CtView } from "./ct.js";
+import { buttonOf, byId, inputOf, put } from "./dom.js";
 import { listen } from "./gestures.js";
 import { History } from "./history.js";
-import { Link } from "./link.js";
-import { byId, put, showAge, showAlarms, showLamps, showRun } from "./panels.js";
-import { Nominal, Points, VERDICT, kindOf } from "./points.js";
+import { Link, OUT_OF_REACH } from "./link.js";
+import { ageWords, showBanner, showButtons, showLamps, showRun } from "./panels.js";
+import { PartView } from "./part_view.js";
+import { Scan } from "./points.js";
 import { Profile } from "./profile.js";
 import { Strip } from "./strip.js";
-import { Work } from "./work.js";
+import { Timing } from "./timing.js";
 
-const NOMINAL = 2;
+/** @import { AlarmRow, Command, Hello, Message, ShownRun } from "./protocol.js" */
+/** @import { Cursor } from "./drawing.js" */
+/** @import { LinkState, Outcome } from "./link.js" */
+/** @import { Heard } from "./panels.js" */
+
 const VIEWS = ["live", "part", "history", "ct"];
+const MOST_MAGNIFICATION = 5000;
+const SLIDER_STEPS = 1000;
+const SAID_MS = 8000; // so long the answer to a command stays
+const SILENT = ["enter", "devices"]; // commands whose success is not worth a word
 
-const told = { run: null, station: null, control: null, alarms: [], fault: false, recorded: false, nowMs: 0, nowAt: 0, version: null, remote: false };
-const points = new Points();
-const figures = new Figures();
-let nominal = null, cursor = null, waiting = false, wanted = { draw: true, words: true }, linkState = "connecting";
+/** @type {Heard} */
+const heard = { run: null, isRecorded: false, station: null, control: null, hasFault: false, isRemote: false, link: "connecting" };
+/** @type {{ nowMs: number, at: number }} */
+let clock = { nowMs: 0, at: 0 }; // the station's time of day, and when it was heard
+/** @type {readonly AlarmRow[]} */
+let alarms = [];
+let version = "";
+/** @type {Cursor | null} */
+let cursor = null;
+let isPainting = false;
+let outdated = { drawings: true, words: true };
+let saidAt = 0;
 
-const profile = new Profile(byId("profile"), () => soon("draw"));
-const strip = new Strip(byId("strip"), () => soon("draw"));
-const link = new Link(location.hash.slice(1), { onState, onBinary, onLink });
-const work = new Work(ask, start);
+const scan = new Scan();
+const timing = new Timing();
+const profile = new Profile(byId("profile"), redraw);
+const strip = new Strip(byId("strip"), redraw);
+const drawings = [profile, strip];
+const link = new Link(location.hash.slice(1), { onMessage, onBinary, onLink });
+const partView = new PartView(ask, start);
 const history = new History({
-  open: async (run) => (await ask("open", { run })).ok && go("live"),
-  replay: async (run) => (await ask("replay", { run })).ok && go("live"),
+  open: (run) => askToSee({ do: "open", run }),
+  replay: (run) => askToSee({ do: "replay", run }),
   export: download,
 });
-
-const ct = new Ct({
-  inspect: (plan) => ask("import", { plan }),
-  open: async (section) => (await ask("section", { section })).ok && go("live"),
-});
+const ctView = new CtView((plan) => ask({ do: "import", plan }), (section) => askToSee({ do: "section", section }));
 
 // What the station says.
 
-function onState(kind, content) {
-  if (kind === "hello") hello(content);
-  else if (kind === "run") newRun(content);
-  else if (kind === "station") told.station = content;
-  else if (kind === "control") told.control = content;
-  else if (kind === "alarms") [told.alarms, told.fault] = [content.alarms, content.fault];
-  else if (kind === "history") history.show(content.runs);
-  else if (kind === "ct") ct.show(content);
-  else if (kind === "alive") [told.nowMs, told.nowAt] = [content.now_ms, performance.now()];
-  soon("words");
+/** @param {Message} message */
+function onMessage(message) {
+  if (message.type === "hello") greet(message);
+  else if (message.type === "run") takeRun(message);
+  else if (message.type === "station") heard.station = message;
+  else if (message.type === "control") heard.control = message;
+  else if (message.type === "alarms") [alarms, heard.hasFault] = [message.alarms, message.fault];
+  else if (message.type === "history") history.show(message.runs);
+  else if (message.type === "ct") ctView.show(message);
+  else if (message.type === "alive") clock = { nowMs: message.now_ms, at: performance.now() };
+  rewrite();
 }
 
-// A connection begins: the station says everything anew, so that nothing heard before may stay.
-function hello(content) {
-  if (told.version !== null && told.version !== content.version) location.reload();
-  told.version = content.version;
-  told.remote = content.remote;
-  told.run = told.station = told.control = nominal = cursor = null;
-  points.clear(0);
+/**
+ * A connection begins: the station says everything anew, so that nothing heard before may stay.
+ * @param {Hello} hello
+ */
+function greet(hello) {
+  if (version && version !== hello.version) location.reload();
+  version = hello.version;
+  heard.isRemote = hello.remote;
+  heard.run = heard.station = heard.control = cursor = null;
+  scan.clear();
 }
 
-function newRun({ run, recorded }) {
-  const before = told.run;
-  told.run = run;
-  told.recorded = recorded;
-  if (run && run.phase !== "finished" && before?.number !== run.number) go("live");
-  soon("draw");
+/** @param {ShownRun} message */
+function takeRun({ run, recorded }) {
+  const isNew = run && run.phase !== "finished" && heard.run?.number !== run.number;
+  heard.run = run;
+  heard.isRecorded = recorded;
+  if (isNew) go("live");
+  redraw();
 }
 
+/** @param {ArrayBuffer} buffer */
 function onBinary(buffer) {
-  figures.bytes += buffer.byteLength;
-  if (kindOf(buffer) === NOMINAL) [nominal, cursor] = [new Nominal(buffer), null];
-  else points.take(buffer);
-  soon("draw");
+  timing.bytes += buffer.byteLength;
+  const { nominal } = scan;
+  scan.take(buffer);
+  if (scan.nominal !== nominal) cursor = null;
+  redraw();
 }
 
+/** @param {LinkState} state */
 function onLink(state) {
-  linkState = state;
-  soon("words");
+  heard.link = state;
+  rewrite();
 }
 
 // What is put on the screen, in step with it, and only when something changed.
 
-function soon(what) {
-  wanted[what] = true;
-  if (waiting) return;
-  waiting = true;
+function redraw() {
+  outdated.drawings = true;
+  paintSoon();
+}
+
+function rewrite() {
+  outdated.words = true;
+  paintSoon();
+}
+
+function paintSoon() {
+  if (isPainting) return;
+  isPainting = true;
   requestAnimationFrame(paint);
 }
 
 function paint() {
-  waiting = false;
-  const began = performance.now(), { draw, words } = wanted;
-  wanted = { draw: false, words: false };
+  isPainting = false;
+  const began = performance.now(), { drawings: mustDraw, words } = outdated;
+  outdated = { drawings: false, words: false };
   if (words) paintWords();
-  if (!draw || document.body.dataset.view !== "live") return;
-  const { run } = told;
-  if (nominal && run) {
-    for (const drawing of [profile, strip]) {
-      drawing.show(points, nominal, run.zone, run.worst);
+  if (!mustDraw || document.body.dataset.view !== "live") return;
+  paintDrawings();
+  timing.note(performance.now() - began, scan.points.newestMs);
+}
+
+function paintDrawings() {
+  const { run } = heard;
+  for (const drawing of drawings) {
+    if (!run) drawing.clear();
+    else {
+      drawing.show(scan, run.zone, run.worst);
       drawing.draw(cursor);
     }
-    put("magnification-words", `\u00d7 ${Math.round(profile.magnified)}`);
-    if (profile.magnification === null) byId("magnification").value = String(sliderOf(profile.magnified));
   }
-  figures.drew(performance.now() - began, points.newest);
+  put("magnification-words", profile.isReady ? `\u00d7 ${Math.round(profile.magnified)}` : "");
+  if (profile.isReady && profile.magnification === null) inputOf("magnification").value = String(sliderOf(profile.magnified));
 }
 
 function paintWords() {
-  const { run, station } = told;
-  const choice = station?.choice;
-  showRun(run, { part: choice?.part, plan: choice?.name, serial_number: station?.serial_number ?? "", operator: station?.operator, can_start: station?.can_start });
-  showLamps(run, told.fault, linkState === "live");
-  showAlarms(told.alarms);
-  if (station) work.show(station);
-  if (station) ct.showPlans(station.ct_plans, station.running);
-  showBanner();
-  showButtons();
-  age();
+  showRun(heard);
+  showLamps(heard);
+  showAlarms(alarms);
+  if (heard.station) {
+    partView.show(heard.station);
+    ctView.showPlans(heard.station.ct_plans, heard.station.running);
+  }
+  showBanner(heard);
+  showButtons(heard);
+  showAge();
 }
 
-function age() {
-  showAge(told.run, told.nowMs + performance.now() - told.nowAt);
+function showAge() {
+  put("age", ageWords(heard.run, clock.nowMs + performance.now() - clock.at));
 }
 
-function showBanner() {
-  const { run, control } = told;
-  const banner = (words, kind, button = "") => {
-    byId("banner").hidden = !words;
-    byId("banner").dataset.kind = kind;
-    put("banner-text", words);
-    byId("banner-button").hidden = !button;
-    put("banner-button", button);
-  };
-  document.body.dataset.stale = String(linkState !== "live");
-  if (linkState === "refused") return banner("This address is not valid any more: open the one the program printed.", "fault");
-  if (linkState === "connecting") return banner("Connecting to the station \u2026", "note");
-  if (linkState !== "live") return banner("STALE: the station does not answer. What you see is old. Trying again \u2026", "fault");
-  if (run?.link === "down" && run.phase !== "finished") return banner("LINK LOST. The device cannot be reached; trying again \u2026", "fault");
-  if (told.recorded) return banner(run?.number ?? "", "note", "Back to now");
-  if (control && !control.controls) return banner(control.taken ? "Watching: another page is in control." : "Watching: no page is in control.", "note", "Take control");
-  if (run?.remark) return banner(run.remark, "note");
-  if (told.remote) return banner("This station is open to the network: whoever knows the address can control it.", "warning");
-  banner("", "none");
-}
+/** @param {number} magnification */
+const sliderOf = (magnification) => Math.round((SLIDER_STEPS * Math.log(magnification)) / Math.log(MOST_MAGNIFICATION));
 
-function showButtons() {
-  const { station, control, run } = told;
-  const may = Boolean(control?.controls) && linkState === "live", going = Boolean(station?.running);
-  byId("start").disabled = !may || !station?.can_start;
-  byId("end").disabled = !may || !going || !run || run.phase !== "measuring";
-  byId("abort").disabled = !may || !going;
-  byId("next").disabled = !may || going;
-  byId("acknowledge").disabled = !may;
-  document.body.dataset.running = String(going);
-}
+/** @param {number} slider */
+const magnificationOf = (slider) => MOST_MAGNIFICATION ** (slider / SLIDER_STEPS);
 
 // What the operator does.
 
-async function ask(what, more = {}, silent = false) {
-  const answer = await link.ask(what, more);
-  if (!silent && what !== "enter") say(answer);
-  else if (!answer.ok) say(answer);
+/** @param {Command} command */
+async function ask(command) {
+  const answer = await link.ask(command);
+  if (!answer.ok || !SILENT.includes(command.do)) say(answer);
   return answer;
 }
 
-let saidAt = 0;
+/**
+ * Ask for a run to look at, and look at it.
+ * @param {Command} command
+ */
+async function askToSee(command) {
+  const answer = await ask(command);
+  if (answer.ok) go("live");
+}
+
+/** @param {Outcome} outcome */
 function say({ ok, message }) {
   saidAt = performance.now();
   byId("said").dataset.ok = String(ok);
@@ -170,108 +192,120 @@ function say({ ok, message }) {
 }
 
 async function start() {
-  if (document.body.dataset.view === "part" && !(await work.enter()).ok) return;
-  await ask("start");
+  if (document.body.dataset.view === "part") {
+    const answer = await partView.enter();
+    if (!answer.ok) return;
+  }
+  await ask({ do: "start" });
 }
 
+/** Save the archive of a recorded run. @param {string} run */
 async function download(run) {
-  const answer = await fetch(`/export/${encodeURIComponent(run)}`, { headers: { Authorization: `Bearer ${link.token}` } });
-  if (!answer.ok) return say({ ok: false, message: await answer.text() });
-  const address = URL.createObjectURL(await answer.blob());
-  const anchor = document.createElement("a");
+  try {
+    const answer = await fetch(`/export/${encodeURIComponent(run)}`, { headers: { Authorization: `Bearer ${link.token}` } });
+    if (!answer.ok) return say({ ok: false, message: await answer.text() });
+    save(await answer.blob(), `${run}.zip`);
+    say({ ok: true, message: `${run}.zip saved` });
+  } catch {
+    say({ ok: false, message: `${run}.zip was not saved: ${OUT_OF_REACH}` });
+  }
+}
+
+/**
+ * @param {Blob} content
+ * @param {string} name
+ */
+function save(content, name) {
+  const address = URL.createObjectURL(content), anchor = document.createElement("a");
   anchor.href = address;
-  anchor.download = `${run}.zip`;
+  anchor.download = name;
   anchor.click();
   URL.revokeObjectURL(address);
-  say({ ok: true, message: `${run}.zip saved` });
 }
 
+/** @param {string} view */
 function go(view) {
   if (!VIEWS.includes(view)) return;
   document.body.dataset.view = view;
-  for (const button of document.querySelectorAll("[data-go]")) button.toggleAttribute("aria-current", button.dataset.go === view);
-  soon("draw");
-  soon("words");
+  for (const button of viewButtons()) button.toggleAttribute("aria-current", button.dataset.go === view);
+  redraw();
+  rewrite();
 }
+
+/** @returns {NodeListOf<HTMLElement>} */
+const viewButtons = () => document.querySelectorAll("[data-go]");
 
 function nextPart() {
   go("part");
-  byId("serial").focus();
-  byId("serial").select();
+  partView.enterSerialNumber();
 }
 
+/** Leave what is in front: the list of alarms, a recorded run, a view. */
 function leave() {
-  const list = byId("alarm-list");
-  if (!list.hidden) return toggleAlarms();
-  if (told.recorded) return ask("live");
-  go("live");
+  if (heard.station?.running) ask({ do: "abort" });
+  else if (!byId("alarm-list").hidden) toggleAlarmList();
+  else if (heard.isRecorded) ask({ do: "live" });
+  else go("live");
 }
 
-function toggleAlarms() {
-  const list = byId("alarm-list");
-  list.hidden = !list.hidden;
-  byId("alarm-list-button").setAttribute("aria-expanded", String(!list.hidden));
-}
+const worstPoint = () => (heard.run ? scan.points.worst(heard.run.zone) : null);
 
-function worstPoint() {
-  const { run } = told;
-  if (!run?.worst || !points.bins) return null;
-  const middle = (run.zone.lower_mm + run.zone.upper_mm) / 2;
-  let best = null, most = -1;
-  for (let side = 0; side < 2; side++) for (let bin = 0; bin < points.bins; bin++) {
-    const far = Math.abs(points.sides[side][1][bin] - middle);
-    if (far > most) [most, best] = [far, [side, bin]];
-  }
-  return best && points.at(...best);
-}
-
-const sliderOf = (magnification) => Math.round((1000 * Math.log10(magnification)) / Math.log10(5000));
-const magnificationOf = (slider) => 5000 ** (slider / 1000);
-
-const press = (id) => () => byId(id).disabled || byId(id).hidden || byId(id).click();
-const KEYS = {
-  1: () => go("live"), 2: () => go("part"), 3: () => go("history"), 4: () => byId("tab-ct").hidden || go("ct"),
-  s: press("start"), e: press("end"), n: press("next"), a: press("acknowledge"), l: press("alarm-list-button"), t: press("test"),
-  o: () => (within("history", press("open-run")), within("ct", press("open-section"))),
-  r: () => within("history", press("replay-run")), x: () => within("history", press("export-run")), i: () => within("ct", press("import-ct")),
-};
-const within = (view, act) => document.body.dataset.view === view && act();
-
-document.addEventListener("keydown", (event) => {
-  if (event.key === "Escape") {
-    event.preventDefault();
-    if (told.station?.running) ask("abort");
-    else leave();
-    return;
-  }
-  const typing = event.target.matches("input:not([type=range]), textarea");
-  if (typing || event.ctrlKey || event.metaKey || event.altKey) return;
-  const act = KEYS[event.key.toLowerCase()];
-  if (act) {
-    event.preventDefault();
-    act();
-  }
-});
-for (const button of document.querySelectorAll("[data-go]")) button.addEventListener("click", () => go(button.dataset.go));
-byId("start").addEventListener("click", start);
-byId("end").addEventListener("click", () => ask("end"));
-byId("abort").addEventListener("click", () => ask("abort"));
-byId("next").addEventListener("click", nextPart);
-byId("acknowledge").addEventListener("click", () => ask("acknowledge"));
-byId("alarm-list-button").addEventListener("click", toggleAlarms);
-byId("banner-button").addEventListener("click", () => ask(told.recorded ? "live" : "take control"));
-byId("magnification").addEventListener("input", (event) => profile.magnify(magnificationOf(Number(event.target.value))));
-byId("magnification-auto").addEventListener("click", () => profile.magnify(null));
-const setCursor = (point) => {
+/** @param {Cursor | null} point */
+function readOut(point) {
   cursor = point;
-  profile.cursorDirty = strip.cursorDirty = true;
-  soon("draw");
+  for (const drawing of drawings) drawing.outdated.cursor = true;
+  redraw();
+}
+
+/** @param {string} id */
+const press = (id) => () => {
+  const button = buttonOf(id);
+  if (!button.disabled && !button.hidden) button.click();
 };
-listen(profile, setCursor, worstPoint);
-listen(strip, setCursor, worstPoint);
+
+/**
+ * @param {string} view
+ * @param {string} id
+ */
+const pressIn = (view, id) => () => {
+  if (document.body.dataset.view === view) press(id)();
+};
+
+/** What keys do, some of them according to the view. @type {Readonly<Record<string, (() => void)[]>>} */
+const KEYS = {
+  1: [() => go("live")], 2: [() => go("part")], 3: [() => go("history")], 4: [press("tab-ct")],
+  s: [press("start")], e: [press("end")], n: [press("next")], a: [press("acknowledge")], l: [press("alarm-list-button")],
+  t: [press("test")], o: [pressIn("history", "open-run"), pressIn("ct", "open-section")], r: [pressIn("history", "replay-run")],
+  x: [pressIn("history", "export-run")], i: [pressIn("ct", "import-ct")], escape: [leave],
+};
+
+/** @param {KeyboardEvent} event */
+function pressKey(event) {
+  const key = event.key.toLowerCase(), acts = KEYS[key];
+  const isTyping = event.target instanceof Element && event.target.matches("input:not([type=range]), textarea");
+  const isForPage = !isTyping && !event.ctrlKey && !event.metaKey && !event.altKey;
+  if (!acts || !(isForPage || key === "escape")) return;
+  event.preventDefault();
+  for (const act of acts) act();
+}
+
+document.addEventListener("keydown", pressKey);
+for (const button of viewButtons()) button.addEventListener("click", () => go(button.dataset.go ?? ""));
+buttonOf("start").addEventListener("click", start);
+buttonOf("end").addEventListener("click", () => ask({ do: "end" }));
+buttonOf("abort").addEventListener("click", () => ask({ do: "abort" }));
+buttonOf("next").addEventListener("click", nextPart);
+buttonOf("acknowledge").addEventListener("click", () => ask({ do: "acknowledge" }));
+buttonOf("alarm-list-button").addEventListener("click", toggleAlarmList);
+buttonOf("banner-button").addEventListener("click", () => ask({ do: heard.isRecorded ? "live" : "take control" }));
+inputOf("magnification").addEventListener("input", (event) => {
+  profile.magnify(magnificationOf(Number(/** @type {HTMLInputElement} */ (event.target).value)));
+});
+buttonOf("magnification-auto").addEventListener("click", () => profile.magnify(null));
+for (const drawing of drawings) listen(drawing, readOut, worstPoint);
 setInterval(() => {
-  age();
-  if (performance.now() - saidAt > 8000) put("said", "");
+  showAge();
+  if (performance.now() - saidAt > SAID_MS) put("said", "");
 }, 250);
-window.figures = () => ({ ...figures.summary(), held: points.held });
+Object.assign(window, { timing: () => ({ ...timing.summary(), held: scan.points.held }) });
 go("part");

@@ -1,124 +1,162 @@
-// The profile with its tolerance band and the deviations magnified along the normal.
+// The profile with its tolerance zone, and the deviations magnified along the normal.
 
-import { CLASSES, DEVIATION, NX, NY, STATION, VERDICT, X, Y, classOf } from "./points.js";
-import { INK, Sheet, label, mark, signed, digitsFor, wordsOf } from "./sheet.js";
+import { CONFORM, DEVIATION, FOOT_X, FOOT_Y, NORMAL_X, NORMAL_Y, NONCONFORM, VERDICT } from "./protocol.js";
+import { Drawing } from "./drawing.js";
+import { digitsFor, niceLength, signed } from "./numbers.js";
+import { CLASSES, classOf } from "./points.js";
+import { INK, label, mark } from "./sheet.js";
+
+/** @import { WorstPoint } from "./protocol.js" */
+/** @import { HeldPoint, PointClass } from "./points.js" */
+/** @import { Place } from "./drawing.js" */
+/** @import { Pen } from "./sheet.js" */
+/** @typedef {{ scale: number, x: number, y: number }} View pixels per mm, and the place of the origin on the sheet */
+/** @typedef {{ kind: PointClass, x: number, y: number }} Flag */
+/** @typedef {{ paths: Map<PointClass, Path2D>, flags: Map<string, Flag> }} Whiskers */
 
 const CELL_PX = 1.6; // whiskers closer together than this cannot be told apart
 const MARK_EVERY_PX = 9;
-const BAND_PX = 15; // half width of the tolerance band that the automatic magnification aims at
+const BAND_PX = 15; // half width of the tolerance zone that the automatic magnification aims at
+const QUAD_PX = 2.5; // length of the pieces that the tolerance zone is filled with
+const CLOSEST = 400; // most that a view enlarges the whole
 
-export class Profile {
+export class Profile extends Drawing {
+  /**
+   * @param {HTMLElement} element
+   * @param {() => void} onChange
+   */
   constructor(element, onChange) {
-    this.name = "profile";
-    this.element = element;
-    this.onChange = onChange;
-    this.sheet = new Sheet(element, () => this.refit());
-    this.magnification = null; // null: chosen by itself
-    this.view = null; // null: all of it
+    super("profile", element, onChange);
+    /** Chosen by the operator; null: chosen by the page. @type {number | null} */
+    this.magnification = null;
+    /** Null: all of the profile. @type {View | null} */
+    this.view = null;
+    /** @type {View} */
+    this.all = { scale: 1, x: 0, y: 0 };
+    this.drawnAt = 1; // the magnification of what stands on the sheet
   }
 
-  touch() {
-    this.groundDirty = this.marksDirty = this.cursorDirty = true;
-    this.onChange?.();
+  lookAtAll() {
+    this.view = null;
+    this.all = this.whole();
   }
 
-  refit() {
-    if (this.nominal && this.sheet.width) this.all = this.whole();
-    this.touch();
+  resize() {
+    this.all = this.whole();
+    super.resize();
   }
 
-  show(points, nominal, zone, worst) {
-    if (nominal !== this.nominal || zone.lower_mm !== this.zone?.lower_mm || zone.upper_mm !== this.zone?.upper_mm) {
-      if (nominal !== this.nominal) this.view = null;
-      this.nominal = nominal;
-      this.zone = zone;
-      this.all = this.whole();
-      this.groundDirty = true;
-    }
-    this.points = points;
-    this.worst = worst;
-    if (this.magnified !== this.drawnAt) this.groundDirty = true;
-    this.drawnAt = this.magnified;
-    this.marksDirty = this.cursorDirty = true;
-  }
-
-  // The view that shows the whole nominal with room for whiskers: pixels per mm and the place of the origin.
+  /** The view that shows the whole nominal with room for whiskers. @returns {View} */
   whole() {
-    const { sheet } = this, [x0, y0, x1, y1] = this.nominal.box;
-    const room = Math.min(sheet.width, sheet.height) * 0.04 + 3.2 * BAND_PX;
-    const scale = Math.min((sheet.width - 2 * room) / Math.max(x1 - x0, 1e-9), (sheet.height - 2 * room) / Math.max(y1 - y0, 1e-9));
-    return { scale, x: sheet.width / 2 - ((x0 + x1) / 2) * scale, y: sheet.height / 2 + ((y0 + y1) / 2) * scale };
+    const { width, height } = this.sheet, [x0, y0, x1, y1] = this.nominal.box;
+    const room = Math.min(width, height) * 0.04 + 3.2 * BAND_PX;
+    const scale = Math.min((width - 2 * room) / Math.max(x1 - x0, 1e-9), (height - 2 * room) / Math.max(y1 - y0, 1e-9));
+    return { scale, x: width / 2 - ((x0 + x1) / 2) * scale, y: height / 2 + ((y0 + y1) / 2) * scale };
   }
 
   get seen() {
     return this.view ?? this.all;
   }
 
-  // The band as wide as BAND_PX asks for, unless the worst deviation would then leave the sheet.
+  /** How much larger deviations are drawn than the part. */
+  get magnified() {
+    return this.magnification ?? this.autoMagnification;
+  }
+
+  // The zone as wide as BAND_PX asks for, unless the worst deviation would then leave the sheet.
   get autoMagnification() {
     const half = (this.zone.upper_mm - this.zone.lower_mm) / 2, most = 0.3 * Math.min(this.sheet.width, this.sheet.height);
     const worst = Math.max(Math.abs(this.worst?.deviation_mm ?? 0), 1e-9);
     return Math.max(1, Math.min(BAND_PX / half, most / worst) / this.all.scale);
   }
 
-  get magnified() {
-    return this.magnification ?? this.autoMagnification;
+  /** @param {number | null} magnification */
+  magnify(magnification) {
+    this.magnification = magnification;
+    this.touch();
   }
 
-  draw(cursor) {
-    if (!this.nominal || !this.sheet.width || !this.all) return;
-    if (this.groundDirty) this.drawGround();
-    if (this.groundDirty || this.marksDirty) this.drawMarks();
-    if (this.groundDirty || this.marksDirty || this.cursorDirty) this.drawCursor(cursor);
-    this.groundDirty = this.marksDirty = this.cursorDirty = false;
+  rescale() {
+    const before = this.drawnAt;
+    this.drawnAt = this.magnified;
+    return before !== this.drawnAt;
   }
 
+  /** @param {number} x */
   px(x) {
     return this.seen.x + x * this.seen.scale;
   }
 
+  /** @param {number} y */
   py(y) {
     return this.seen.y - y * this.seen.scale;
   }
 
-  // The nominal moved along its outward normal, as a path on the sheet.
-  offset(path, distance) {
-    const { x, y, nx, ny, rows, closed } = this.nominal;
-    let up = true;
-    for (let k = 0; k < rows; k++) {
-      if (x[k] !== x[k]) {
-        up = true;
-        continue;
-      }
-      const [px, py] = [this.px(x[k] + distance * nx[k]), this.py(y[k] + distance * ny[k])];
-      if (up) path.moveTo(px, py);
-      else path.lineTo(px, py);
-      up = false;
+  /** @param {Pen} pen */
+  drawGround(pen) {
+    const lower = this.zone.lower_mm * this.drawnAt, upper = this.zone.upper_mm * this.drawnAt;
+    this.fillZone(pen, lower, upper);
+    pen.strokeStyle = INK.limit;
+    pen.lineWidth = 1;
+    pen.setLineDash([7, 5]);
+    pen.stroke(this.offset(lower));
+    pen.stroke(this.offset(upper));
+    pen.setLineDash([]);
+    pen.strokeStyle = INK.line;
+    pen.lineWidth = 1.75;
+    pen.stroke(this.offset(0));
+    this.drawRuler(pen);
+  }
+
+  /**
+   * Where a sample of the nominal lies on the sheet, moved along its outward normal.
+   * @param {number} k
+   * @param {number} distance
+   * @returns {Place}
+   */
+  moved(k, distance) {
+    const { x, y, nx, ny } = this.nominal;
+    return [this.px(x[k] + distance * nx[k]), this.py(y[k] + distance * ny[k])];
+  }
+
+  /**
+   * The nominal moved along its outward normal, as a path on the sheet.
+   * @param {number} distance
+   */
+  offset(distance) {
+    const path = new Path2D();
+    for (const [first, last] of this.nominal.pieces) {
+      path.moveTo(...this.moved(first, distance));
+      for (let k = first + 1; k <= last; k++) path.lineTo(...this.moved(k, distance));
     }
-    if (closed && !x.some((value) => value !== value)) path.closePath();
+    if (this.nominal.closed) path.closePath();
     return path;
   }
 
-  // Where along the nominal each sample's band quadrilateral lies; filled one by one so that loops of the offset do no harm.
-  band(pen, lower, upper) {
-    const { x, y, nx, ny, rows, closed } = this.nominal;
+  /**
+   * Fill the tolerance zone quadrilateral by quadrilateral, so that loops of the limits do no harm.
+   * @param {Pen} pen
+   * @param {number} lower
+   * @param {number} upper
+   */
+  fillZone(pen, lower, upper) {
     const path = new Path2D();
-    const put = (k, l) => {
-      path.moveTo(this.px(x[k] + lower * nx[k]), this.py(y[k] + lower * ny[k]));
-      path.lineTo(this.px(x[k] + upper * nx[k]), this.py(y[k] + upper * ny[k]));
-      path.lineTo(this.px(x[l] + upper * nx[l]), this.py(y[l] + upper * ny[l]));
-      path.lineTo(this.px(x[l] + lower * nx[l]), this.py(y[l] + lower * ny[l]));
+    const add = (/** @type {number} */ k, /** @type {number} */ l) => {
+      path.moveTo(...this.moved(k, lower));
+      path.lineTo(...this.moved(k, upper));
+      path.lineTo(...this.moved(l, upper));
+      path.lineTo(...this.moved(l, lower));
       path.closePath();
     };
-    let from = 0;
-    for (let k = 1; k < rows; k++) {
-      if (x[k] !== x[k]) from = k + 1;
-      else if (k > from && this.far(from, k) > 2.5) {
-        put(from, k);
+    for (const [first, last] of this.nominal.pieces) {
+      let from = first;
+      for (let k = first + 1; k <= last; k++) {
+        if (k < last && this.apart(from, k) <= QUAD_PX) continue;
+        add(from, k);
         from = k;
       }
+      if (this.nominal.closed) add(last, first);
     }
-    put(from, closed && !x.some((value) => value !== value) ? 0 : rows - 1);
     pen.fillStyle = INK.band;
     pen.fill(path, "nonzero");
     pen.strokeStyle = INK.band;
@@ -126,180 +164,173 @@ export class Profile {
     pen.stroke(path);
   }
 
-  far(k, l) {
+  /**
+   * How far two samples are apart on the sheet, and how much the normal turns between them.
+   * @param {number} k
+   * @param {number} l
+   */
+  apart(k, l) {
     const { x, y, nx, ny } = this.nominal;
-    const turned = Math.abs(nx[k] * ny[l] - ny[k] * nx[l]) * 40;
-    return Math.hypot(x[k] - x[l], y[k] - y[l]) * this.seen.scale + turned;
+    const turn = Math.abs(nx[k] * ny[l] - ny[k] * nx[l]) * 40;
+    return Math.hypot(x[k] - x[l], y[k] - y[l]) * this.seen.scale + turn;
   }
 
-  drawGround() {
-    const { zone, sheet } = this, pen = sheet.pen("ground"), m = this.magnified;
-    this.band(pen, zone.lower_mm * m, zone.upper_mm * m);
-    pen.strokeStyle = INK.limit;
-    pen.lineWidth = 1;
-    pen.setLineDash([7, 5]);
-    pen.stroke(this.offset(new Path2D(), zone.lower_mm * m));
-    pen.stroke(this.offset(new Path2D(), zone.upper_mm * m));
-    pen.setLineDash([]);
-    pen.strokeStyle = INK.line;
-    pen.lineWidth = 1.75;
-    pen.stroke(this.offset(new Path2D(), 0));
-    this.drawRuler(pen);
-  }
-
-  // A length on the part and, magnified, a length of deviation: what the eye needs to read the drawing.
+  /**
+   * A length on the part: what the eye needs to read the drawing.
+   * @param {Pen} pen
+   */
   drawRuler(pen) {
-    const { sheet, zone } = this, y = sheet.height - sheet.text * 1.1;
-    const wanted = (sheet.width * 0.14) / this.seen.scale;
-    const power = 10 ** Math.floor(Math.log10(wanted));
-    const length = power * (wanted / power >= 5 ? 5 : wanted / power >= 2 ? 2 : 1);
-    const x = sheet.text, wide = length * this.seen.scale;
+    const { sheet } = this, length = niceLength((sheet.width * 0.14) / this.seen.scale);
+    const left = sheet.text, right = left + length * this.seen.scale, y = sheet.height - sheet.text * 1.1;
     pen.strokeStyle = INK.soft;
     pen.lineWidth = 1.5;
     pen.beginPath();
-    pen.moveTo(x, y - 5);
-    pen.lineTo(x, y);
-    pen.lineTo(x + wide, y);
-    pen.lineTo(x + wide, y - 5);
+    pen.moveTo(left, y - 5);
+    pen.lineTo(left, y);
+    pen.lineTo(right, y);
+    pen.lineTo(right, y - 5);
     pen.stroke();
     pen.fillStyle = INK.soft;
     pen.textAlign = "left";
     pen.textBaseline = "middle";
-    pen.fillText(`${+length.toPrecision(3)} mm`, x + wide + 8, y - 3);
+    pen.fillText(`${Number(length.toPrecision(3))} mm`, right + 8, y - 3);
   }
 
-  drawMarks() {
-    const { sheet, points, nominal, zone } = this, pen = sheet.pen("marks");
-    if (!points?.bins) return;
-    const m = this.magnified, paths = {}, flags = new Map();
+  /** @param {Pen} pen */
+  drawPoints(pen) {
+    const { points, nominal } = this, [low, high] = points.sides;
+    /** @type {Whiskers} */
+    const whiskers = { paths: new Map(), flags: new Map() };
     const perCell = Math.max(1, Math.floor((CELL_PX / this.seen.scale / nominal.length) * points.bins));
-    const [low, high] = points.sides;
-    for (let start = 0; start < points.bins; start += perCell) {
-      let [least, most] = [-1, -1];
-      for (let bin = start; bin < Math.min(start + perCell, points.bins); bin++) {
-        if (low[DEVIATION][bin] !== low[DEVIATION][bin]) continue;
-        if (least < 0 || low[DEVIATION][bin] < low[DEVIATION][least]) least = bin;
-        if (most < 0 || high[DEVIATION][bin] > high[DEVIATION][most]) most = bin;
-      }
-      if (least < 0) continue;
-      if (low[DEVIATION][least] < 0 || least === most || low[VERDICT][least] > 0) this.whisker(paths, flags, low, least, m);
-      if (high[DEVIATION][most] >= 0 || high[VERDICT][most] > 0) this.whisker(paths, flags, high, most, m);
+    for (let first = 0; first < points.bins; first += perCell) {
+      const extremes = this.extremes(first, Math.min(first + perCell, points.bins));
+      if (!extremes) continue;
+      const { lowest, highest } = extremes, isOne = lowest === highest;
+      if (low[DEVIATION][lowest] < 0 || isOne || low[VERDICT][lowest] !== CONFORM) this.addWhisker(whiskers, low, lowest);
+      if (high[DEVIATION][highest] >= 0 || high[VERDICT][highest] !== CONFORM) this.addWhisker(whiskers, high, highest);
     }
     for (const kind of CLASSES) {
-      if (!paths[kind]) continue;
       pen.strokeStyle = INK[kind];
       pen.lineWidth = 2; // no gaps between neighbours: the deviations read as one shape
-      pen.stroke(paths[kind]);
+      pen.stroke(whiskers.paths.get(kind) ?? new Path2D());
     }
-    for (const [kind, x, y, size] of flags.values()) mark(pen, kind, x, y, size);
-    if (this.worst) this.drawWorst(pen, m);
+    for (const { kind, x, y } of whiskers.flags.values()) mark(pen, kind, x, y, 4.5);
   }
 
-  whisker(paths, flags, side, bin, m) {
-    const deviation = side[DEVIATION][bin], verdict = side[VERDICT][bin];
-    const [fx, fy] = [this.px(side[X][bin]), this.py(side[Y][bin])];
-    const [tx, ty] = [fx + m * deviation * side[NX][bin] * this.seen.scale, fy - m * deviation * side[NY][bin] * this.seen.scale];
+  /**
+   * The bins with the lowest and the highest deviation among some; null where none holds a point.
+   * @param {number} first
+   * @param {number} end
+   */
+  extremes(first, end) {
+    const low = this.points.sides[0][DEVIATION], high = this.points.sides[1][DEVIATION];
+    let lowest = -1, highest = -1;
+    for (let bin = first; bin < end; bin++) {
+      if (this.points.isEmpty(bin)) continue;
+      if (lowest < 0 || low[bin] < low[lowest]) lowest = bin;
+      if (highest < 0 || high[bin] > high[highest]) highest = bin;
+    }
+    return lowest < 0 ? null : { lowest, highest };
+  }
+
+  /**
+   * @param {Whiskers} whiskers
+   * @param {Float32Array[]} side
+   * @param {number} bin
+   */
+  addWhisker({ paths, flags }, side, bin) {
+    const [fx, fy] = this.foot(side, bin), [tx, ty] = this.tip(side, bin);
     const { width, height } = this.sheet;
     if (Math.max(fx, tx) < -20 || Math.min(fx, tx) > width + 20 || Math.max(fy, ty) < -20 || Math.min(fy, ty) > height + 20) return;
-    const kind = classOf(deviation, verdict, this.zone);
-    const path = (paths[kind] ??= new Path2D());
+    const kind = classOf(side[DEVIATION][bin], side[VERDICT][bin], this.zone), path = paths.get(kind) ?? new Path2D();
+    paths.set(kind, path);
     path.moveTo(fx, fy);
     path.lineTo(tx, ty);
-    if (verdict < 1) return;
+    if (side[VERDICT][bin] === CONFORM) return;
     const place = `${Math.round(tx / MARK_EVERY_PX)} ${Math.round(ty / MARK_EVERY_PX)}`;
-    if (!flags.has(place)) flags.set(place, [kind, tx, ty, 4.5]);
+    if (!flags.has(place)) flags.set(place, { kind, x: tx, y: ty });
   }
 
-  tip(point) {
-    const m = this.magnified, at = this.nearestSample(point.station_mm);
-    const [nx, ny] = [this.nominal.nx[at], this.nominal.ny[at]];
-    const [x, y] = [point.x_mm - point.deviation_mm * nx, point.y_mm - point.deviation_mm * ny];
-    return [this.px(x + m * point.deviation_mm * nx), this.py(y + m * point.deviation_mm * ny)];
+  /**
+   * Where the foot of a point lies on the sheet.
+   * @param {Float32Array[]} side
+   * @param {number} bin
+   * @returns {Place}
+   */
+  foot(side, bin) {
+    return [this.px(side[FOOT_X][bin]), this.py(side[FOOT_Y][bin])];
   }
 
-  nearestSample(station) {
-    let [best, least] = [0, Infinity];
-    this.nominal.station.forEach((value, k) => {
-      const far = Math.abs(value - station);
-      if (far < least) [least, best] = [far, k];
-    });
-    return best;
+  /**
+   * Where a point lies on the sheet, its deviation magnified.
+   * @param {Float32Array[]} side
+   * @param {number} bin
+   * @returns {Place}
+   */
+  tip(side, bin) {
+    const far = this.drawnAt * side[DEVIATION][bin];
+    return [this.px(side[FOOT_X][bin] + far * side[NORMAL_X][bin]), this.py(side[FOOT_Y][bin] + far * side[NORMAL_Y][bin])];
   }
 
-  drawWorst(pen) {
-    const { worst, zone, sheet } = this, [x, y] = this.tip(worst);
-    if (x < 0 || y < 0 || x > sheet.width || y > sheet.height) return;
-    pen.strokeStyle = INK.text;
-    pen.lineWidth = 2;
-    pen.beginPath();
-    pen.arc(x, y, 9, 0, 7);
-    pen.stroke();
-    const ink = worst.verdict === "nonconform" ? INK[classOf(worst.deviation_mm, 2, zone)] : INK.limit;
-    label(pen, this.sheet, `${signed(worst.deviation_mm, digitsFor(zone))} mm at ${worst.station_mm.toFixed(2)} mm`, x, y, ink, true);
-  }
-
-  drawCursor(cursor) {
-    const pen = this.sheet.pen("cursor");
-    if (!cursor) return;
-    const [x, y] = this.place(cursor);
-    pen.strokeStyle = INK.text;
-    pen.lineWidth = 1.5;
-    pen.beginPath();
-    pen.arc(x, y, 6, 0, 7);
-    pen.stroke();
-    if (cursor.by === "profile") label(pen, this.sheet, wordsOf(cursor, this.zone), x, y, INK.text);
-  }
-
+  /** @param {HeldPoint} point */
   place(point) {
-    const side = this.points.sides[point.side], m = this.magnified * point.deviation;
-    return [this.px(side[X][point.bin] + m * side[NX][point.bin]), this.py(side[Y][point.bin] + m * side[NY][point.bin])];
+    return this.tip(this.points.sides[point.side], point.bin);
   }
 
-  nearest(x, y) {
-    const { points } = this;
-    if (!points?.bins) return null;
-    const m = this.magnified, { scale } = this.seen;
-    let best = null, least = Infinity;
-    for (let s = 0; s < 2; s++) {
-      const side = points.sides[s];
-      for (let bin = 0; bin < points.bins; bin++) {
-        const deviation = side[DEVIATION][bin];
-        if (deviation !== deviation) continue;
-        const [fx, fy] = [this.px(side[X][bin]) - x, this.py(side[Y][bin]) - y];
-        const [wx, wy] = [m * deviation * side[NX][bin] * scale, -m * deviation * side[NY][bin] * scale];
-        const along = Math.min(1, Math.max(0, -(fx * wx + fy * wy) / (wx * wx + wy * wy || 1)));
-        const far = (fx + along * wx) ** 2 + (fy + along * wy) ** 2;
-        if (far < least) [least, best] = [far, [s, bin]];
-      }
-    }
-    return best && points.at(...best);
+  /**
+   * @param {WorstPoint} worst
+   * @returns {Place}
+   */
+  placeOfWorst(worst) {
+    const { nx, ny } = this.nominal, k = this.nominal.nearest(worst.station_mm);
+    const more = (this.drawnAt - 1) * worst.deviation_mm; // the point itself lies one deviation away from its foot
+    return [this.px(worst.x_mm + more * nx[k]), this.py(worst.y_mm + more * ny[k])];
   }
 
-  zoom(factor, x, y) {
-    const seen = this.seen, scale = Math.min(Math.max(seen.scale / factor, this.all.scale), this.all.scale * 400);
+  /**
+   * @param {Pen} pen
+   * @param {WorstPoint} worst
+   * @param {Place} place
+   */
+  drawWorst(pen, worst, place) {
+    if (!this.holds(place)) return;
+    super.drawWorst(pen, worst, place);
+    const ink = worst.verdict === "nonconform" ? INK[classOf(worst.deviation_mm, NONCONFORM, this.zone)] : INK.limit;
+    const words = `${signed(worst.deviation_mm, digitsFor(this.zone))} mm at ${worst.station_mm.toFixed(2)} mm`;
+    label(pen, this.sheet, words, ...place, ink, true);
+  }
+
+  /**
+   * Squared distance of a place from a point's whisker.
+   * @param {number} side
+   * @param {number} bin
+   * @param {Place} place
+   */
+  distance(side, bin, [x, y]) {
+    const columns = this.points.sides[side], [fx, fy] = this.foot(columns, bin), [tx, ty] = this.tip(columns, bin);
+    const [wx, wy] = [tx - fx, ty - fy];
+    const along = Math.min(1, Math.max(0, ((x - fx) * wx + (y - fy) * wy) / (wx * wx + wy * wy || 1)));
+    return (fx + along * wx - x) ** 2 + (fy + along * wy - y) ** 2;
+  }
+
+  /**
+   * @param {number} factor
+   * @param {Place} place
+   */
+  zoom(factor, [x, y]) {
+    const { seen, all } = this, scale = Math.min(Math.max(seen.scale / factor, all.scale), all.scale * CLOSEST);
     const share = scale / seen.scale;
-    this.view = scale === this.all.scale ? null : { scale, x: x - (x - seen.x) * share, y: y - (y - seen.y) * share };
+    this.view = scale === all.scale ? null : { scale, x: x - (x - seen.x) * share, y: y - (y - seen.y) * share };
     this.touch();
   }
 
-  pan(dx, dy = 0) {
-    if (!this.view) this.view = { ...this.all };
-    this.view = { ...this.view, x: this.view.x - dx, y: this.view.y - dy };
-    this.touch();
-  }
-
-  fit() {
-    this.view = null;
-    this.touch();
-  }
-
-  reveal(point) {
-    const [x, y] = this.place(point), { width, height } = this.sheet;
-    if (x < 0 || x > width || y < 0 || y > height) this.pan(x - width / 2, y - height / 2);
-  }
-
-  magnify(magnification) {
-    this.magnification = magnification;
+  /**
+   * @param {number} dx
+   * @param {number} dy
+   */
+  pan(dx, dy) {
+    const { scale, x, y } = this.seen;
+    this.view = { scale, x: x - dx, y: y - dy };
     this.touch();
   }
 }

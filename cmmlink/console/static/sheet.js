@@ -1,27 +1,33 @@
-// A stack of canvases with a shared size: what changes rarely below, what changes often above. And the palette.
+// A stack of canvases with a shared size: what changes rarely below, what changes often above. And what is drawn on them alike.
 
+/** @import { PointClass } from "./points.js" */
+/** @typedef {CanvasRenderingContext2D} Pen */
+/** @typedef {"ground" | "marks" | "cursor"} Layer */
+
+/** @type {Layer[]} */
 const LAYERS = ["ground", "marks", "cursor"];
 
 export const INK = {
   text: "#1b2733", soft: "#5a6b7b", faint: "#c9d2da", line: "#22313f", band: "#e3eeea", limit: "#6d8f84", ground: "#ffffff",
-  in: "#3f9483", near: "#8a7a10", unsure: "#b37400", over: "#c2410c", under: "#1d5fae", gap: "#d9dfe5",
+  in: "#3f9483", near: "#8a7a10", "not-proven": "#b37400", over: "#c2410c", under: "#1d5fae", gap: "#d9dfe5",
 };
 
 export class Sheet {
+  /**
+   * @param {HTMLElement} element
+   * @param {() => void} onResize
+   */
   constructor(element, onResize) {
     this.element = element;
-    this.layers = {};
-    for (const name of LAYERS) {
-      const canvas = document.createElement("canvas");
-      element.append(canvas);
-      this.layers[name] = canvas.getContext("2d");
-    }
     this.width = this.height = 0;
+    this.ratio = 1;
+    this.text = 11; // size of letters, px
+    this.layers = new Map(LAYERS.map((layer) => [layer, addCanvas(element)]));
+    this.fit();
     new ResizeObserver(() => {
       this.fit();
       onResize();
     }).observe(element);
-    this.fit();
   }
 
   fit() {
@@ -30,35 +36,58 @@ export class Sheet {
     this.width = Math.floor(box.width);
     this.height = Math.floor(box.height);
     this.text = Math.max(11, Math.round(parseFloat(getComputedStyle(document.documentElement).fontSize) * 0.86));
-    for (const pen of Object.values(this.layers)) {
+    for (const pen of this.layers.values()) {
       pen.canvas.width = this.width * this.ratio;
       pen.canvas.height = this.height * this.ratio;
     }
   }
 
+  /**
+   * The pen of a layer, which is empty again.
+   * @param {Layer} layer
+   */
   pen(layer) {
-    const pen = this.layers[layer];
+    const pen = /** @type {Pen} */ (this.layers.get(layer));
     pen.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
     pen.clearRect(0, 0, this.width, this.height);
     pen.font = `${this.text}px ${getComputedStyle(document.body).fontFamily}`;
     pen.lineJoin = "round";
     return pen;
   }
+
+  clear() {
+    for (const layer of LAYERS) this.pen(layer);
+  }
 }
 
-// Marks by class: what is out of tolerance has a shape of its own, so that colour is never alone.
-export function mark(pen, kind, x, y, size, up = -1) {
+/** @param {HTMLElement} element */
+function addCanvas(element) {
+  const canvas = document.createElement("canvas"), pen = canvas.getContext("2d");
+  if (!pen) throw new Error("this browser cannot draw");
+  element.append(canvas);
+  return pen;
+}
+
+/**
+ * Mark a point by its class: what is out of tolerance has a shape of its own, so that colour is never alone.
+ * @param {Pen} pen
+ * @param {PointClass} kind
+ * @param {number} x
+ * @param {number} y
+ * @param {number} size
+ */
+export function mark(pen, kind, x, y, size) {
   pen.beginPath();
-  if (kind === "unsure") {
+  if (kind === "not-proven") {
     pen.moveTo(x, y - size);
     pen.lineTo(x + size, y);
     pen.lineTo(x, y + size);
     pen.lineTo(x - size, y);
   } else {
-    const tip = kind === "under" ? -up : up;
-    pen.moveTo(x, y + tip * size);
-    pen.lineTo(x + size, y - tip * size * 0.8);
-    pen.lineTo(x - size, y - tip * size * 0.8);
+    const up = kind === "under" ? 1 : -1;
+    pen.moveTo(x, y + up * size);
+    pen.lineTo(x + size, y - up * size * 0.8);
+    pen.lineTo(x - size, y - up * size * 0.8);
   }
   pen.closePath();
   pen.fillStyle = INK[kind];
@@ -68,7 +97,31 @@ export function mark(pen, kind, x, y, size, up = -1) {
   pen.stroke();
 }
 
-// A label that stays inside the sheet, on a ground of its own.
+/**
+ * A ring around a point.
+ * @param {Pen} pen
+ * @param {number} x
+ * @param {number} y
+ * @param {number} radius
+ * @param {number} width
+ */
+export function ring(pen, x, y, radius, width) {
+  pen.strokeStyle = INK.text;
+  pen.lineWidth = width;
+  pen.beginPath();
+  pen.arc(x, y, radius, 0, 2 * Math.PI);
+  pen.stroke();
+}
+
+/**
+ * Words beside a place, on a ground of their own and always inside the sheet.
+ * @param {Pen} pen
+ * @param {Sheet} sheet
+ * @param {string} words
+ * @param {number} x
+ * @param {number} y
+ * @param {string} ink
+ */
 export function label(pen, sheet, words, x, y, ink, strong = false) {
   const lines = words.split("\n");
   const font = pen.font;
@@ -90,25 +143,4 @@ export function label(pen, sheet, words, x, y, ink, strong = false) {
   pen.textBaseline = "middle";
   lines.forEach((line, k) => pen.fillText(line, left + pad, top + pad / 2 + high * (k + 0.5)));
   pen.font = font;
-}
-
-// Steps of 1, 2 or 5 times a power of ten, about `count` of them over a span.
-export function niceStep(span, count) {
-  const rough = span / Math.max(count, 1);
-  const power = 10 ** Math.floor(Math.log10(rough));
-  const share = rough / power;
-  return power * (share > 5 ? 10 : share > 2 ? 5 : share > 1 ? 2 : 1);
-}
-
-export function signed(value, digits = 4) {
-  const words = Math.abs(value).toFixed(digits);
-  return (Number(words) === 0 ? "" : value > 0 ? "+" : "\u2212") + words;
-}
-
-// Enough digits to tell limits and deviations of this size apart.
-export const digitsFor = (zone) => (zone.upper_mm - zone.lower_mm < 0.02 ? 5 : 4);
-
-export function wordsOf(point, zone) {
-  const word = ["CONFORM", "NOT PROVEN", "NOT CONFORM"][point.verdict] ?? "";
-  return `${signed(point.deviation, digitsFor(zone))} mm  ${word}\nstation ${point.station.toFixed(2)} mm\nx ${point.x.toFixed(3)}  y ${point.y.toFixed(3)}`;
 }

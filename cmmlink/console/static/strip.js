@@ -1,84 +1,117 @@
 // Deviation against station: per pixel column the lowest and the highest point, so that no spike is hidden.
 
-import { DEVIATION, NONCONFORM, STATION, UNCERTAIN, VERDICT, classOf } from "./points.js";
-import { INK, Sheet, label, mark, niceStep, signed, wordsOf } from "./sheet.js";
+import { CONFORM, DEVIATION, STATION, VERDICT } from "./protocol.js";
+import { Drawing } from "./drawing.js";
+import { niceStep, signed } from "./numbers.js";
+import { classOf, middleOf } from "./points.js";
+import { INK, mark } from "./sheet.js";
+
+/** @import { WorstPoint } from "./protocol.js" */
+/** @import { HeldPoint, PointClass } from "./points.js" */
+/** @import { Cursor, Place } from "./drawing.js" */
+/** @import { Pen } from "./sheet.js" */
+/** @typedef {{ column: number, deviation: number, verdict: number }} Flag */
 
 const MARK_EVERY_PX = 9;
+const MEASURED_PX = 4; // height of the line at the foot that shows where something was measured
 
-export class Strip {
+export class Strip extends Drawing {
+  /**
+   * @param {HTMLElement} element
+   * @param {() => void} onChange
+   */
   constructor(element, onChange) {
-    this.sheet = new Sheet(element, () => this.touch());
-    this.onChange = onChange;
-    this.name = "strip";
-    this.element = element;
-    this.from = 0;
+    super("strip", element, onChange);
+    this.from = 0; // stations at the left and at the right edge
     this.to = 1;
+    this.low = this.high = 0; // deviations at the lower and at the upper edge
+    this.left = this.right = this.top = this.bottom = 0; // edges in pixels
   }
 
-  touch() {
-    this.groundDirty = this.marksDirty = this.cursorDirty = true;
-    this.onChange?.();
+  lookAtAll() {
+    [this.from, this.to] = [0, this.nominal.length];
   }
 
-  show(points, nominal, zone, worst) {
-    if (nominal !== this.nominal || zone.lower_mm !== this.zone?.lower_mm || zone.upper_mm !== this.zone?.upper_mm || zone.uncertainty_mm !== this.zone?.uncertainty_mm) {
-      if (nominal !== this.nominal) [this.from, this.to] = [0, nominal.length];
-      this.nominal = nominal;
-      this.zone = zone;
-      this.groundDirty = true;
-    }
-    this.points = points;
-    this.worst = worst;
-    this.marksDirty = this.cursorDirty = true;
-  }
-
-  draw(cursor) {
-    if (!this.nominal || !this.sheet.width) return;
-    if (this.scale()) this.groundDirty = true;
-    if (this.groundDirty) this.drawGround();
-    if (this.groundDirty || this.marksDirty) this.drawMarks();
-    if (this.groundDirty || this.marksDirty || this.cursorDirty) this.drawCursor(cursor);
-    this.groundDirty = this.marksDirty = this.cursorDirty = false;
-  }
-
-  // Where things stand on the sheet; true when the scale changed.
-  scale() {
-    const { zone, worst, sheet } = this;
-    const half = (zone.upper_mm - zone.lower_mm) / 2, middle = (zone.lower_mm + zone.upper_mm) / 2;
-    const far = worst ? 1.18 * (worst.deviation_mm - middle) : 0;
-    const low = middle - Math.max(1.5 * half, -far), high = middle + Math.max(1.5 * half, far);
-    const changed = low !== this.low || high !== this.high;
-    Object.assign(this, { low, high, middle });
+  rescale() {
+    const { zone, worst, sheet, low, high } = this, middle = middleOf(zone);
+    const room = 0.75 * (zone.upper_mm - zone.lower_mm), far = worst ? 1.18 * (worst.deviation_mm - middle) : 0;
+    this.low = middle - Math.max(room, -far);
+    this.high = middle + Math.max(room, far);
     this.left = sheet.text * 5.2;
     this.right = sheet.width - sheet.text * 1.2;
     this.top = 6;
     this.bottom = sheet.height - sheet.text * 2.3;
-    return changed;
+    return low !== this.low || high !== this.high;
   }
 
+  /** @param {number} station */
   px(station) {
     return this.left + ((station - this.from) / (this.to - this.from)) * (this.right - this.left);
   }
 
+  /** @param {number} deviation */
   py(deviation) {
     return this.bottom - ((deviation - this.low) / (this.high - this.low)) * (this.bottom - this.top);
   }
 
-  drawGround() {
-    const { sheet, zone } = this, pen = sheet.pen("ground");
-    const [low, high] = [this.py(zone.lower_mm), this.py(zone.upper_mm)];
+  /**
+   * @param {HeldPoint} point
+   * @returns {Place}
+   */
+  place(point) {
+    return [this.px(point.station), this.py(point.deviation)];
+  }
+
+  /**
+   * @param {WorstPoint} worst
+   * @returns {Place}
+   */
+  placeOfWorst(worst) {
+    return [this.px(worst.station_mm), this.py(worst.deviation_mm)];
+  }
+
+  /** @param {Place} place */
+  holds([x]) {
+    return x >= this.left && x <= this.right;
+  }
+
+  /** @param {Pen} pen */
+  drawGround(pen) {
+    const { zone, sheet } = this, lower = this.py(zone.lower_mm), upper = this.py(zone.upper_mm);
     pen.fillStyle = INK.band;
-    pen.fillRect(this.left, high, this.right - this.left, low - high);
+    pen.fillRect(this.left, upper, this.right - this.left, lower - upper);
     this.rule(pen, 0, INK.faint, []);
-    for (const [limit, name] of [[zone.upper_mm, "upper"], [zone.lower_mm, "lower"]]) {
+    for (const limit of [zone.upper_mm, zone.lower_mm]) {
       this.rule(pen, limit, INK.limit, [7, 5]);
-      this.yLabel(pen, limit, signed(limit, 3), INK.text, name);
+      if (!zone.uncertainty_mm) continue;
+      for (const side of [-1, 1]) this.rule(pen, limit + side * zone.uncertainty_mm, INK["not-proven"], [2, 4]);
     }
-    if (zone.uncertainty_mm) for (const limit of [zone.upper_mm, zone.lower_mm]) for (const side of [-1, 1]) this.rule(pen, limit + side * zone.uncertainty_mm, INK.unsure, [2, 4]);
-    if (Math.abs(this.py(0) - high) > sheet.text * 1.4 && Math.abs(this.py(0) - low) > sheet.text * 1.4) this.yLabel(pen, 0, "0", INK.soft);
+    this.labelLimits(pen, lower, upper);
+    const isFree = [lower, upper].every((limit) => Math.abs(this.py(0) - limit) > sheet.text * 1.4);
+    if (isFree) this.yLabel(pen, this.py(0), "0", INK.soft);
     this.drawStations(pen);
   }
 
+  /**
+   * The limits by value and name, the names outside the zone; apart from each other however narrow the zone is drawn.
+   * @param {Pen} pen
+   * @param {number} lower
+   * @param {number} upper
+   */
+  labelLimits(pen, lower, upper) {
+    const { zone, sheet } = this, line = sheet.text * 1.15, apart = Math.max(0, line - (lower - upper)) / 2;
+    this.yLabel(pen, upper - apart, signed(zone.upper_mm, 3), INK.text);
+    this.yLabel(pen, upper - apart - line, "upper", INK.soft);
+    this.yLabel(pen, lower + apart, signed(zone.lower_mm, 3), INK.text);
+    this.yLabel(pen, lower + apart + line, "lower", INK.soft);
+  }
+
+  /**
+   * @param {Pen} pen
+   * @param {number} deviation
+   * @param {string} ink
+   * @param {number[]} dash
+   */
   rule(pen, deviation, ink, dash) {
     const y = Math.round(this.py(deviation)) + 0.5;
     pen.setLineDash(dash);
@@ -91,13 +124,20 @@ export class Strip {
     pen.setLineDash([]);
   }
 
-  yLabel(pen, deviation, words, ink) {
+  /**
+   * @param {Pen} pen
+   * @param {number} y
+   * @param {string} words
+   * @param {string} ink
+   */
+  yLabel(pen, y, words, ink) {
     pen.fillStyle = ink;
     pen.textAlign = "right";
     pen.textBaseline = "middle";
-    pen.fillText(words, this.left - 8, this.py(deviation));
+    pen.fillText(words, this.left - 8, y);
   }
 
+  /** @param {Pen} pen */
   drawStations(pen) {
     const { sheet } = this;
     const step = niceStep(this.to - this.from, (this.right - this.left) / (sheet.text * 7));
@@ -119,137 +159,173 @@ export class Strip {
     pen.fillText("mm", this.right, this.bottom + 8);
   }
 
-  // Bins that can fall into the view, one to each side more.
+  /** Bins that can fall into the view, one to each side more. @returns {[number, number]} */
   range() {
     const { points, nominal } = this;
-    const bin = (station) => Math.floor((station / nominal.length) * points.bins);
+    const bin = (/** @type {number} */ station) => Math.floor((station / nominal.length) * points.bins);
     return [Math.max(0, bin(this.from) - 1), Math.min(points.bins - 1, bin(this.to) + 1)];
   }
 
-  drawMarks() {
-    const { sheet, points, zone } = this, pen = sheet.pen("marks");
-    if (!points?.bins) return;
-    const wide = Math.ceil(this.right - this.left) + 1;
-    const low = new Float32Array(wide).fill(Infinity), high = new Float32Array(wide).fill(-Infinity);
-    const lowVerdict = new Uint8Array(wide), highVerdict = new Uint8Array(wide);
-    const [first, last] = this.range(), flagged = [];
-    for (let side = 0; side < 2; side++) {
-      const [station, deviation, verdict] = [STATION, DEVIATION, VERDICT].map((c) => points.sides[side][c]);
+  /** @param {Pen} pen */
+  drawPoints(pen) {
+    const columns = new Columns(Math.ceil(this.right - this.left) + 1), [first, last] = this.range();
+    /** @type {Flag[]} */
+    const flags = [];
+    for (const side of this.points.sides) {
+      const [stations, deviations, verdicts] = [side[STATION], side[DEVIATION], side[VERDICT]];
       for (let bin = first; bin <= last; bin++) {
-        const value = deviation[bin];
-        if (value !== value || station[bin] < this.from || station[bin] > this.to) continue;
-        const column = Math.round(this.px(station[bin]) - this.left);
-        if (value < low[column]) [low[column], lowVerdict[column]] = [value, verdict[bin]];
-        if (value > high[column]) [high[column], highVerdict[column]] = [value, verdict[bin]];
-        if (verdict[bin] === NONCONFORM || verdict[bin] === UNCERTAIN) flagged.push([column, value, verdict[bin]]);
+        const deviation = deviations[bin], verdict = verdicts[bin];
+        if (Number.isNaN(deviation) || stations[bin] < this.from || stations[bin] > this.to) continue;
+        const column = Math.round(this.px(stations[bin]) - this.left);
+        columns.add(column, deviation, verdict);
+        if (verdict !== CONFORM) flags.push({ column, deviation, verdict });
       }
     }
-    this.drawColumns(pen, low, high, lowVerdict, highVerdict);
-    this.drawFlags(pen, flagged);
-    if (this.worst) this.drawWorst(pen);
+    this.drawColumns(pen, columns);
+    this.drawMeasured(pen, columns);
+    this.drawFlags(pen, flags);
   }
 
-  drawColumns(pen, low, high, lowVerdict, highVerdict) {
-    const { zone } = this, paths = {}, half = this.to - this.from < this.nominal.length / 4 ? 1.5 : 1; // few points: larger dots
-    for (let column = 0; column < low.length; column++) {
-      if (high[column] < low[column]) continue;
-      const above = Math.abs(high[column] - this.middle) > Math.abs(low[column] - this.middle);
-      const kind = above ? classOf(high[column], highVerdict[column], zone) : classOf(low[column], lowVerdict[column], zone);
-      const path = (paths[kind] ??= new Path2D());
-      const top = this.py(high[column]) - half, bottom = this.py(low[column]) + half;
+  /**
+   * @param {Pen} pen
+   * @param {Columns} columns
+   */
+  drawColumns(pen, columns) {
+    const half = this.to - this.from < this.nominal.length / 4 ? 1.5 : 1; // few points: larger dots
+    /** @type {Map<PointClass, Path2D>} */
+    const paths = new Map();
+    for (const column of columns.filled()) {
+      const { deviation, verdict } = columns.farthest(column, middleOf(this.zone)), kind = classOf(deviation, verdict, this.zone);
+      const path = paths.get(kind) ?? new Path2D();
+      paths.set(kind, path);
+      const top = this.py(columns.high[column]) - half, bottom = this.py(columns.low[column]) + half;
       path.rect(this.left + column - 0.75 * half, top, 1.5 * half, bottom - top);
     }
-    for (const [kind, path] of Object.entries(paths)) {
+    for (const [kind, path] of paths) {
       pen.fillStyle = INK[kind];
       pen.fill(path);
     }
-    pen.fillStyle = INK.gap; // where nothing was measured yet, the foot of the strip stays empty
-    pen.fillRect(this.left, this.bottom - 4, this.right - this.left, 4);
+  }
+
+  /**
+   * A line at the foot, filled where something was measured.
+   * @param {Pen} pen
+   * @param {Columns} columns
+   */
+  drawMeasured(pen, columns) {
+    const top = this.bottom - MEASURED_PX;
+    pen.fillStyle = INK.gap;
+    pen.fillRect(this.left, top, this.right - this.left, MEASURED_PX);
     pen.fillStyle = INK.in;
-    for (let column = 0; column < low.length; column++) if (high[column] >= low[column]) pen.fillRect(this.left + column - 1, this.bottom - 4, 3, 4);
+    for (const column of columns.filled()) pen.fillRect(this.left + column - 1, top, 3, MEASURED_PX);
   }
 
-  // Shapes on what is not proven to be good: the farthest of every few pixels, so that shapes stay readable.
-  drawFlags(pen, flagged) {
+  /**
+   * Shapes on what is not proven to be good: the farthest of every few pixels, so that shapes stay readable.
+   * @param {Pen} pen
+   * @param {Flag[]} flags
+   */
+  drawFlags(pen, flags) {
+    const middle = middleOf(this.zone);
+    /** @type {Map<string, Flag>} */
     const farthest = new Map();
-    for (const one of flagged) {
-      const place = `${Math.floor(one[0] / MARK_EVERY_PX)} ${one[1] > this.middle}`;
-      const known = farthest.get(place);
-      if (!known || Math.abs(one[1] - this.middle) > Math.abs(known[1] - this.middle)) farthest.set(place, one);
+    for (const flag of flags) {
+      const place = `${Math.floor(flag.column / MARK_EVERY_PX)} ${flag.deviation > middle}`, known = farthest.get(place);
+      if (!known || Math.abs(flag.deviation - middle) > Math.abs(known.deviation - middle)) farthest.set(place, flag);
     }
-    for (const [column, value, verdict] of farthest.values()) mark(pen, classOf(value, verdict, this.zone), this.left + column, this.py(value), 5);
-  }
-
-  drawWorst(pen) {
-    const { worst } = this;
-    if (worst.station_mm < this.from || worst.station_mm > this.to) return;
-    const [x, y] = [this.px(worst.station_mm), this.py(worst.deviation_mm)];
-    pen.strokeStyle = INK.text;
-    pen.lineWidth = 2;
-    pen.beginPath();
-    pen.arc(x, y, 8, 0, 7);
-    pen.stroke();
-  }
-
-  drawCursor(cursor) {
-    const pen = this.sheet.pen("cursor");
-    if (!cursor || cursor.station < this.from || cursor.station > this.to) return;
-    const [x, y] = [this.px(cursor.station), this.py(cursor.deviation)];
-    pen.strokeStyle = INK.text;
-    pen.lineWidth = 1;
-    pen.beginPath();
-    pen.moveTo(x, this.top);
-    pen.lineTo(x, this.bottom);
-    pen.stroke();
-    pen.beginPath();
-    pen.arc(x, y, 4.5, 0, 7);
-    pen.stroke();
-    if (cursor.by === "strip") label(pen, this.sheet, wordsOf(cursor, this.zone), x, y, INK.text);
-  }
-
-  // The held point nearest to a place on the sheet.
-  nearest(x, y) {
-    const { points } = this;
-    if (!points?.bins) return null;
-    const [first, last] = this.range();
-    let best = null, least = Infinity;
-    for (let side = 0; side < 2; side++) {
-      const [station, deviation] = [points.sides[side][STATION], points.sides[side][DEVIATION]];
-      for (let bin = first; bin <= last; bin++) {
-        if (deviation[bin] !== deviation[bin]) continue;
-        const far = 4 * (this.px(station[bin]) - x) ** 2 + (this.py(deviation[bin]) - y) ** 2;
-        if (far < least) [least, best] = [far, [side, bin]];
-      }
+    for (const { column, deviation, verdict } of farthest.values()) {
+      mark(pen, classOf(deviation, verdict, this.zone), this.left + column, this.py(deviation), 5);
     }
-    return best && points.at(...best);
   }
 
-  zoom(factor, x) {
-    const at = this.from + ((x - this.left) / (this.right - this.left)) * (this.to - this.from);
+  /**
+   * @param {Pen} pen
+   * @param {Cursor | null} cursor
+   */
+  drawCursor(pen, cursor) {
+    if (cursor && this.holds(this.place(cursor))) {
+      const [x] = this.place(cursor);
+      pen.strokeStyle = INK.text;
+      pen.lineWidth = 1;
+      pen.beginPath();
+      pen.moveTo(x, this.top);
+      pen.lineTo(x, this.bottom);
+      pen.stroke();
+    }
+    super.drawCursor(pen, cursor);
+  }
+
+  /**
+   * A pixel along the station counts twice a pixel of deviation.
+   * @param {number} side
+   * @param {number} bin
+   * @param {Place} place
+   */
+  distance(side, bin, [x, y]) {
+    const columns = this.points.sides[side];
+    return 4 * (this.px(columns[STATION][bin]) - x) ** 2 + (this.py(columns[DEVIATION][bin]) - y) ** 2;
+  }
+
+  /**
+   * @param {number} factor
+   * @param {Place} place
+   */
+  zoom(factor, [x]) {
+    const share = (x - this.left) / (this.right - this.left), at = this.from + share * (this.to - this.from);
     const span = Math.min(Math.max((this.to - this.from) * factor, this.nominal.length / 2000), this.nominal.length);
-    this.look(at - ((at - this.from) / (this.to - this.from)) * span, span);
+    this.look(at - share * span, span);
   }
 
-  pan(px) {
-    this.look(this.from + (px / (this.right - this.left)) * (this.to - this.from), this.to - this.from);
+  /** @param {number} dx */
+  pan(dx) {
+    this.look(this.from + (dx / (this.right - this.left)) * (this.to - this.from), this.to - this.from);
   }
 
+  /**
+   * @param {number} from
+   * @param {number} span
+   */
   look(from, span) {
     this.from = Math.min(Math.max(from, 0), this.nominal.length - span);
     this.to = this.from + span;
     this.touch();
   }
+}
 
-  fit() {
-    if (this.nominal) this.look(0, this.nominal.length);
+/** The lowest and the highest point of every pixel column. */
+export class Columns {
+  /** @param {number} count */
+  constructor(count) {
+    this.low = new Float32Array(count).fill(Infinity);
+    this.high = new Float32Array(count).fill(-Infinity);
+    this.lowVerdict = new Uint8Array(count);
+    this.highVerdict = new Uint8Array(count);
   }
 
-  reveal(point) {
-    const span = this.to - this.from;
-    if (point.station < this.from || point.station > this.to) this.look(point.station - span / 2, span);
+  /**
+   * @param {number} column
+   * @param {number} deviation
+   * @param {number} verdict
+   */
+  add(column, deviation, verdict) {
+    if (deviation < this.low[column]) [this.low[column], this.lowVerdict[column]] = [deviation, verdict];
+    if (deviation > this.high[column]) [this.high[column], this.highVerdict[column]] = [deviation, verdict];
   }
 
-  place(point) {
-    return [this.px(point.station), this.py(point.deviation)];
+  /** Columns that hold a point. */
+  *filled() {
+    for (let column = 0; column < this.low.length; column++) if (this.high[column] >= this.low[column]) yield column;
+  }
+
+  /**
+   * The point of a column that is farther from the middle of the zone.
+   * @param {number} column
+   * @param {number} middle
+   */
+  farthest(column, middle) {
+    const isHigh = Math.abs(this.high[column] - middle) > Math.abs(this.low[column] - middle);
+    return isHigh
+      ? { deviation: this.high[column], verdict: this.highVerdict[column] }
+      : { deviation: this.low[column], verdict: this.lowVerdict[column] };
   }
 }

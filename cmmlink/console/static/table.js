@@ -1,31 +1,54 @@
 // A table whose rows are chosen by arrows or mouse and opened by Enter or a double click.
 
-import { SHAPES, WORDS } from "./panels.js";
+import { showSymbol, within } from "./dom.js";
+import { digitsFor, signed } from "./numbers.js";
+import { WORDS_OF_VERDICTS } from "./protocol.js";
+import { shapeOf } from "./verdicts.js";
 
+/** @import { RunRow } from "./protocol.js" */
+
+const PAGE = 10;
+
+/** @template Item */
 export class Table {
-  // rowOf(item) gives the cells of a row; open(item, place) opens one.
+  /**
+   * @param {HTMLElement} element
+   * @param {(item: Item) => HTMLElement[]} rowOf gives the cells of a row
+   * @param {(item: Item, place: number) => void} open
+   */
   constructor(element, rowOf, open) {
-    Object.assign(this, { element, rowOf, open, items: [], at: 0 });
-    element.addEventListener("keydown", (event) => this.key(event));
+    this.element = element;
+    this.rowOf = rowOf;
+    this.open = open;
+    /** @type {readonly Item[]} */
+    this.items = [];
+    this.at = 0;
+    element.addEventListener("keydown", (event) => this.act(event));
   }
 
+  /** @returns {Item | undefined} */
   get chosen() {
     return this.items[this.at];
   }
 
   openChosen() {
-    if (this.chosen) this.open(this.chosen, this.at);
+    if (this.chosen !== undefined) this.open(this.chosen, this.at);
   }
 
-  key(event) {
-    const last = this.items.length - 1;
-    const to = { ArrowDown: this.at + 1, ArrowUp: this.at - 1, Home: 0, End: last, PageDown: this.at + 10, PageUp: this.at - 10 }[event.key];
-    if (to !== undefined) {
+  /** @param {KeyboardEvent} event */
+  act(event) {
+    const { at } = this, last = this.items.length - 1;
+    const targets = new Map([
+      ["ArrowDown", at + 1], ["ArrowUp", at - 1], ["PageDown", at + PAGE], ["PageUp", at - PAGE], ["Home", 0], ["End", last],
+    ]);
+    const target = targets.get(event.key);
+    if (target !== undefined) {
       event.preventDefault();
-      this.point(Math.min(Math.max(to, 0), last));
+      this.point(Math.min(Math.max(target, 0), last));
     } else if (event.key === "Enter") this.openChosen();
   }
 
+  /** @param {number} at */
   point(at) {
     this.at = at;
     const rows = this.element.querySelectorAll("tbody tr");
@@ -33,9 +56,10 @@ export class Table {
     rows[at]?.scrollIntoView({ block: "nearest" });
   }
 
+  /** @param {readonly Item[]} items */
   show(items, at = 0) {
     this.items = items;
-    this.element.querySelector("tbody").replaceChildren(...items.map((item, k) => {
+    within(this.element, "tbody").replaceChildren(...items.map((item, k) => {
       const row = document.createElement("tr");
       row.append(...this.rowOf(item));
       row.addEventListener("click", () => this.point(k));
@@ -46,6 +70,7 @@ export class Table {
   }
 }
 
+/** @param {string} words */
 export function cell(words, kind = "") {
   const element = document.createElement("td");
   element.className = kind;
@@ -53,12 +78,23 @@ export function cell(words, kind = "") {
   return element;
 }
 
+/** @param {RunRow["verdict"]} verdict */
 export function verdictCell(verdict) {
-  const word = WORDS[verdict], shape = word ? SHAPES[word] : "none";
-  const element = cell("", "said-verdict");
+  const word = verdict && WORDS_OF_VERDICTS[verdict], shape = word ? shapeOf(word) : "none";
+  const element = cell("", "verdict-cell");
   element.dataset.verdict = shape;
   element.innerHTML = '<svg class="shape" aria-hidden="true"><use/></svg>';
-  element.querySelector("use").setAttribute("href", `#shape-${shape}`);
+  showSymbol(element, `shape-${shape}`);
   element.append(word ?? "no verdict");
   return element;
+}
+
+/**
+ * The worst deviation of a run or section and its station, in two cells.
+ * @param {Pick<RunRow, "worst_mm" | "worst_station_mm" | "lower_mm" | "upper_mm">} run
+ */
+export function worstCells({ worst_mm, worst_station_mm, lower_mm, upper_mm }) {
+  if (worst_mm === null || worst_station_mm === null) return [cell(""), cell("")];
+  const digits = digitsFor({ lower_mm: lower_mm ?? 0, upper_mm: upper_mm ?? 0 });
+  return [cell(signed(worst_mm, digits), "number"), cell(worst_station_mm.toFixed(2), "number")];
 }

@@ -48,7 +48,7 @@ def millimetres(words: str | None) -> float:
 def test_count_rises_and_a_good_part_conforms(bench: Bench, keep: Keep) -> None:
     page = bench.started()
     points = batches(measured(bench.profile, 2000, seed=1), 50)
-    expect(page.locator("#lamp-link")).to_contain_text("opening")
+    expect(page.locator("#lamp-link")).to_contain_text("connecting")
     bench.device.source.put(opened(2000), *points[:20])
     expect(page.locator("#received")).to_have_text("1,000")
     expect(page.locator("#lamp-link")).to_contain_text("up")
@@ -426,7 +426,7 @@ def test_history_is_listed_opened_replayed_and_exported(make_bench: MakeBench, t
     verdicts = ["NOT CONFORM" if defect_mm else "CONFORM" for defect_mm in reversed(defects)]
     expect(page.locator("#runs tbody td:first-child")).to_have_text(verdicts)
     expect(page.locator("#runs tbody td:nth-child(3)")).to_have_text(["B-0044", "B-0043", "B-0042", "B-0041"])
-    expect(page.locator("#chart-words")).to_have_text("4 parts, 2 not conform; newest at the right")
+    expect(page.locator("#chart-words")).to_have_text("4 parts, 2 NOT CONFORM; newest at the right")
     keep(page, "history")
     page.locator("#runs").focus()
     for _ in range(2):

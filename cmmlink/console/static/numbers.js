@@ -1,0 +1,46 @@
+// How numbers are written on the page, and where the steps of an axis lie.
+
+/** @import { ZoneLimits } from "./protocol.js" */
+
+const COUNT = new Intl.NumberFormat("en");
+
+/** @param {number} value */
+export const count = (value) => COUNT.format(value);
+
+/**
+ * A number with its sign; what is zero at the digits shown has none.
+ * @param {number} value
+ */
+export function signed(value, digits = 4) {
+  const words = Math.abs(value).toFixed(digits);
+  if (Number(words) === 0) return words;
+  return (value > 0 ? "+" : "\u2212") + words;
+}
+
+/**
+ * Enough digits to tell limits and deviations of this size apart.
+ * @param {Pick<ZoneLimits, "lower_mm" | "upper_mm">} zone
+ */
+export const digitsFor = (zone) => (zone.upper_mm - zone.lower_mm < 0.02 ? 5 : 4);
+
+/**
+ * Steps of 1, 2 or 5 times a power of ten, at most `most` of them over a span.
+ * @param {number} span
+ * @param {number} most
+ */
+export function niceStep(span, most) {
+  const rough = span / Math.max(most, 1), power = powerOfTen(rough);
+  return power * ([1, 2, 5].find((digit) => rough <= digit * power) ?? 10);
+}
+
+/**
+ * The greatest length of 1, 2 or 5 times a power of ten that is not above `most`.
+ * @param {number} most
+ */
+export function niceLength(most) {
+  const power = powerOfTen(most);
+  return power * ([5, 2].find((digit) => most >= digit * power) ?? 1);
+}
+
+/** @param {number} value */
+const powerOfTen = (value) => 10 ** Math.floor(Math.log10(value));

@@ -1,0 +1,134 @@
+// The part view: choose a plan, see that it can be run, enter the part, test the device.
+
+import { buttonOf, byId, inputOf, make, put } from "./dom.js";
+import { List } from "./list.js";
+
+/** @import { ChosenPlan, Command, Device, StationState } from "./protocol.js" */
+/** @import { Outcome } from "./link.js" */
+
+const TEST_SIGNS = { none: "", testing: "\u2026 ", passed: "\u2713 ", failed: "\u2715 " };
+
+export class PartView {
+  /**
+   * @param {(command: Command) => Promise<Outcome>} ask
+   * @param {() => void} start
+   */
+  constructor(ask, start) {
+    this.ask = ask;
+    this.list = new List(byId("plans"), (name) => this.choose(name));
+    this.shownChoice = "";
+    /** The plan whose serial number is to be entered next, once the station has told it. */
+    this.entering = "";
+    byId("entry").addEventListener("submit", (event) => {
+      event.preventDefault();
+      start();
+    });
+    for (const id of ["serial", "operator", "address"]) byId(id).addEventListener("change", () => this.enter());
+    buttonOf("test").addEventListener("click", () => this.test());
+    byId("address").addEventListener("focus", () => this.lookForDevices());
+  }
+
+  enter() {
+    const [serial_number, operator, address] = ["serial", "operator", "address"].map((id) => inputOf(id).value);
+    return this.ask({ do: "enter", serial_number, operator, address });
+  }
+
+  async test() {
+    const answer = await this.enter();
+    if (answer.ok) await this.ask({ do: "test" });
+  }
+
+  async lookForDevices() {
+    const answer = await this.ask({ do: "devices" });
+    if (!answer.ok) return;
+    /** @type {Device[]} */
+    const devices = JSON.parse(answer.message);
+    byId("devices").replaceChildren(...devices.map(({ address, description }) => new Option(description, address)));
+  }
+
+  /** @param {string} name */
+  async choose(name) {
+    const answer = await this.ask({ do: "choose", plan: name });
+    if (answer.ok) this.entering = name;
+  }
+
+  /** @param {StationState} station */
+  show(station) {
+    const { choice, running } = station;
+    byId("no-plans").hidden = station.plans.length > 0;
+    this.list.show(station.plans, choice?.name ?? "", Boolean(choice?.problem));
+    this.showChoice(choice);
+    this.showEntry("serial", station.serial_number, running);
+    this.showEntry("operator", station.operator, running);
+    this.showEntry("address", station.address, running);
+    byId("address-label").hidden = !choice?.has_address;
+    const { state, message } = station.test;
+    byId("test-result").dataset.state = state;
+    put("test-result", state === "none" ? "" : TEST_SIGNS[state] + message);
+    buttonOf("test").disabled = running;
+    buttonOf("start-part").disabled = !station.can_start;
+    this.enterNext(station);
+  }
+
+  /**
+   * Put into an input what the station says, once: what the operator types is not overwritten.
+   * @param {string} id
+   * @param {string} value
+   * @param {boolean} isRunning
+   */
+  showEntry(id, value, isRunning) {
+    const input = inputOf(id);
+    input.disabled = isRunning;
+    if (input.dataset.shown === value) return;
+    input.value = input.dataset.shown = value;
+    if (input === document.activeElement) input.select(); // so that typing replaces what was suggested
+  }
+
+  /**
+   * The cursor goes to the serial number once what belongs to the plan stands there, so that nothing typed is overwritten.
+   * @param {StationState} station
+   */
+  enterNext(station) {
+    if (!this.entering || this.entering !== station.choice?.name || !station.can_start) return;
+    this.entering = "";
+    this.enterSerialNumber();
+  }
+
+  enterSerialNumber() {
+    inputOf("serial").focus();
+    inputOf("serial").select();
+  }
+
+  /** @param {ChosenPlan | null} choice */
+  showChoice(choice) {
+    const shown = JSON.stringify(choice);
+    if (shown === this.shownChoice) return;
+    this.shownChoice = shown;
+    const { state, words } = checkOf(choice);
+    byId("check").dataset.state = state;
+    put("check-word", words);
+    const facts = choice?.facts ?? [];
+    byId("check-facts").replaceChildren(...facts.flatMap(([name, value]) => [make("dt", name), make("dd", value)]));
+    this.showText(choice?.text ?? "", choice?.line ?? null);
+  }
+
+  /**
+   * The text of the plan, its wrong line marked.
+   * @param {string} text
+   * @param {number | null} wrong
+   */
+  showText(text, wrong) {
+    const lines = text ? text.replace(/\n$/, "").split("\n").map((line) => make("li", line)) : [];
+    const line = wrong === null ? undefined : lines[wrong - 1];
+    line?.classList.add("wrong");
+    byId("plan-text").replaceChildren(...lines);
+    line?.scrollIntoView({ block: "center" });
+  }
+}
+
+/** @param {ChosenPlan | null} choice */
+function checkOf(choice) {
+  if (!choice) return { state: "none", words: "No plan is chosen." };
+  if (choice.problem) return { state: "bad", words: `\u2715 Cannot be run: ${choice.problem}` };
+  return { state: "good", words: `\u2713 ${choice.name} can be run.` };
+}

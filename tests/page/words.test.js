@@ -1,0 +1,65 @@
+// What the page says: the banner, the word before a run, how far values can move, and which alarm.
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { alarmWords } from "../../cmmlink/console/static/alarms.js";
+import { CODE_OF, shapeOf, wordOf } from "../../cmmlink/console/static/verdicts.js";
+import { ageWords, bannerOf, moveWords, readiness } from "../../cmmlink/console/static/panels.js";
+
+const HEARD = { run: null, isRecorded: false, station: null, control: null, hasFault: false, isRemote: false, link: "live" };
+const RUN = { number: "run 7", phase: "measuring", link: "up", remark: "" };
+
+test("the most urgent thing stands in the banner", () => {
+  const lost = { ...RUN, link: "down" };
+  const watching = { controls: false, taken: true };
+  assert.equal(bannerOf(HEARD).words, "");
+  assert.match(bannerOf({ ...HEARD, link: "refused", run: lost }).words, /not valid/);
+  assert.match(bannerOf({ ...HEARD, link: "stale", run: lost }).words, /STALE/);
+  assert.match(bannerOf({ ...HEARD, link: "away" }).words, /STALE/);
+  assert.match(bannerOf({ ...HEARD, run: lost, control: watching }).words, /LINK LOST/);
+  assert.equal(bannerOf({ ...HEARD, run: { ...lost, phase: "finished" } }).words, "");
+  assert.deepEqual(bannerOf({ ...HEARD, run: RUN, isRecorded: true }), { words: "run 7", kind: "note", button: "Back to live" });
+  assert.match(bannerOf({ ...HEARD, control: watching }).words, /another page is in control/);
+  assert.match(bannerOf({ ...HEARD, control: { ...watching, taken: false } }).words, /no page is in control/);
+  assert.equal(bannerOf({ ...HEARD, run: { ...RUN, remark: "identical" }, isRemote: true }).words, "identical");
+  assert.match(bannerOf({ ...HEARD, run: RUN, isRemote: true }).words, /open to the network/);
+});
+
+test("values move by nothing only where the registration is final", () => {
+  assert.equal(moveWords(undefined), "\u2013");
+  assert.equal(moveWords({ state: "seeking", can_move_mm: null, other_poses: 0 }), "\u2013");
+  assert.equal(moveWords({ state: "provisional", can_move_mm: 0.0123, other_poses: 0 }), "\u00b112.3 \u00b5m");
+  assert.equal(moveWords({ state: "provisional", can_move_mm: 0.25, other_poses: 0 }), "\u00b10.25 mm");
+  assert.equal(moveWords({ state: "settled", can_move_mm: 0, other_poses: 0 }), "nothing: final");
+  assert.equal(moveWords({ state: "settled", can_move_mm: 0, other_poses: 1 }), "final, but 1 other pose fits as well");
+  assert.equal(moveWords({ state: "settled", can_move_mm: 0, other_poses: 2 }), "final, but 2 other poses fit as well");
+});
+
+test("before a run the page says whether one can be started", () => {
+  assert.equal(readiness(null).word, "NO PLAN");
+  assert.equal(readiness({ can_start: true, choice: { name: "a.yaml" } }).word, "READY");
+  assert.equal(readiness({ can_start: false, choice: { name: "a.yaml" } }).why, "a.yaml cannot be run");
+});
+
+test("the age of the newest verdict is never negative", () => {
+  const run = { phase: "measuring", verdict_at_ms: 5000 };
+  assert.equal(ageWords(null, 0), "\u2013");
+  assert.equal(ageWords({ ...run, verdict_at_ms: null }, 0), "\u2013");
+  assert.equal(ageWords(run, 4000), "0.0 s ago");
+  assert.equal(ageWords(run, 6234), "1.2 s ago");
+  assert.equal(ageWords(run, 65_400), "60 s ago");
+  assert.match(ageWords({ ...run, phase: "finished" }, 9000), /^at \d\d:\d\d:\d\d$/);
+});
+
+test("an alarm that came more than once says how often", () => {
+  assert.equal(alarmWords({ what: "Link lost", count: 1, detail: "the port is gone" }), "Link lost: the port is gone");
+  assert.equal(alarmWords({ what: "Data lost", count: 1200, detail: "gap" }), "Data lost (1,200): gap");
+});
+
+test("each verdict has a word and a shape of its own", () => {
+  assert.deepEqual([0, 1, 2].map(wordOf), ["CONFORM", "NOT PROVEN", "NOT CONFORM"]);
+  assert.deepEqual([0, 1, 2].map(wordOf).map(shapeOf), ["conform", "not-proven", "not-conform"]);
+  assert.deepEqual(CODE_OF, { conform: 0, uncertain: 1, nonconform: 2 });
+  assert.equal(wordOf(7), "");
+});
