@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from inspection.box_tree import box_tree
 from inspection.curve import NurbsCurve, left_limit
 from inspection.errors import NominalError
-from inspection.kernels import VERTEX_WIDTH
+from inspection.kernels.layout import VERTEX_WIDTH
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -14,8 +14,9 @@ from typing import get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inspection.inversion import INSIDE, OPEN_END, invert_points
+from inspection.inversion import invert_points
 from inspection.kernels import Feet, project, project_on_samples
+from inspection.kernels.layout import INSIDE, OPEN_END
 from inspection.methods import Method
 from inspection.nominal import NominalProfile
 

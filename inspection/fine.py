@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from inspection.coarse import check_registrable, coarse_poses, trimmed_mean_square
 from inspection.deviations import feet_on
-from inspection.inversion import OPEN_END
-from inspection.kernels import Fit, OutlierLimit, PoseFit, project
+from inspection.kernels import OutlierLimit, PoseEstimate, PoseFit, project
+from inspection.kernels.layout import OPEN_END
 from inspection.methods import Method
 from inspection.nominal import NominalProfile
 from inspection.registration import Registration
@@ -155,9 +155,9 @@ def _pose_numbers(pose: RigidTransform) -> tuple[float, float, float]:
     return (pose.rotation_rad, float(pose.translation_mm[0]), float(pose.translation_mm[1]))
 
 
-def _pose_of(fit: Fit) -> RigidTransform:
+def _pose_of(fit: PoseEstimate) -> RigidTransform:
     return RigidTransform(fit.pose[0], np.array(fit.pose[1:]))
 
 
-def _registration(fit: Fit, iterations: int, converged: bool, outliers: NDArray[np.bool_]) -> Registration:
+def _registration(fit: PoseEstimate, iterations: int, converged: bool, outliers: NDArray[np.bool_]) -> Registration:
     return Registration(_pose_of(fit), math.sqrt(fit.mean_square), iterations, converged, fit.covariance, fit.centre_mm, (), outliers)

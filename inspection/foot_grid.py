@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from inspection.curve import NurbsCurve
 from inspection.curve_pieces import CurvePieces, cut_into_pieces, derivative_bounds, piece_tree
-from inspection.kernels import BLOCK_LEVEL, FAR, LISTED, MOST_BRANCHES
+from inspection.kernels.layout import BLOCK_LEVEL, FAR, LISTED, MOST_BRANCHES
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from inspection.curve import NurbsCurve, unit_vectors
 from inspection.kernels import Feet
+from inspection.kernels.layout import CORNER, INSIDE, OPEN_END
 from inspection.nominal import NominalProfile
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-INSIDE, CORNER, OPEN_END = 0, 1, 2  # kinds of feet, as `Feet.vertex` holds them
 _MOST_STEPS = 20
 _STANDSTILL_MM = 1e-13
 

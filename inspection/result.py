@@ -6,6 +6,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from inspection.kernels import layout
 from inspection.methods import Method
 from inspection.nominal import NominalProfile
 from inspection.registration import Registration
@@ -13,7 +14,7 @@ from inspection.tolerance import ToleranceZone, Verdict
 
 Array = NDArray[np.float64]
 
-NOT_JUDGED = -1  # in place of a verdict where a point was rejected, or is not judged yet
+NOT_JUDGED = layout.NOT_JUDGED  # in place of a verdict where a point was rejected, or is not judged yet
 _GAP = 3.0  # a gap of more than this many median spacings is not measured
 _FINEST_GAP = 0.02  # share of the length; gaps below it always count as measured
 _WIDEST_GAP = 0.1  # share of the length; gaps above it never do, however few the points
@@ -22,11 +23,11 @@ _WIDEST_GAP = 0.1  # share of the length; gaps above it never do, however few th
 class Rejection(IntEnum):
     """Why a received point was not judged."""
 
-    NONE = 0
-    NOT_FINITE = 1
-    OFF_SECTION = 2
-    BEYOND_END = 3
-    OUTLIER = 4
+    NONE = layout.NOT_REJECTED
+    NOT_FINITE = layout.NOT_FINITE
+    OFF_SECTION = layout.OFF_SECTION
+    BEYOND_END = layout.BEYOND_END
+    OUTLIER = layout.OUTLIER
 
     @property
     def words(self) -> str:

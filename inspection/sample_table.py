@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from inspection.box_tree import box_tree
 from inspection.curve import NurbsCurve
-from inspection.kernels import LEAF
+from inspection.kernels.layout import LEAF
 from inspection.voronoi import SitePoles
 
 Array = NDArray[np.float64]

@@ -38,7 +38,10 @@ PROMISED_NAMES = [
     "fit_minimum_zone",
 ]
 GRAB_BAGS = {"utils", "util", "helpers", "helper", "common", "base", "manager", "types", "misc", "core"}
-LIBRARIES_IN_ONE_FILE = {"serial": {"drivers/links/serial_scanner.py"}, "numba": {"inspection/kernels.py"}}
+LIBRARIES_IN_ONE_FILE = {
+    "serial": {"drivers/links/serial_scanner.py"},
+    "numba": {"inspection/kernels/compiling.py"},
+}
 
 
 def tracked() -> list[Path]:

@@ -22,14 +22,14 @@ from rich.progress import track
 from inspection import NominalProfile, NurbsCurve, Registration, RigidTransform, register_coarse, register_fine
 from inspection.coarse import mean_square
 from inspection.deviations import feet_on
-from inspection.inversion import OPEN_END
-from inspection.kernels import compile_kernels
+from inspection.kernels.layout import OPEN_END
 from inspection.methods import Method
 from inspection.rigid import best_motion
 from inspection.synthetic import even_stations
 from tests.benchmarks import published_method
 from tests.benchmarks.machine import machine
 from tests.benchmarks.parts import Missing, best_place, cross_section, curves, farthest_mm, nominal
+from tests.benchmarks.warm_up import compile_kernels
 from tests.inspection import profiles
 from tests.inspection.oracle import closest_point
 from tests.inspection.profiles import Array

@@ -23,9 +23,10 @@ from scipy.spatial import cKDTree
 
 from inspection import NurbsCurve
 from inspection.foot_grid import FootGrid, build_foot_grid
-from inspection.kernels import compile_kernels, project, project_on_samples
+from inspection.kernels import project, project_on_samples
 from inspection.nominal import NominalProfile, discretize
 from tests.benchmarks.machine import machine
+from tests.benchmarks.warm_up import compile_kernels
 from tests.inspection import profiles
 from tests.inspection import projections_reference as reference
 from tests.inspection.oracle import closest_point

@@ -29,11 +29,11 @@ from inspection import (
     register_fine,
     rehearse,
 )
-from inspection.kernels import compile_kernels
 from inspection.synthetic import even_stations
 from tests.benchmarks import published_method
 from tests.benchmarks.machine import machine
 from tests.benchmarks.parts import FORM_MM, Missing, best_place, cross_section, farthest_mm, nominals, random_pose
+from tests.benchmarks.warm_up import compile_kernels
 from tests.inspection import profiles
 from tests.inspection.oracle import closest_point
 from tests.inspection.profiles import Array

@@ -4,8 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inspection.curve import unit_vectors
-from inspection.inversion import INSIDE, choose_feet, dot, feet_on_vertices, nearest_sites
+from inspection.inversion import choose_feet, dot, feet_on_vertices, nearest_sites
 from inspection.kernels import Feet
+from inspection.kernels.layout import INSIDE
 from inspection.nominal import NominalProfile
 
 Array = NDArray[np.float64]

@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 from numba import njit
 from scipy.spatial import cKDTree
 
-from inspection import NominalProfile, NurbsCurve, discretize, kernels
+from inspection import NominalProfile, NurbsCurve, discretize
 from inspection.foot_grid import FootGrid, build_foot_grid
-from inspection.kernels import SAMPLE_METHODS, Feet, project, project_on_samples
+from inspection.kernels import SAMPLE_METHODS, Feet, compiling, project, project_on_samples
+from inspection.kernels.nearest_sample import nearest_sample
 from tests.inspection import profiles
 from tests.inspection import projections_reference as reference
 from tests.inspection.oracle import Closest, closest_point
@@ -247,7 +248,7 @@ def test_the_nearest_sample_is_the_nearest_of_coarse_ones_as_well() -> None:
         samples, links, boxes, starts, _ = table.flat
         stack = np.empty(64, dtype=np.int64)
         found = [
-            kernels._nearest_sample(x, y, starts[k], samples, links, boxes, stack)
+            nearest_sample(x, y, starts[k], samples, links, boxes, stack)
             for (x, y), k in zip(points.tolist(), begin.astype(int).tolist(), strict=True)
         ]
         distance = np.hypot(*(points - nominal.points_mm[found]).T)
@@ -260,8 +261,8 @@ def test_where_no_cache_can_be_kept_loops_are_compiled_all_the_same(monkeypatch:
             raise RuntimeError("cannot cache function: no locator available")
         return njit(**options)  # type: ignore[no-any-return]
 
-    monkeypatch.setattr(kernels, "njit", without_cache)
-    assert kernels._compiled(lambda: 7)() == 7
+    monkeypatch.setattr(compiling, "njit", without_cache)
+    assert compiling.kernel(lambda: 7)() == 7
 
 
 FORKED = """

@@ -1,0 +1,36 @@
+"""The compiled inner loops (numba): closest points on a curve, the paper's projections, poses, and the rows of a scan.
+
+Every point is worked out on its own: no result depends on the batch, the order or the thread that a point comes in.
+Arithmetic is plain IEEE double precision with explicit fused multiply-adds, so results are the same bit for bit in
+vectorised and scalar code. Nothing is compiled at import; the first call does it.
+
+What the rest of the project may call stands here; the files behind it are this package's own.
+"""
+
+from inspection.kernels.blocks import CurveTables, project
+from inspection.kernels.compiling import while_compiling
+from inspection.kernels.feet import Feet
+from inspection.kernels.growing import GrowingSums
+from inspection.kernels.layout import SAMPLE_METHODS
+from inspection.kernels.on_samples import SampleTables, project_on_samples
+from inspection.kernels.pose import OutlierLimit, PoseEstimate, PoseFit
+from inspection.kernels.scan_rows import judge, placed, take_in
+from inspection.kernels.strides import strides
+
+__all__ = [
+    "SAMPLE_METHODS",
+    "CurveTables",
+    "Feet",
+    "GrowingSums",
+    "OutlierLimit",
+    "PoseEstimate",
+    "PoseFit",
+    "SampleTables",
+    "judge",
+    "placed",
+    "project",
+    "project_on_samples",
+    "strides",
+    "take_in",
+    "while_compiling",
+]

@@ -1,0 +1,167 @@
+"""Compiling with numba: when and with which options, the instructions that Python has no words for, and who is told of it.
+
+Nothing is compiled at import; the first call of a kernel does it.
+"""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+from llvmlite import ir
+from numba import carray, njit, types
+from numba.core import cgutils, config
+from numba.core.event import Event, Listener, install_listener
+from numba.extending import intrinsic
+
+from inspection.kernels.cache_folder import places_for, stamp_of, stamped_folder
+from inspection.kernels.layout import BLOCK, CHUNK, INTEGERS, REALS
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+array_at = carray  # the array of a size that begins at a place in memory, without a copy
+
+
+def kernel(function: _Function, **options: bool) -> _Function:
+    """Compile on the first call and keep the result on disk; where nothing can be written, compile in every process."""
+    try:
+        with _code_kept_in_stamped_folder():
+            return cast(_Function, njit(cache=True, nogil=True, error_model="numpy", **options)(function))
+    except RuntimeError:
+        return cast(_Function, njit(nogil=True, error_model="numpy", **options)(function))
+
+
+def inlined_kernel(function: _Function) -> _Function:
+    """Compile with forced inlining, so that loops calling it vectorise."""
+    return kernel(function, forceinline=True)
+
+
+@contextmanager
+def _code_kept_in_stamped_folder() -> Iterator[None]:
+    """Let numba keep what is decorated meanwhile in the folder of this package's stamp. Raises RuntimeError where there is none."""
+    stamp, chosen = _stamp(), config.CACHE_DIR
+    if not stamp:  # in an archive: numba's own stamp is that of the whole archive
+        yield
+        return
+    folder = _folder(stamp, chosen)
+    if folder is None:
+        raise RuntimeError("no folder for compiled code can be written")
+    config.CACHE_DIR = str(folder)
+    try:
+        yield
+    finally:
+        config.CACHE_DIR = chosen
+
+
+@cache
+def _stamp() -> str:
+    return stamp_of(Path(__file__).parent)
+
+
+@cache
+def _folder(stamp: str, chosen: str) -> Path | None:
+    return stamped_folder(stamp, places_for(Path(__file__).parent, chosen))
+
+
+def instructions(function: Callable[..., Any]) -> Any:
+    """Mark a function that emits LLVM instructions itself."""
+    return intrinsic(function)
+
+
+@instructions
+def fma(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
+    """The value a b + c with one rounding."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.fma(*args)
+
+    return types.float64(types.float64, types.float64, types.float64), generate
+
+
+@instructions
+def stack_reals(typing_context: Any) -> Any:
+    """Memory on the stack: the compiler then knows that it overlaps no table, and vectorises loops that read both."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        place = cgutils.alloca_once(builder, ir.ArrayType(ir.DoubleType(), REALS))
+        place.align = 64
+        return builder.bitcast(place, ir.DoubleType().as_pointer())
+
+    return types.CPointer(types.float64)(), generate
+
+
+@instructions
+def stack_integers(typing_context: Any) -> Any:
+    """Likewise for integers."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        place = cgutils.alloca_once(builder, ir.ArrayType(ir.IntType(64), INTEGERS))
+        return builder.bitcast(place, ir.IntType(64).as_pointer())
+
+    return types.CPointer(types.int64)(), generate
+
+
+@instructions
+def rows_to_columns(typing_context: Any, table: Any, rows: Any, first: Any, target: Any, place: Any) -> Any:
+    """Eight rows of eight numbers of a table become eight columns: target[place + q BLOCK + i] = table[rows[first + i] + q].
+
+    Whole rows are loaded and transposed in registers, which takes a third of the time of gathering single numbers.
+    """
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        eight = ir.VectorType(ir.DoubleType(), 8)
+        table_data, rows_data, target_data = (context.make_array(signature.args[i])(context, builder, args[i]).data for i in (0, 1, 3))
+        word = ir.IntType(64)
+
+        def at(data: Any, offset: Any) -> Any:
+            return builder.gep(data, [offset], inbounds=True)
+
+        lines = []
+        for i in range(8):
+            row = builder.load(at(rows_data, builder.add(args[2], word(i))))
+            lines.append(builder.load(builder.bitcast(at(table_data, row), eight.as_pointer()), align=8))
+        choice = ir.VectorType(ir.IntType(32), 8)
+        for span in (4, 2, 1):
+            low = ir.Constant(choice, [i + (8 - span if i & span else 0) for i in range(8)])
+            high = ir.Constant(choice, [i + (8 if i & span else span) for i in range(8)])
+            for i in range(8):
+                if not i & span:
+                    a, b = lines[i], lines[i + span]
+                    lines[i], lines[i + span] = builder.shuffle_vector(a, b, low), builder.shuffle_vector(a, b, high)
+        for q in range(8):
+            offset = builder.add(args[4], word(q * BLOCK))
+            builder.store(lines[q], builder.bitcast(at(target_data, offset), eight.as_pointer()), align=8)
+        return context.get_dummy_value()
+
+    return types.void(table, rows, types.int64, target, types.int64), generate
+
+
+@instructions
+def claim_chunk(typing_context: Any, claimed: Any) -> Any:
+    """The first of the next chunk of points, which no other thread gets."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        counter = context.make_array(signature.args[0])(context, builder, args[0]).data
+        return builder.atomic_rmw("add", counter, ir.Constant(ir.IntType(64), CHUNK), "monotonic")
+
+    return types.int64(claimed), generate
+
+
+@contextmanager
+def while_compiling(tell: Callable[[], None]) -> Iterator[None]:
+    """Call `tell` once, when the first function has to be compiled instead of loaded from the cache."""
+    with install_listener("numba:compile", _FirstOne(tell)):
+        yield
+
+
+class _FirstOne(Listener):  # type: ignore[misc]  # numba has no types
+    def __init__(self, tell: Callable[[], None]) -> None:
+        self._tell: Callable[[], None] | None = tell
+
+    def on_start(self, event: Event) -> None:
+        if self._tell is not None:
+            self._tell()
+            self._tell = None
+
+    def on_end(self, event: Event) -> None:
+        """Nothing to tell."""

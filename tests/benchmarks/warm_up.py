@@ -1,0 +1,14 @@
+"""Compiles what a benchmark measures before it measures."""
+
+from typing import get_args
+
+from inspection import discretize, rehearse
+from inspection.methods import Method
+from tests.inspection import profiles
+
+
+def compile_kernels() -> None:
+    """Compile the projections and the registration by every method, or load them from the cache."""
+    nominal = discretize(profiles.p3(), samples=400)
+    for method in get_args(Method):
+        rehearse(nominal, method, reject_outliers=True)
