@@ -23,9 +23,10 @@ from binascii import crc_hqx
 
 import numpy as np
 
+from drivers.codecs.outbox import Outbox
 from drivers.codecs.sequence import SequenceCounter, WrappingClock
 from drivers.errors import ProtocolError
-from drivers.source import Arrival, Damaged, Heartbeat, Lost, PointBatch, Rejected, ScanClosed, ScanOpened
+from drivers.source import Arrival, Damaged, Heartbeat, PointBatch, Rejected, ScanClosed, ScanOpened
 
 MM_PER_UNIT = {"mm": 1.0, "um": 1e-3, "cm": 10.0, "m": 1000.0, "inch": 25.4}
 LONGEST_LINE = 256  # bytes before the line feed; anything longer is garbage
@@ -49,7 +50,7 @@ class AsciiDecoder:
         self._header: bytes | None = None
         self._pending = b""
         self._overlong = False
-        self._out: list[Arrival] = []
+        self._out = Outbox(self._batch)
         self._asked = False
         self._begin()
 
@@ -63,15 +64,15 @@ class AsciiDecoder:
         lines = (self._pending + data).split(b"\n")
         self._pending = lines.pop()
         self._lines(lines)
-        self._pending = self._without_excess(self._pending)
-        return self._handed_over()
+        self._pending = self._drop_excess(self._pending)
+        return self._out.hand_over()
 
     def interrupted(self) -> list[Arrival]:
         """Count the begun line, if any, as damaged."""
         if self._pending:
-            self._damaged(len(self._pending), "line cut off where the link ended")
+            self._damage(len(self._pending), "line cut off where the link ended")
         self._pending, self._overlong, self._asked = b"", False, False
-        return self._handed_over()
+        return self._out.hand_over()
 
     def _begin(self) -> None:
         self._counter = SequenceCounter(WRAP)
@@ -104,100 +105,86 @@ class AsciiDecoder:
 
     def _other_line(self, line: bytes) -> None:
         """Take a line that is not simply the next good point."""
-        rest = self._without_excess(line)
+        rest = self._drop_excess(line)
         overlong, self._overlong = self._overlong, False
         if overlong:
-            self._damaged(len(rest) + 1, "no line end in time")
+            self._damage(len(rest) + 1, "no line end in time")
             return
         body = rest[:-6]
         if rest[-6:] != b"*%04X\r" % crc_hqx(body, 0xFFFF):
-            self._damaged(len(rest) + 1, "checksum wrong" if len(rest) > 6 and rest[-6:-5] == b"*" else "not a whole line")
+            self._damage(len(rest) + 1, "checksum wrong" if len(rest) > 6 and rest[-6:-5] == b"*" else "not a whole line")
         elif found := POINT.fullmatch(body):
             self._point(found)
         elif found := HEARTBEAT.fullmatch(body):
-            self._lost(self._counter.reach(int(found[1])))
-            self._append(Heartbeat())
+            self._out.append_loss(self._counter.reach(int(found[1])))
+            self._out.append(Heartbeat())
         elif found := OPENING.fullmatch(body):
-            self._opened(body, found)
+            self._open(body, found)
         elif found := CLOSING.fullmatch(body):
             self._close(int(found[1]))
         else:
-            self._damaged(len(rest) + 1, "sound line of unknown form")
+            self._damage(len(rest) + 1, "sound line of unknown form")
 
     def _point(self, found: re.Match[bytes]) -> None:
         sequence, raw_us, x, y, z, flags = found.groups()
         if self._closed:
-            self._append(Rejected(1, "sent after the end of the scan"))
+            self._out.append(Rejected(1, "sent after the end of the scan"))
             return
         place = self._counter.place(int(sequence))
         if place.repeated:
-            self._append(Rejected(1, "frame repeated"))
+            self._out.append(Rejected(1, "frame repeated"))
             return
-        self._lost(place.lost)
+        self._out.append_loss(place.lost)
         if int(flags) & INVALID:
-            self._append(Rejected(1, "marked invalid by the device"))
+            self._out.append(Rejected(1, "marked invalid by the device"))
             return
         self._sequence.append(place.sequence)
         self._raw_us.append(int(raw_us))
         self._xyz += (float(x), float(y), float(z))
 
-    def _opened(self, body: bytes, found: re.Match[bytes]) -> None:
+    def _open(self, body: bytes, found: re.Match[bytes]) -> None:
         if body == self._header and self._counter.expected == 0:
             return  # said once more before the first point
         device, serial_number, unit, count = (group.decode("ascii") for group in found.groups())
         if unit not in MM_PER_UNIT:
             known = ", ".join(MM_PER_UNIT)
             raise ProtocolError(f"{device} {serial_number} sends points in {unit!r}; set the device to one of {known}")
-        self._flush()
+        self._out.flush()
         self._begin()
         self._header, self._mm_per_unit = body, MM_PER_UNIT[unit]
-        self._append(ScanOpened(device, serial_number, int(count) if count else None))
+        self._out.append(ScanOpened(device, serial_number, int(count) if count else None))
 
     def _close(self, count: int) -> None:
         if self._closed:
             return
-        self._lost(self._counter.reach(count % WRAP))
+        self._out.append_loss(self._counter.reach(count % WRAP))
         self._closed = True
-        self._append(ScanClosed(count))
+        self._out.append(ScanClosed(count))
 
-    def _without_excess(self, line: bytes) -> bytes:
+    def _drop_excess(self, line: bytes) -> bytes:
         """Count what no line can hold as damage at fixed places, so that garbage without a line end needs no memory."""
         while len(line) > LONGEST_LINE:
-            self._damaged(LONGEST_LINE, "no line end in time")
+            self._damage(LONGEST_LINE, "no line end in time")
             line = line[LONGEST_LINE:]
             self._overlong = True
         return line
 
-    def _damaged(self, byte_count: int, reason: str) -> None:
-        self._append(Damaged(byte_count, reason))
+    def _damage(self, byte_count: int, reason: str) -> None:
+        self._out.append(Damaged(byte_count, reason))
 
-    def _lost(self, count: int) -> None:
-        if count:
-            self._append(Lost(count, "gap in the sequence numbers" if count > 0 else "arrived late after all"))
-
-    def _append(self, arrival: Arrival) -> None:
-        self._flush()
-        self._out.append(arrival)
-
-    def _flush(self) -> None:
-        """Turn the points collected so far into one batch."""
+    def _batch(self) -> Arrival | None:
+        """Return the points collected so far as one batch."""
         if not self._sequence:
-            return
+            return None
         sequence, raw_us, xyz = self._sequence, self._raw_us, self._xyz
         self._sequence, self._raw_us, self._xyz = [], [], []
         if self._mm_per_unit is None:
-            self._out.append(Rejected(len(sequence), "no scan header arrived: the unit is unknown"))
-            return
+            return Rejected(len(sequence), "no scan header arrived: the unit is unknown")
         points_mm = np.array(xyz).reshape(-1, 3)
         if self._mm_per_unit != 1.0:
             points_mm = points_mm * self._mm_per_unit
         time_s = np.array(self._clock.ticks(raw_us)) / 1e6
-        self._out.append(PointBatch(np.array(sequence), time_s, points_mm))
-
-    def _handed_over(self) -> list[Arrival]:
-        self._flush()
-        out, self._out = self._out, []
-        return out
+        return PointBatch(np.array(sequence), time_s, points_mm)
 
 
 DECODERS = {"ascii": AsciiDecoder}

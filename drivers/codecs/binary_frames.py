@@ -26,8 +26,9 @@ from binascii import crc32, crc_hqx
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.codecs.outbox import Outbox
 from drivers.codecs.sequence import SequenceCounter, WrappingClock
-from drivers.source import Arrival, Damaged, Heartbeat, Lost, PointBatch, Rejected, ScanClosed, ScanOpened
+from drivers.source import Arrival, Damaged, Heartbeat, PointBatch, Rejected, ScanClosed, ScanOpened
 
 FRAME = np.dtype([("sync", "<u2"), ("type", "u1"), ("flags", "u1"), ("seq", "<u2"), ("t_us", "<u4"), ("xyz", "<i4", 3), ("crc", "<u2")])
 HEAD = np.dtype([("sync", "<u2"), ("n", "<u2"), ("seq", "<u4"), ("t_us", "<u8"), ("crc", "<u2")])
@@ -46,7 +47,7 @@ class BinaryDecoder:
 
     def __init__(self) -> None:
         self._pending = b""
-        self._out: list[Arrival] = []
+        self._out = Outbox(self._take_damage)
         self._asked = False
         self._damage = 0
         self._away = False
@@ -68,13 +69,13 @@ class BinaryDecoder:
                 break
             at += used
         self._pending = data[at:]
-        return self._handed_over()
+        return self._out.hand_over()
 
     def interrupted(self) -> list[Arrival]:
         """Count a begun frame as damaged; the counter may have wrapped when the link comes back."""
         self._damage += len(self._pending)
         self._pending, self._away, self._asked = b"", True, False
-        return self._handed_over()
+        return self._out.hand_over()
 
     def _begin(self) -> None:
         self._counter = SequenceCounter(1 << 16)
@@ -124,7 +125,7 @@ class BinaryDecoder:
         fields = np.frombuffer(frame, dtype=FRAME)[0]
         if int(fields["crc"]) != crc_hqx(frame[:CHECKED], 0xFFFF) or fields["type"] > CLOSING:
             return self._skip(1)
-        self._sound()
+        self._out.flush()
         kind, total = int(fields["type"]), int.from_bytes(frame[10:18], "little")
         if kind == POINT:
             self._point(fields)
@@ -156,7 +157,7 @@ class BinaryDecoder:
         if place.repeated:
             self._out.append(Rejected(1, "frame repeated"))
             return False
-        self._lose(place.lost)
+        self._out.append_loss(place.lost)
         if flags & INVALID:
             self._out.append(Rejected(1, "marked invalid by the device"))
             return False
@@ -174,16 +175,16 @@ class BinaryDecoder:
             return 0
         if int.from_bytes(data[end : end + 4], "little") != crc32(data[at:end]):
             return self._skip(1)
-        self._sound()
+        self._out.flush()
         points = np.frombuffer(data, dtype=BLOCK_POINT, count=count, offset=body)
-        self._block_points(self._unwrapped_32(int(head["seq"])), int(head["t_us"]) + points["dt_us"].astype(np.int64), points)
+        self._block_points(self._unwrap_32(int(head["seq"])), int(head["t_us"]) + points["dt_us"].astype(np.int64), points)
         return end + 4 - at
 
     def _block_points(self, first: int, t_us: NDArray[np.int64], points: NDArray[np.void]) -> None:
         self._away, self._in_blocks = False, True  # the clock of blocks does not wrap
         count = len(points)
         if first >= self._counter.expected and not points["flags"].any() and not self._closed:
-            self._lose(self._counter.place(first, near=first).lost)
+            self._out.append_loss(self._counter.place(first, near=first).lost)
             self._counter.expected = first + count
             self._batch(first + np.arange(count), t_us, points["xyz"])
             return
@@ -191,7 +192,7 @@ class BinaryDecoder:
         if keep.any():
             self._batch((first + np.arange(count))[keep], t_us[keep], points["xyz"][keep])
 
-    def _unwrapped_32(self, seq: int) -> int:
+    def _unwrap_32(self, seq: int) -> int:
         anchor, half = self._counter.expected, 1 << 31
         return anchor + (seq - anchor + half) % (1 << 32) - half
 
@@ -223,26 +224,16 @@ class BinaryDecoder:
         return round(((raw_us - self._last_us) % (1 << 32)) / self._us_per_point) - 1
 
     def _reach(self, total: int) -> None:
-        self._lose(self._counter.reach_total(total))
-
-    def _lose(self, count: int) -> None:
-        if count:
-            self._out.append(Lost(count, "gap in the sequence numbers" if count > 0 else "arrived late after all"))
+        self._out.append_loss(self._counter.reach_total(total))
 
     def _skip(self, count: int) -> int:
         self._damage += count
         return count
 
-    def _sound(self) -> None:
-        """Hand on what damage there was before a sound frame."""
-        if self._damage:
-            self._out.append(Damaged(self._damage, "no valid frame"))
-            self._damage = 0
-
-    def _handed_over(self) -> list[Arrival]:
-        self._sound()
-        out, self._out = self._out, []
-        return out
+    def _take_damage(self) -> Arrival | None:
+        """Return what bytes since the last sound frame are damaged."""
+        damage, self._damage = self._damage, 0
+        return Damaged(damage, "no valid frame") if damage else None
 
 
 DECODERS = {"binary": BinaryDecoder}

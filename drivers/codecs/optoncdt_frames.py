@@ -14,13 +14,17 @@ Points are (0, 0, distance); an axis puts them where they belong.
 """
 
 import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.codecs.distances import Distances
 from drivers.codecs.sequence import SequenceCounter, WrappingClock
 from drivers.errors import DeviceRefused, ProtocolError
-from drivers.source import Arrival, Damaged, Lost, PointBatch, Rejected, ScanClosed, ScanOpened
+from drivers.source import Arrival, Damaged, Rejected, ScanOpened
 
 ERRORS = {
     262075: "too much data for the baud rate",
@@ -39,11 +43,30 @@ RUN = 1024  # blocks looked at together
 PROMPT = b"->"
 SHORTEST_REPLY, LONGEST_REPLY = 3, 4096
 OUTPUTS = re.compile(r"\b(DIST1|DIST_RAW|DIST|SHUTTER|COUNTER|TIMESTAMP(?:_?LO|_?HI)?|INTENSITY|STATE)\b")
+Whole = int | NDArray[np.int64]
+Number = TypeVar("Number", float, NDArray[np.float64])
 WORDS = re.compile(rb"[\x00-\x3f][\x40-\x7f][\x80-\xff]")
 
 
-def _ticks(values: dict[str, int]) -> int:
-    return (values["TIMESTAMPHI"] & 0xFFFF) << 16 | (values["TIMESTAMPLO"] & 0xFFFF)
+@dataclass(frozen=True, slots=True)
+class _Block:
+    """The values that the sensor sends together, of one block or, as arrays (m,), of many."""
+
+    distance: Whole
+    counter: Whole
+    ticks: Whole
+
+    def follows(self, counter: Whole, ticks: Whole, rate_hz: float | None) -> bool | NDArray[np.bool_]:
+        """Tell whether each block comes next after one with this counter and clock."""
+        next_one = (self.counter - counter) % COUNTER_RANGE == 1
+        if rate_hz is None:
+            return next_one
+        periods = np.asarray((self.ticks - ticks) % CLOCK_RANGE, dtype=np.float64) * rate_hz / TICKS_PER_SECOND
+        return np.asarray(next_one & (np.abs(periods - 1.0) <= 0.5))
+
+    def is_in_range(self) -> bool | NDArray[np.bool_]:
+        """Tell whether each distance lies in the measuring range."""
+        return (self.distance >= FIRST_IN_RANGE) & (self.distance <= LAST_IN_RANGE)
 
 
 class OptoncdtDecoder:
@@ -63,20 +86,18 @@ class OptoncdtDecoder:
         self._range_mm = range_mm
         self._rate_hz = rate_hz
         self._count = count
-        self._largest_step_mm = largest_step_mm
+        self._clock = WrappingClock(CLOCK_RANGE, TICKS_PER_SECOND)
+        self._distances = Distances(self._clock.seconds, gap="gap in the sensor's counter", count=count, largest_step_mm=largest_step_mm)
+        self._out = self._distances.out
         self._asked = False
         self._text = b""
         self._outputs: list[str] | None = None
-        self._block: list[int] = []
-        self._last: dict[str, int] | None = None
-        self._held: dict[str, int] | None = None
+        self._places: list[int] = []  # where counter and clock stand among them
+        self._words: list[int] = []
+        self._last: _Block | None = None  # the last one that was accepted
+        self._held: _Block | None = None  # the last one that waits for the next to confirm it
         self._counter: SequenceCounter | None = None
         self._first = 0
-        self._clock = WrappingClock(CLOCK_RANGE, TICKS_PER_SECOND)
-        self._before_mm: float | None = None
-        self._closed = False
-        self._out: list[Arrival] = []
-        self._rows: list[tuple[int, int, float]] = []
 
     def request(self) -> bytes:
         """Ask, each time the link opens, for counter and clock beside the distance, for the order of the values, and for the stream."""
@@ -98,75 +119,81 @@ class OptoncdtDecoder:
             self._word(*found.group())
             at = found.end()
         self._text = self._replies(data[at:])
-        return self._handed_over()
+        return self._out.hand_over()
 
     def interrupted(self) -> list[Arrival]:
         """Count what was begun as damaged; ask again when the link is back."""
-        pending = len(self._text) + 3 * len(self._block)
+        pending = len(self._text) + 3 * len(self._words)
         if pending:
-            self._say(Damaged(pending, "cut off where the link ended"))
-        self._text, self._block, self._asked = b"", [], False
-        return self._handed_over()
+            self._out.append(Damaged(pending, "cut off where the link ended"))
+        if self._last is None and self._held is not None:  # the only one there is: nothing contradicts it
+            held, self._held = self._held, None
+            self._accept(held)
+        self._text, self._words, self._asked = b"", [], False
+        return self._out.hand_over()
 
     def _run(self, data: bytes, start: int) -> int:
-        """Take whole, sound blocks that follow on, many at once; return the number of bytes used."""
-        if self._outputs is None or self._last is None or self._held or self._block or self._closed or self._counter is None:
+        """Take blocks that are whole, sound and next in order, many at once; return the number of bytes used."""
+        if self._last is None or self._counter is None or self._held or self._words or self._distances.closed:
             return 0
-        words = len(self._outputs)
-        count = min((len(data) - start) // (3 * words), RUN)
-        if self._count is not None:
-            count = min(count, int(self._count) - 1 - (self._counter.expected - self._first))
+        values = self._values_ahead(data, start)
+        if len(values) < 2:
+            return 0
+        blocks = self._block_of(values.T)
+        distance_mm = self._distance_mm(np.asarray(blocks.distance, dtype=np.float64))
+        good = self._are_next(blocks) & blocks.is_in_range() & self._distances.steady(distance_mm)
+        count = len(good) if good.all() else int(good.argmin())
+        if count:
+            self._distances.take_many(np.asarray(blocks.ticks)[:count], distance_mm[:count])
+            self._counter.expected += count
+            self._last = self._block_of(values[count - 1].tolist())
+        return int(count * 3 * values.shape[1])
+
+    def _values_ahead(self, data: bytes, start: int) -> NDArray[np.int64]:
+        """Return the values (m, words) of the blocks ahead, up to the first whose words do not stand where they belong."""
+        words = len(self._outputs or ())
+        count = self._distances.room(min((len(data) - start) // (3 * words), RUN))
         if count < 2:
-            return 0
+            return np.empty((0, words), dtype=np.int64)
         raw = np.frombuffer(data, np.uint8, count * 3 * words, start).reshape(count, words, 3)
         tags = np.array([[0, 64, 128]] + (words - 1) * [[0, 64, 192]])  # the first word of a block, and the further ones
         sound = ((raw & TAGS) == tags).all(axis=(1, 2))
-        values = (raw.astype(np.int64) & 63) @ (1, 1 << 6, 1 << 12)  # (count, words)
-        place = {name: index for index, name in enumerate(self._outputs)}
-        counters = values[:, place["COUNTER"]]
-        ticks = (values[:, place["TIMESTAMPHI"]] & 0xFFFF) << 16 | (values[:, place["TIMESTAMPLO"]] & 0xFFFF)
-        steps = np.diff(ticks, prepend=_ticks(self._last)) % CLOCK_RANGE
-        good = sound & (np.diff(counters, prepend=self._last["COUNTER"]) % COUNTER_RANGE == 1)
-        if self._rate_hz is not None:
-            good &= np.abs(steps * self._rate_hz / TICKS_PER_SECOND - 1.0) <= 0.5
-        distance = values[:, 0]
-        good &= (distance >= FIRST_IN_RANGE) & (distance <= LAST_IN_RANGE)
-        distance_mm = np.asarray(self._range_mm / 100.0 * (SCALE * distance - 1.0), dtype=np.float64)
-        if self._largest_step_mm is not None:
-            before_mm = distance_mm[0] if self._before_mm is None else self._before_mm
-            good &= np.abs(np.diff(distance_mm, prepend=before_mm)) <= self._largest_step_mm
-        count = count if good.all() else int(good.argmin())
-        if count:
-            self._take_run(count, ticks[:count], distance_mm[:count])
-            self._last = dict(zip(self._outputs, values[count - 1].tolist(), strict=True))
-        return count * 3 * words
+        values = (raw.astype(np.int64) & 63) @ (1, 1 << 6, 1 << 12)
+        return np.asarray(values if sound.all() else values[: int(sound.argmin())])
 
-    def _take_run(self, count: int, ticks: NDArray[np.int64], distance_mm: NDArray[np.float64]) -> None:
+    def _are_next(self, blocks: _Block) -> NDArray[np.bool_]:
+        """Tell of each of many blocks whether it follows the one before it and is the one that the counter expects."""
+        assert self._last is not None
         assert self._counter is not None
-        self._flush()
-        first = self._counter.expected
-        self._counter.expected = first + count
-        self._before_mm = float(distance_mm[-1])
-        points_mm = np.zeros((count, 3))
-        points_mm[:, 2] = distance_mm
-        self._out.append(PointBatch(first - self._first + np.arange(count), self._clock.seconds(ticks), points_mm))
+        counter, ticks = np.asarray(blocks.counter), np.asarray(blocks.ticks)
+        before = [np.concatenate([[first], column[:-1]]) for first, column in ((self._last.counter, counter), (self._last.ticks, ticks))]
+        expected = (self._counter.expected + np.arange(len(counter))) % COUNTER_RANGE
+        return np.asarray(blocks.follows(before[0], before[1], self._rate_hz) & (counter == expected))
+
+    def _block_of(self, values: Sequence[int] | NDArray[np.int64]) -> _Block:
+        """Pick what is needed from the values of a block, or from the columns (words, m) of many."""
+        counter, low, high = self._places
+        return _Block(values[0], values[counter], (values[high] & 0xFFFF) << 16 | (values[low] & 0xFFFF))
+
+    def _distance_mm(self, value: Number) -> Number:
+        return self._range_mm / 100.0 * (SCALE * value - 1.0)
 
     def _other_bytes(self, data: bytes) -> None:
         """Take what stands between two words: replies, or damage."""
         rest = self._replies(data)
         if rest:
-            self._say(Damaged(len(rest), "neither value nor reply"))
+            self._out.append(Damaged(len(rest), "neither value nor reply"))
 
     def _replies(self, data: bytes) -> bytes:
         """Read the replies that end with a prompt; return what follows the last one."""
         *replies, rest = data.split(PROMPT)
         for reply in replies:
             if len(reply) + len(PROMPT) < SHORTEST_REPLY or not reply.replace(b"\r", b"").replace(b"\n", b"").isascii():
-                self._say(Damaged(len(reply) + len(PROMPT), "neither value nor reply"))
+                self._out.append(Damaged(len(reply) + len(PROMPT), "neither value nor reply"))
             else:
                 self._reply(reply.decode("ascii"))
         while len(rest) > LONGEST_REPLY:
-            self._say(Damaged(LONGEST_REPLY, "neither value nor reply"))
+            self._out.append(Damaged(LONGEST_REPLY, "neither value nor reply"))
             rest = rest[LONGEST_REPLY:]
         return rest
 
@@ -182,100 +209,64 @@ class OptoncdtDecoder:
         if outputs[:1] != ["DIST1"] or not {"COUNTER", "TIMESTAMPLO", "TIMESTAMPHI"} <= set(outputs):
             raise ProtocolError(f"the sensor sends {' '.join(outputs) or 'nothing'}; DIST1, COUNTER and TIMESTAMP are needed")
         if self._outputs is None:
-            self._say(ScanOpened("optoNCDT 1420", "", self._count))
+            self._out.append(ScanOpened("optoNCDT 1420", "", self._count))
         self._outputs = outputs
+        self._places = [outputs.index(name) for name in ("COUNTER", "TIMESTAMPLO", "TIMESTAMPHI")]
 
     def _word(self, low: int, middle: int, high: int) -> None:
         value = (low & 63) | (middle & 63) << 6 | (high & 63) << 12
         if self._outputs is None:
-            self._say(Rejected(0 if high & 0x40 else 1, "came before the sensor told its outputs"))
+            self._out.append(Rejected(0 if high & 0x40 else 1, "came before the sensor told its outputs"))
             return
-        if not high & 0x40 and self._block:
-            self._incomplete()
-        if high & 0x40 and not self._block:
-            self._say(Damaged(3, "value of no block"))
+        if not high & 0x40 and self._words:
+            self._out.append(Damaged(3 * len(self._words), "block with values missing"))
+            self._words = []
+        if high & 0x40 and not self._words:
+            self._out.append(Damaged(3, "value of no block"))
             return
-        self._block.append(value)
-        if len(self._block) == len(self._outputs):
-            block, self._block = self._block, []
-            self._complete(dict(zip(self._outputs, block, strict=True)))
+        self._words.append(value)
+        if len(self._words) == len(self._outputs):
+            words, self._words = self._words, []
+            self._complete(self._block_of(words))
 
-    def _incomplete(self) -> None:
-        self._say(Damaged(3 * len(self._block), "block with values missing"))
-        self._block = []
-
-    def _complete(self, values: dict[str, int]) -> None:
+    def _complete(self, block: _Block) -> None:
         """Accept a block that follows on; hold any other until the next one confirms or contradicts its counter and clock."""
-        if self._last is None or self._follows(self._last, values):
-            self._contradicted()
-            self._accept(values)
-        elif self._held is not None and self._follows(self._held, values):
-            held, self._held = self._held, None
+        held, self._held = self._held, None
+        if self._confirms(block, self._last):
+            self._drop(held)
+            self._accept(block)
+        elif held is not None and self._confirms(block, held):
             self._accept(held)
-            self._accept(values)
+            self._accept(block)
         else:
-            self._contradicted()
-            self._held = values
+            self._drop(held)
+            self._held = block
 
-    def _contradicted(self) -> None:
-        if self._held is not None:
-            self._say(Damaged(3 * len(self._held), "counter or clock contradicted by the next value"))
-            self._held = None
+    def _confirms(self, block: _Block, before: _Block | None) -> bool:
+        return before is not None and bool(block.follows(before.counter, before.ticks, self._rate_hz))
 
-    def _follows(self, before: dict[str, int], values: dict[str, int]) -> bool:
-        if (values["COUNTER"] - before["COUNTER"]) % COUNTER_RANGE != 1:
-            return False
-        ticks = (_ticks(values) - _ticks(before)) % CLOCK_RANGE
-        return self._rate_hz is None or abs(ticks * self._rate_hz / TICKS_PER_SECOND - 1.0) <= 0.5
+    def _drop(self, held: _Block | None) -> None:
+        if held is not None:
+            self._out.append(Damaged(3 * len(self._outputs or ()), "counter or clock contradicted by the next value"))
 
-    def _accept(self, values: dict[str, int]) -> None:
-        if self._closed:
+    def _accept(self, block: _Block) -> None:
+        if self._distances.closed:
             return
-        self._last = values
+        self._last = block
+        counter, ticks, value = int(block.counter), int(block.ticks), int(block.distance)
         if self._counter is None:
-            self._first = values["COUNTER"]
+            self._first = counter
             self._counter = SequenceCounter(COUNTER_RANGE, self._first)
-        place = self._counter.place(values["COUNTER"])
-        if place.lost:
-            self._say(Lost(place.lost, "gap in the sensor's counter" if place.lost > 0 else "arrived late after all"))
-        reason, distance_mm = ("value repeated", 0.0) if place.repeated else self._distance(values["DIST1"])
-        if reason:
-            self._say(Rejected(1, reason))
-        else:
-            self._rows.append((place.sequence - self._first, _ticks(values), distance_mm))
-        if self._count is not None and self._counter.expected - self._first >= self._count:
-            self._say(ScanClosed(None))
-            self._closed = True
+        place = self._counter.place(counter)
+        refusal = "value repeated" if place.repeated else self._refusal(block)
+        distance_mm = None if refusal else self._distance_mm(float(value))
+        self._distances.take(place.sequence - self._first, ticks, distance_mm, lost=place.lost, refusal=refusal)
 
-    def _distance(self, value: int) -> tuple[str, float]:
-        """Return why a value is no distance, or the distance."""
-        if value in ERRORS:
-            return ERRORS[value], 0.0
-        if not FIRST_IN_RANGE <= value <= LAST_IN_RANGE:
-            return "outside the measuring range", 0.0
-        distance_mm = self._range_mm / 100.0 * (SCALE * value - 1.0)
-        before_mm, self._before_mm = self._before_mm, distance_mm
-        if self._largest_step_mm is not None and before_mm is not None and abs(distance_mm - before_mm) > self._largest_step_mm:
-            return "jump larger than the plan allows", 0.0
-        return "", distance_mm
-
-    def _say(self, arrival: Arrival) -> None:
-        self._flush()
-        self._out.append(arrival)
-
-    def _flush(self) -> None:
-        if not self._rows:
-            return
-        sequence, ticks, distance_mm = (np.array(column) for column in zip(*self._rows, strict=True))
-        self._rows = []
-        points_mm = np.zeros((len(sequence), 3))
-        points_mm[:, 2] = distance_mm
-        self._out.append(PointBatch(sequence.astype(np.int64), self._clock.seconds(ticks.astype(np.int64)), points_mm))
-
-    def _handed_over(self) -> list[Arrival]:
-        self._flush()
-        out, self._out = self._out, []
-        return out
+    def _refusal(self, block: _Block) -> str:
+        """Return why a value is no distance; nothing if it is one."""
+        if block.distance in ERRORS:
+            return ERRORS[int(block.distance)]
+        return "" if block.is_in_range() else "outside the measuring range"
 
 
 DECODERS = {"optoncdt": OptoncdtDecoder}

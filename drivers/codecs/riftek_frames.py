@@ -15,10 +15,9 @@ Points are (0, 0, distance); an axis puts them where they belong.
 
 import re
 
-import numpy as np
-
+from drivers.codecs.distances import Distances
 from drivers.errors import ProtocolError
-from drivers.source import Arrival, Damaged, Lost, PointBatch, Rejected, ScanClosed
+from drivers.source import Arrival, Damaged
 
 FULL_SCALE = 16384
 STREAM, STOP = 7, 8
@@ -26,58 +25,10 @@ LONGEST_LINE = 64
 NUMBER = re.compile(rb"-?[0-9]{1,6}(\.[0-9]{1,6})?")
 
 
-class _Distances:
-    """Distances in order to arrivals; ends after `count` of them."""
-
-    def __init__(self, rate_hz: float, count: int | None, largest_step_mm: float | None) -> None:
-        self.expected = 0
-        self.closed = False
-        self._rate_hz = rate_hz
-        self._count = count
-        self._largest_step_mm = largest_step_mm
-        self._before_mm: float | None = None
-        self._numbers: list[int] = []
-        self._distances_mm: list[float] = []
-        self._out: list[Arrival] = []
-
-    def take(self, distance_mm: float, lost: int = 0, refused: str = "") -> None:
-        """Take the next distance, after `lost` missing ones, unless it is `refused` for a reason."""
-        if self.closed:
-            return
-        if lost:
-            self.say(Lost(lost, "gap in the burst counter"))
-        number = self.expected + lost
-        self.expected = number + 1
-        before_mm, self._before_mm = self._before_mm, distance_mm
-        if not refused and self._largest_step_mm is not None and before_mm is not None:
-            refused = "jump larger than the plan allows" if abs(distance_mm - before_mm) > self._largest_step_mm else ""
-        if refused:
-            self.say(Rejected(1, refused))
-        else:
-            self._numbers.append(number)
-            self._distances_mm.append(distance_mm)
-        if self._count is not None and self.expected >= self._count:
-            self.say(ScanClosed(None))
-            self.closed = True
-
-    def say(self, arrival: Arrival) -> None:
-        """Append an arrival behind the points so far."""
-        self._flush()
-        self._out.append(arrival)
-
-    def handed_over(self) -> list[Arrival]:
-        """Return everything since the last call."""
-        self._flush()
-        out, self._out = self._out, []
-        return out
-
-    def _flush(self) -> None:
-        if self._numbers:
-            sequence = np.array(self._numbers, dtype=np.int64)
-            points_mm = np.zeros((len(sequence), 3))
-            points_mm[:, 2] = self._distances_mm
-            self._out.append(PointBatch(sequence, sequence / self._rate_hz, points_mm))
-            self._numbers, self._distances_mm = [], []
+def _distances(rate_hz: float, count: int | None, largest_step_mm: float | None) -> Distances:
+    """Return an account whose clock is the number of the burst over the rate."""
+    gap = "gap in the burst counter"
+    return Distances(lambda numbers: numbers / rate_hz, gap=gap, count=count, largest_step_mm=largest_step_mm)
 
 
 class RiftekDecoder:
@@ -96,7 +47,8 @@ class RiftekDecoder:
             raise ValueError(f"range {range_mm} mm and rate {rate_hz} Hz must be positive, address {address} between 1 and 127")
         self._range_mm = range_mm
         self._address = address
-        self._distances = _Distances(rate_hz, count, largest_step_mm)
+        self._distances = _distances(rate_hz, count, largest_step_mm)
+        self._out = self._distances.out
         self._burst = b""
         self._last_count: int | None = None
         self._asked = self._away = False
@@ -115,27 +67,27 @@ class RiftekDecoder:
         for byte in data:
             if byte < 0x80:
                 self._end_of_burst()
-                self._distances.say(Damaged(1, "byte of no answer"))
+                self._out.append(Damaged(1, "byte of no answer"))
             elif self._burst and (byte ^ self._burst[0]) & 0x70:
                 self._end_of_burst()
                 self._burst = bytes([byte])
             elif len(self._burst) < 64:
                 self._burst += bytes([byte])
             else:
-                self._distances.say(Damaged(1, "burst without end"))
-        return self._distances.handed_over()
+                self._out.append(Damaged(1, "burst without end"))
+        return self._out.hand_over()
 
     def interrupted(self) -> list[Arrival]:
         """Count the begun burst as damaged."""
         if self._burst:
-            self._distances.say(Damaged(len(self._burst), "burst cut off where the link ended"))
+            self._out.append(Damaged(len(self._burst), "burst cut off where the link ended"))
         self._burst, self._away = b"", True
-        return self._distances.handed_over()
+        return self._out.hand_over()
 
     def _end_of_burst(self) -> None:
         bursts, self._burst = self._burst, b""
         if len(bursts) % 4:
-            self._distances.say(Damaged(len(bursts), "burst of a wrong length"))
+            self._out.append(Damaged(len(bursts), "burst of a wrong length"))
             return
         for start in range(0, len(bursts), 4):  # more than one where three in a row were lost between them
             self._result(bursts[start : start + 4])
@@ -145,10 +97,11 @@ class RiftekDecoder:
         lost = 0 if self._last_count is None else (counter - self._last_count - 1) % 4
         self._last_count = counter
         value = sum((byte & 15) << 4 * place for place, byte in enumerate(burst))
-        refused = "" if burst[0] & 0x40 else "not renewed since the last transmission"
+        refusal = "" if burst[0] & 0x40 else "not renewed since the last transmission"
         if value > FULL_SCALE:
-            refused = "outside the measuring range"
-        self._distances.take(value * self._range_mm / FULL_SCALE, lost, refused)
+            refusal = "outside the measuring range"
+        number = self._distances.expected + lost
+        self._distances.take(number, number, value * self._range_mm / FULL_SCALE, lost=lost, refusal=refusal)
 
 
 class RiftekAsciiDecoder:
@@ -158,7 +111,8 @@ class RiftekAsciiDecoder:
         if not rate_hz > 0:
             raise ValueError(f"rate {rate_hz} Hz must be positive")
         self._line = request_line.encode("ascii") + b"\r\n"
-        self._distances = _Distances(rate_hz, count, largest_step_mm)
+        self._distances = _distances(rate_hz, count, largest_step_mm)
+        self._out = self._distances.out
         self._pending = b""
         self._waiting = 0
 
@@ -174,20 +128,21 @@ class RiftekAsciiDecoder:
         for line in lines:
             self._waiting = 0
             if line.endswith(b"\r") and NUMBER.fullmatch(line[:-1]):
-                self._distances.take(float(line[:-1]))
+                number = self._distances.expected
+                self._distances.take(number, number, float(line[:-1]))
             else:
-                self._distances.say(Damaged(len(line) + 1, "line that is no distance"))
+                self._out.append(Damaged(len(line) + 1, "line that is no distance"))
         while len(self._pending) > LONGEST_LINE:
-            self._distances.say(Damaged(LONGEST_LINE, "no line end in time"))
+            self._out.append(Damaged(LONGEST_LINE, "no line end in time"))
             self._pending = self._pending[LONGEST_LINE:]
-        return self._distances.handed_over()
+        return self._out.hand_over()
 
     def interrupted(self) -> list[Arrival]:
         """Count the begun line as damaged."""
         if self._pending:
-            self._distances.say(Damaged(len(self._pending), "line cut off where the link ended"))
+            self._out.append(Damaged(len(self._pending), "line cut off where the link ended"))
         self._pending, self._waiting = b"", 0
-        return self._distances.handed_over()
+        return self._out.hand_over()
 
 
 DECODERS = {"riftek": RiftekDecoder, "riftek-ascii": RiftekAsciiDecoder}

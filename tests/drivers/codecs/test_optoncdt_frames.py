@@ -129,6 +129,24 @@ def test_any_cut_of_a_damaged_stream_gives_the_same(seed: int, edges: list[int])
     assert decoded(make(), damaged, [min(edge, len(damaged)) for edge in edges]) == whole
 
 
+@pytest.mark.parametrize("bit", range(6))
+def test_a_first_value_whose_counter_is_flipped_costs_itself_alone(bit: int) -> None:
+    """The values after it agree with each other and contradict it: they are points, not repetitions of lost ones."""
+    data = bytearray(b"".join(block(i, 30_000 + i) for i in range(40)))
+    data[4] ^= 1 << bit
+    book = any_cut_is_the_same(make, INFO + bytes(data))
+    assert distances(book) == [millimetres(30_000 + i) for i in range(1, 40)]
+    assert book.sequence == list(range(39))
+    assert book.counts == {("Damaged", "counter or clock contradicted by the next value"): 12}
+
+
+def test_values_whose_counter_went_back_are_counted_however_the_bytes_are_cut() -> None:
+    first, again = (b"".join(block(i, 30_000 + i) for i in range(40, 80)), b"".join(block(i, 30_000 + i) for i in range(30)))
+    book = any_cut_is_the_same(make, INFO + first + again)
+    assert len(book.sequence) == 40
+    assert book.counts == {("Rejected", "value repeated"): 30}
+
+
 @pytest.mark.parametrize("at", range(12))
 def test_a_lost_byte_costs_one_value(at: int) -> None:
     data = b"".join(block(i, 30_000 + i) for i in range(40))
