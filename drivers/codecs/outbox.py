@@ -29,6 +29,10 @@ class Outbox:
         if count:
             self.append(Lost(count, gap if count > 0 else "arrived late after all"))
 
+    def append_overflow(self) -> None:
+        """Append that the device itself lost points; how many, its counter will show."""
+        self.append(Lost(0, "the device says that its buffer overflowed; its counter shows how many"))
+
     def flush(self) -> None:
         """Append what was collected so far."""
         collected = self._take_collected()

@@ -250,14 +250,22 @@ def _line_of(text: str, keys: Iterable[str]) -> int:
 
 
 @dataclass(frozen=True, slots=True)
-class Columns:
-    """The fields of consecutive entries, each (m,); `sound` is False where the checksum of an entry is wrong."""
+class Entries:
+    """The fields of m consecutive entries of a block.
+
+    values   (m,) of each field, by its name
+    sound    (m,) False where the checksum of an entry is wrong
+    """
 
     values: dict[str, NDArray[np.generic]]
     sound: NDArray[np.bool_]
 
+    def first(self, count: int) -> "Entries":
+        """Return the first `count` entries."""
+        return Entries({name: column[:count] for name, column in self.values.items()}, self.sound[:count])
 
-def columns(block: Block, word_order: str, registers: bytes) -> Columns:
+
+def entries_of(block: Block, word_order: str, registers: bytes) -> Entries:
     """Take the big-endian registers of whole entries apart."""
     words = np.frombuffer(registers, dtype=">u2").reshape(-1, block.size)
     values: dict[str, NDArray[np.generic]] = {}
@@ -271,7 +279,7 @@ def columns(block: Block, word_order: str, registers: bytes) -> Columns:
         size = 2 * block.size
         found = [crc_hqx(registers[at : at + checked], 0xFFFF) for at in range(0, len(registers), size)]
         sound = values["crc"] == np.array(found)
-    return Columns(values, sound)
+    return Entries(values, sound)
 
 
 def equals_pattern(column: NDArray[np.generic], pattern: int, kind: str) -> NDArray[np.bool_]:

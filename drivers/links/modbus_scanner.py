@@ -19,8 +19,9 @@ from pymodbus.exceptions import ConnectionException, ModbusIOException
 from pymodbus.pdu import ModbusPDU
 from pymodbus.pdu.file_message import ReadFifoQueueResponse
 
-from drivers.codecs.register_decoder import READ_FIFO, RegisterDecoder
+from drivers.codecs.register_decoder import RegisterDecoder
 from drivers.codecs.register_map import RegisterMap
+from drivers.codecs.register_pdus import READ_FIFO
 from drivers.errors import LinkError
 from drivers.links.reconnect import kept_up
 from drivers.source import Arrival, Damaged, ScanClosed, WireBytes

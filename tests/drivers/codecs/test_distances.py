@@ -25,11 +25,9 @@ def test_a_loss_comes_before_the_distance_behind_it() -> None:
     scan.take(0, 0, 1.0)
     scan.take(4, 4, 1.0, lost=3)
     first, lost, second = scan.out.hand_over()
-    assert (
-        (len(first), lost, len(second)) == (1, Lost(3, "gap"), 1)
-        if isinstance(first, PointBatch) and isinstance(second, PointBatch)
-        else False
-    )
+    assert lost == Lost(3, "gap")
+    assert account([first]).sequence == [0]
+    assert account([second]).sequence == [4]
     assert scan.expected == 5
 
 

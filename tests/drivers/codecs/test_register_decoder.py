@@ -160,9 +160,8 @@ def test_points_the_device_dropped_are_lost() -> None:
 
 
 def test_sequence_and_written_wrap() -> None:
-    ring, decoder = Ring(), RegisterDecoder(RING)
-    ring.written = decoder._written = decoder._read = decoder._counter.expected = 2**32 - 30
-    decoder._first = 0
+    ring, decoder = Ring(), RegisterDecoder(RING, first=2**32 - 30)
+    ring.written = 2**32 - 30
     put = ring.put
     ring.put = lambda at, code, value: put(at, code, value % 2**32 if code == "I" else 0)  # type: ignore[method-assign]
     ring.write(60)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import yaml
 
-from drivers.codecs.register_map import MAPS, Block, RegisterField, columns, load_map, shipped_maps
+from drivers.codecs.register_map import MAPS, Block, RegisterField, entries_of, load_map, shipped_maps
 
 README = (Path(__file__).parents[3] / "README.md").read_text(encoding="utf-8")
 MINE = "device: my controller\n" + README.partition("\ndevice: my controller\n")[2].partition("```")[0]
@@ -136,7 +136,7 @@ def test_every_type_in_both_word_orders(order: str, words: int, kind: str, code:
         big = struct.pack(">" + code, value)
         entries.append(b"\xaa\xbb" + b"".join([big[i : i + 2] for i in range(0, len(big), 2)][::words]))
     field = RegisterField.model_validate({"at": 1, "type": kind})
-    read = columns(Block(at=0, fields={"x": field}), order, b"".join(entries))
+    read = entries_of(Block(at=0, fields={"x": field}), order, b"".join(entries))
     np.testing.assert_array_equal(read.values["x"], values)
 
 
