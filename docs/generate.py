@@ -1,5 +1,6 @@
 """Write the pages of docs that come from the models: `python docs/generate.py`; a test compares them with what stands there."""
 
+import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +24,7 @@ from cmmlink.result_keys import (
     Understood,
     Verified,
 )
+from drivers.codecs import decoders
 from drivers.codecs.register_map import PATTERNS, POINTS_FIELDS, POP_FIELDS, STATUS_FIELDS, RegisterMap
 
 DOCS = Path(__file__).parent
@@ -148,6 +150,17 @@ def _holds(group: Group) -> str:
     return table(group, defaults=False).replace("a mapping", "an object").replace("a list of mappings", "a list of objects")
 
 
+def _plan() -> str:
+    """The keys of a plan, and the formats that a serial device may have, with the options of each."""
+    rows = []
+    for name, make in sorted(decoders().items()):
+        parameters = inspect.signature(make).parameters.values()
+        options = [f"`{each.name}`{' (required)' if each.default is each.empty else ''}" for each in parameters]
+        rows.append(f"| `{name}` | {', '.join(options) or 'none'} | {(inspect.getdoc(make) or '').splitlines()[0]} |")
+    formats = ["## Formats of `device (type: serial)`", "", "| format | options | what it reads |", "| --- | --- | --- |", *rows, ""]
+    return "\n".join([page(PLAN, Plan), *formats])
+
+
 def _register_map() -> str:
     fields = [
         named("Names in the block `status`", STATUS_FIELDS),
@@ -158,7 +171,7 @@ def _register_map() -> str:
 
 
 PAGES: dict[str, Callable[[], str]] = {
-    "plan.md": lambda: page(PLAN, Plan),
+    "plan.md": _plan,
     "ct-plan.md": lambda: page(CT_PLAN, CtPlan),
     "register-map.md": _register_map,
     "results.md": results,

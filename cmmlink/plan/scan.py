@@ -113,7 +113,7 @@ class SerialDevice(_Settings):
     baud_rate: int = Field(default=115200, gt=0, description="the speed of a serial port in bits per second")
     silence_s: Positive = Field(default=5.0, description=_SILENCE)
     reconnect_s: float = Field(default=0.0, ge=0, description=_RECONNECT)
-    format: Text = Field(default="ascii", description="how points are spelled on the wire: ascii, binary, optoncdt, riftek or riftek-ascii")
+    format: Text = Field(default="ascii", description="how points are spelled on the wire, like ascii, binary or optoncdt")
     options: dict[str, Annotated[int | float | str, Field(union_mode="left_to_right")]] = Field(
         default={}, description="options of the format, like {range_mm: 50, rate_hz: 1000, count: 5000}"
     )

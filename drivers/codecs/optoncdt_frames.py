@@ -70,7 +70,7 @@ class _Block:
 
 
 class OptoncdtDecoder:
-    """Bytes of the sensor to arrivals.
+    """Bytes of a Micro-Epsilon optoNCDT 1420 distance sensor to arrivals.
 
     range_mm          the measuring range: 10, 25, 50, 100, 200 or 500 mm
     rate_hz           the measuring rate; if given, a clock that contradicts it is damage

@@ -32,7 +32,7 @@ def _distances(rate_hz: float, count: int | None, largest_step_mm: float | None)
 
 
 class RiftekDecoder:
-    """The binary stream.
+    """Bytes of a RIFTEK RF60x distance sensor, its binary stream, to arrivals.
 
     range_mm, address   the sensor's measuring range and network address
     rate_hz             its sampling rate: the only clock there is
@@ -105,7 +105,7 @@ class RiftekDecoder:
 
 
 class RiftekAsciiDecoder:
-    """The ASCII lines: each request is answered by one line with the distance in mm; the next request follows the answer."""
+    """Lines of a RIFTEK RF60x distance sensor to arrivals; each request is answered by one distance, and the next one follows it."""
 
     def __init__(self, rate_hz: float, *, request_line: str = "R1", count: int | None = None, largest_step_mm: float | None = None) -> None:
         if not rate_hz > 0:

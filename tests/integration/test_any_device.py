@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers.codecs import decoder
+from drivers.codecs import decoder, decoders
 from drivers.codecs.register_map import load_map
 from drivers.links.modbus_scanner import ModbusScanner
 from drivers.links.serial_scanner import SerialScanner
@@ -28,7 +28,7 @@ Open = Callable[[], ScanSource]
 
 def opener(address: str, name: str, options: dict[str, float], parity: str, baud_rate: int) -> Open:
     """Return what makes a source: a format's name is a stream, a map's name or file is Modbus."""
-    if name in {"ascii", "binary", "optoncdt", "riftek", "riftek-ascii"}:
+    if name in decoders():
         return lambda: SerialScanner(address, decoder(name, **options), baud_rate=baud_rate, parity=parity)
     return lambda: ModbusScanner(address, load_map(name), baud_rate=baud_rate, parity=parity)
 
