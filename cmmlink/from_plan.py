@@ -1,32 +1,50 @@
-"""The parts of a run that a plan describes and that need no device: its nominal and its inspection."""
+"""What a plan describes and needs no device for: its nominal profile and its inspection. Errors name file, line and key."""
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 
 from cmmlink.errors import PlanError
 from cmmlink.nominal_files import NominalFile, load_nominal, material_side
-from cmmlink.plan.scan import Datum, Plan
-from inspection import LiveInspection, Material, NominalProfile, RigidTransform, SectionPlane, discretize
+from cmmlink.plan.scan import Datum, Discretisation, Nominal, Plan, place_of
+from inspection import LiveInspection, NominalProfile, RigidTransform, SectionPlane, discretize
 
 
-def profile_of(file: NominalFile, path: Path, material: Material | None) -> NominalProfile:
-    """The discretised nominal; material inside a closed profile unless it is told otherwise."""
-    side = material or material_side(file.curve)
-    if side is None:
-        raise PlanError(f"{path}: an open profile does not show on which side its material lies; say --material left or --material right")
-    return discretize(file.curve, material=side)
+def check_plan(plan: Plan, plan_file: Path) -> NominalProfile:
+    """Build the profile of a plan and check the values that depend on it. Raises PlanError with file, line and key."""
+    with name_place(plan_file, "nominal.file"):
+        profile = profile_of(plan)
+    with name_place(plan_file, "probe.tip_radius_mm"):
+        inspection_of(plan, profile)
+    return profile
 
 
-def planned_profile(plan: Plan) -> NominalProfile:
+@contextmanager
+def name_place(plan_file: Path, key: str) -> Iterator[None]:
+    """Prefix a value's error with file, line and key."""
+    try:
+        yield
+    except ValueError as error:
+        raise PlanError(f"{place_of(plan_file, key)}: {error}") from None
+
+
+def profile_of(plan: Plan) -> NominalProfile:
     """The nominal that a plan names, discretised as it says."""
-    nominal, finely = plan.nominal, plan.discretisation
+    nominal = plan.nominal
     file = load_nominal(nominal.file, nominal.scale, nominal.closed)
+    return discretize_file(file, nominal.file, nominal, plan.discretisation)
+
+
+def discretize_file(file: NominalFile, path: Path, nominal: Nominal, finely: Discretisation) -> NominalProfile:
+    """Discretise a nominal that was read from `path`. The material lies inside a closed profile unless the plan says otherwise."""
     side = nominal.material or material_side(file.curve)
     if side is None:
         raise PlanError(
-            f"{nominal.file}: an open profile does not show on which side its material lies; set nominal.material to left or right"
+            f"{path}: an open profile does not show on which side its material lies; "
+            "set nominal.material to left or right in the plan, or give --material left or --material right"
         )
     return discretize(file.curve, finely.samples, finely.pole_angle_min_deg, finely.step_min, side)
 
@@ -36,7 +54,7 @@ def pose_of(datum: Datum | None) -> RigidTransform | None:
     return None if datum is None else RigidTransform(math.radians(datum.rotation_deg), np.array(datum.translation_mm))
 
 
-def planned_inspection(plan: Plan, profile: NominalProfile) -> LiveInspection:
+def inspection_of(plan: Plan, profile: NominalProfile) -> LiveInspection:
     """A fresh inspection as a plan describes it."""
     registration, section = plan.registration, plan.section
     return LiveInspection(

@@ -15,9 +15,10 @@ import numpy as np
 
 from cmmlink.errors import PlanError
 from cmmlink.events import Counts, RunStarted
-from cmmlink.from_plan import pose_of
-from cmmlink.nominal_files import load_nominal, material_side
+from cmmlink.from_plan import discretize_file, pose_of
+from cmmlink.nominal_files import load_nominal
 from cmmlink.pipeline import RunOutcome, run_inspection
+from cmmlink.plan.scan import Discretisation
 from cmmlink.plan.surface import CtPlan
 from cmmlink.result_json import summary
 from drivers.surface import (
@@ -34,7 +35,7 @@ from drivers.surface import (
     read_stl,
     with_points_between,
 )
-from inspection import LiveInspection, NominalProfile, RegistrationError, SectionPlane, Verdict, discretize
+from inspection import LiveInspection, NominalProfile, RegistrationError, SectionPlane, Verdict
 
 _FEW_SECTIONS = 50  # up to here Open3D costs less than half a second; numpy gives the same points, a stack of 200 twice as fast
 _MOST_SECTIONS = 100_000
@@ -216,11 +217,8 @@ class _Profiles:
     def _load(self, path: Path) -> None:
         nominal = self._plan.nominal
         file = load_nominal(path, nominal.scale, nominal.closed)
-        side = nominal.material or material_side(file.curve)
-        if side is None:
-            raise PlanError(f"{path}: an open profile does not show on which side its material lies; say material left or right")
         self.notes += [f"{path.name}: {note}" for note in file.notes]
-        self._profiles[path] = discretize(file.curve, material=side)
+        self._profiles[path] = discretize_file(file, path, nominal, Discretisation())
 
 
 def _slices(

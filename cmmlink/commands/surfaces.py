@@ -1,24 +1,48 @@
-"""What the command `ct` needs besides the inspection: its options spelled out, its progress, and its table of sections."""
+"""The command `ct`: its options spelled out, its progress, and its table of sections."""
 
 import re
+import sys
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
-from pydantic import ValidationError
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from typer.core import TyperCommand
 
+from cmmlink.commands.exit_codes import EXIT_OF
+from cmmlink.commands.options import Closed, Json, NominalScale, Out, RejectOutliers, Uncertainty, plan_from_options
+from cmmlink.commands.output import Output, print_json, stop_on_ctrl_c, terminal
 from cmmlink.errors import PlanError
-from cmmlink.plan.surface import CtPlan, NominalAt
+from cmmlink.plan.surface import CtPlan, CutterName, NominalAt, load_ct_plan
+from cmmlink.report.folder import prepare
+from cmmlink.report.stack_folder import write_stack
 from cmmlink.report.terminal import STYLES
-from cmmlink.stack import SectionOutcome, StackOutcome
+from cmmlink.stack import SectionOutcome, StackOutcome, inspect_stack
 from cmmlink.words import VERDICT_WORDS
+from inspection import FitName, Material, Method
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _MOST_WARNINGS = 20
+_OPTION_OF = {
+    "mesh.scale": "--mesh-scale",
+    "nominal.scale": "--scale",
+    "tolerance.uncertainty_mm": "--uncertainty",
+    "tolerance": "--tolerance",
+    "sections.normal": "--normal",
+    "sections.every_mm": "--every",
+    "sections.from_mm": "--from",
+    "sections.to_mm": "--to",
+    "sections.nominal_at": "--nominal-at",
+    "sections": "--heights, --every, --from, --to",
+    "cut.weld_mm": "--weld",
+    "cut.shortest_mm": "--shortest",
+    "registration.coverage_min": "--coverage-min",
+    "registration.reject_outliers": "--reject-outliers",
+}
 
 
 class ManyHeights(TyperCommand):
@@ -26,10 +50,10 @@ class ManyHeights(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Spell `--heights 1 2` as `--heights=1 --heights=2` and `--nominal-at 1 FILE` as `--nominal-at=1=FILE`."""
-        return super().parse_args(ctx, list(_spelled_out(args)))
+        return super().parse_args(ctx, list(_spell_out(args)))
 
 
-def _spelled_out(args: Sequence[str]) -> Iterator[str]:
+def _spell_out(args: Sequence[str]) -> Iterator[str]:
     waiting = list(args)
     while waiting:
         word = waiting.pop(0)
@@ -42,19 +66,92 @@ def _spelled_out(args: Sequence[str]) -> Iterator[str]:
             yield word
 
 
-def plan_from(settings: dict[str, object]) -> CtPlan:
-    """Check a plan made of options. Raises PlanError with the option's place in the plan."""
+def ct(
+    context: typer.Context,
+    mesh: Annotated[Path, typer.Argument(metavar="MESH", help="Surface: STL, PLY, OBJ; or a plan (YAML) of all that follows.")],
+    nominal: Annotated[Path | None, typer.Option(metavar="FILE", help="The nominal profile.")] = None,
+    tolerance: Annotated[
+        tuple[float, float] | None, typer.Option(metavar="LO HI", help="Deviations allowed, mm, positive out of material.")
+    ] = None,
+    normal: Annotated[tuple[float, float, float], typer.Option(metavar="X Y Z", help="The part's axis in the scan.")] = (0.0, 0.0, 1.0),
+    heights: Annotated[list[float] | None, typer.Option(metavar="H [H ...]", help="Heights of the sections along the normal, mm.")] = None,
+    every: Annotated[float | None, typer.Option(metavar="STEP", help="A section every STEP mm, in place of --heights.")] = None,
+    start: Annotated[float | None, typer.Option("--from", metavar="A", help="First height with --every.")] = None,
+    end: Annotated[float | None, typer.Option("--to", metavar="B", help="Last height with --every.")] = None,
+    nominal_at: Annotated[list[str] | None, typer.Option(metavar="HEIGHT FILE", help="Another nominal for one section.")] = None,
+    method: Annotated[Method, typer.Option(help="How deviations are found.")] = "exact",
+    fit: Annotated[FitName, typer.Option(help="How each section comes onto its nominal.")] = "best-fit",
+    uncertainty: Uncertainty = 0.0,
+    scale: NominalScale = 1.0,
+    mesh_scale: Annotated[float, typer.Option(metavar="S", help="Units of the surface file to mm.")] = 1.0,
+    closed: Closed = None,
+    material: Annotated[Material | None, typer.Option(help="Side of the material, seen along the nominal.")] = None,
+    coverage_min: Annotated[float, typer.Option(help="Share of a nominal to be there before conform is proven.")] = 0.95,
+    reject_outliers: RejectOutliers = False,
+    cutter: Annotated[CutterName, typer.Option(help="auto: Open3D, and numpy for more than 50 sections; same points.")] = "auto",
+    weld: Annotated[float, typer.Option(metavar="MM", help="Loose ends no farther apart are one point.")] = 1e-6,
+    shortest: Annotated[float | None, typer.Option(metavar="MM", help="Shorter pieces are dust; 5 % of the longest if not given.")] = None,
+    pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="Draw them into the folder of --out.")] = True,
+    out: Out = None,
+    as_json: Json = False,
+) -> int:
+    """Inspect sections of a CT surface."""
+    if mesh.suffix.lower() in (".yaml", ".yml"):
+        beside = [name for name in _given_options(context) if name not in ("mesh", "out", "as_json", "pictures")]
+        if beside:
+            raise PlanError(f"{mesh}: --{beside[0].replace('_', '-')} stands beside a plan, which says it all itself: set it in the plan")
+        return _inspect_stack(load_ct_plan(mesh), Output(False, as_json, out), pictures)
+    if nominal is None or tolerance is None:
+        raise PlanError(f"{mesh}: a surface needs --nominal FILE and --tolerance LO HI")
+    settings: dict[str, object] = {
+        "part": {"name": mesh.stem},
+        "mesh": {"file": mesh, "scale": mesh_scale},
+        "nominal": {"file": nominal, "scale": scale, "closed": closed, "material": material},
+        "tolerance": {"lower_mm": tolerance[0], "upper_mm": tolerance[1], "uncertainty_mm": uncertainty},
+        "sections": {
+            "normal": normal,
+            "heights_mm": tuple(heights or ()),
+            "every_mm": every,
+            "from_mm": start,
+            "to_mm": end,
+            "nominal_at": _own_nominals(nominal_at or ()),
+        },
+        "cut": {"cutter": cutter, "weld_mm": weld, "shortest_mm": shortest},
+        "registration": {"fit": fit, "method": method, "coverage_min": coverage_min, "reject_outliers": reject_outliers},
+    }
+    return _inspect_stack(plan_from_options(CtPlan, settings, _OPTION_OF), Output(False, as_json, out), pictures)
+
+
+def _inspect_stack(plan: CtPlan, output: Output, pictures: bool) -> int:
+    """Inspect a stack with a progress bar; write its files and print what came of it, each even if the other fails."""
+    folder = output.out or plan.out
+    prepare(folder)
+    bar = _SectionBar(Console(stderr=True), visible=not output.as_json and sys.stderr.isatty())
+    steps: list[Callable[[], None]] = []
+    with bar.show(), stop_on_ctrl_c() as stop:
+        stack = inspect_stack(
+            plan,
+            clock=time.monotonic,
+            stop=stop,
+            on_start=lambda sections: steps.append(bar.begin_round("inspected", sections)),
+            on_section=lambda _: steps[0](),
+        )
     try:
-        return CtPlan.model_validate(settings)
-    except ValidationError as failure:
-        problem = failure.errors()[0]
-        place = ".".join(str(part) for part in problem["loc"])
-        allowed = re.sub(r"^(Value error, |Input should be )", "", problem["msg"])
-        given = problem["input"] if isinstance(problem["input"], str | int | float) else None
-        raise PlanError(f"{place or 'the options'}{'' if given is None else f' is {given}'}: expected {allowed}") from None
+        if folder is not None:
+            with bar.show():
+                done = bar.begin_round("written", len(stack.sections))
+                write_stack(folder, stack, plan.tolerance.zone, plan.part.name, pictures=pictures, on_section=done)
+    finally:
+        if output.as_json:
+            print_json(stack.facts())
+        else:
+            _print_stack(terminal(), stack)
+    if folder is not None and not output.as_json:
+        typer.echo(f"results in {folder}: result.json, sections.csv, a folder for each section{', stack.png' if pictures else ''}")
+    return EXIT_OF[stack.verdict]
 
 
-def own_nominals(texts: Sequence[str]) -> list[dict[str, object]]:
+def _own_nominals(texts: Sequence[str]) -> list[dict[str, object]]:
     """Understand HEIGHT=FILE as ManyHeights spells it."""
     own = []
     for text in texts:
@@ -65,13 +162,13 @@ def own_nominals(texts: Sequence[str]) -> list[dict[str, object]]:
     return own
 
 
-def given(context: typer.Context) -> list[str]:
+def _given_options(context: typer.Context) -> list[str]:
     """Names of the parameters that stand on the command line."""
     sources = {name: context.get_parameter_source(name) for name in context.params}
     return [name for name, source in sources.items() if source is not None and source.name == "COMMANDLINE"]
 
 
-class SectionBar:
+class _SectionBar:
     """A progress bar with the remaining time, one step a section, for as many rounds as there are things to do with each."""
 
     def __init__(self, console: Console, visible: bool) -> None:
@@ -80,20 +177,20 @@ class SectionBar:
         self._progress = Progress(*columns, console=console, transient=True, disable=not visible)
 
     @contextmanager
-    def shown(self) -> Iterator[None]:
+    def show(self) -> Iterator[None]:
         """Keep the bar on the screen."""
         with self._progress:
             yield
         for task in self._progress.task_ids:
             self._progress.remove_task(task)
 
-    def round(self, words: str, sections: int) -> Callable[[], None]:
+    def begin_round(self, words: str, sections: int) -> Callable[[], None]:
         """Begin a round; call what it returns for each section done."""
         task = self._progress.add_task(words, total=sections)
         return lambda: self._progress.advance(task)
 
 
-def print_stack(console: Console, stack: StackOutcome) -> None:
+def _print_stack(console: Console, stack: StackOutcome) -> None:
     """Print the verdict, a line for each section, and what was not as it should be."""
     facts = stack.facts()
     cutters = ", ".join(sorted({section.slice.cutter for section in stack.sections}))

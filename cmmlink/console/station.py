@@ -18,9 +18,10 @@ from cmmlink.console.alarms import Alarms
 from cmmlink.console.ct_import import CtImport, InspectSurface
 from cmmlink.console.past_runs import Recorded
 from cmmlink.console.protocol import ChosenPlan, DeviceTest, RunRow, StationState
+from cmmlink.devices import Connected
 from cmmlink.errors import PlanError, RunError, StoreError
 from cmmlink.events import Event, RunStarted, Sink
-from cmmlink.from_plan import planned_inspection, planned_profile
+from cmmlink.from_plan import inspection_of, profile_of
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan.scan import FileDevice, Plan, load_plan
 from cmmlink.run_view import RunContext, RunView
@@ -39,15 +40,6 @@ _UNTESTED = DeviceTest("none", "")
 
 class Refused(Exception):  # noqa: N818 - it is the answer, not a failure
     """A command cannot be carried out now; the message says why and what to do."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Connected:
-    """A device made ready for one scan. `simulated` says that no real device is measured."""
-
-    source: ScanSource
-    device: str
-    simulated: bool
 
 
 class Records(Protocol):
@@ -397,7 +389,7 @@ class Station:
             # compiled before the device is asked for points: twenty seconds, once after installation
             rehearse(profile, plan.registration.method, plan.registration.reject_outliers)
             view.await_device()
-            live = planned_inspection(plan, profile)
+            live = inspection_of(plan, profile)
             connected = stack.enter_context(self._means.connect(plan))
             started = self.started = replace(started, device=connected.device, simulated=connected.simulated)
             sinks: list[Sink] = [self.alarms, self._shown_in(view)]
@@ -466,8 +458,8 @@ def checked(name: str, file: Path) -> Choice:
         with file.open("rb") as opened:
             text = opened.read(_MOST_PLAN_BYTES).decode("utf-8", errors="replace")
         plan = load_plan(file)
-        profile = planned_profile(plan)
-        planned_inspection(plan, profile)
+        profile = profile_of(plan)
+        inspection_of(plan, profile)
     except OSError as error:
         return Choice(name, "", None, None, f"{file.name}: {error.strerror or error}", None)
     except (PlanError, InspectionError, PointFileError, ValueError) as error:

@@ -10,16 +10,15 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from cmmlink.errors import PlanError, YamlError
-from cmmlink.plan.yaml_model import line_of, read_model
+from cmmlink.plan.yaml_model import Positive, Settings, line_of, read_model
 from drivers import PointFileError, read_text, shipped_maps
-from inspection import ToleranceZone
+from inspection import FitName, Material, Method, ToleranceZone
 
 Vector = tuple[float, float, float]
 Text = Annotated[str, Field(min_length=1)]
-Positive = Annotated[float, Field(gt=0)]
 
 _SILENCE = "how long a device may send nothing before it counts as failed"
 _RECONNECT = "how long a lost link is tried again while the run goes on"
@@ -28,29 +27,25 @@ _AXIS = "what makes points of the distances of a one-dimensional sensor"
 _LEAST_SINE = 1e-3  # between x axis and normal: below it the direction of x in the plane is noise
 
 
-class _Settings(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, str_strip_whitespace=True)
-
-
-class Part(_Settings):
+class Part(Settings):
     """What is measured."""
 
     name: Text = Field(description="the name of the part")
     serial_number: Text | None = Field(default=None, description="the serial number of this one part; digits keep their leading zeros")
 
 
-class Nominal(_Settings):
+class Nominal(Settings):
     """The nominal profile, and on which side of it the material lies."""
 
     file: Path = Field(description="the file of the nominal profile: UIUC dat, points, or NURBS yaml")
     scale: Positive = Field(default=1.0, description="how many mm a unit of the file is; for an airfoil in chord units, the chord in mm")
     closed: bool | None = Field(default=None, description="whether the profile is closed; null: what the file shows")
-    material: Literal["left", "right"] | None = Field(
+    material: Material | None = Field(
         default=None, description="the side of the material, seen along the direction of travel; null: inside a closed profile"
     )
 
 
-class Tolerance(_Settings):
+class Tolerance(Settings):
     """Limits of the deviation, positive out of material, and its expanded uncertainty."""
 
     lower_mm: float = Field(description="the lower limit of the deviation in mm, like -0.05")
@@ -62,7 +57,7 @@ class Tolerance(_Settings):
     def _above_lower(cls, upper_mm: float, info: ValidationInfo) -> float:
         lower_mm = info.data.get("lower_mm")
         if lower_mm is not None and upper_mm <= lower_mm:
-            raise ValueError(f"a number above lower_mm, which is {lower_mm:g}")
+            raise ValueError(f"a number above the lower limit, {lower_mm:g}")
         return upper_mm
 
     @field_validator("uncertainty_mm")
@@ -80,7 +75,7 @@ class Tolerance(_Settings):
         return ToleranceZone(self.lower_mm, self.upper_mm, self.uncertainty_mm)
 
 
-class Axis(_Settings):
+class Axis(Settings):
     """What makes points of the distances of a one-dimensional sensor: a constant feed, or a second device that tells the position."""
 
     origin_mm: Vector = Field(default=(0.0, 0.0, 0.0), description="where a distance of zero lies while the axis stands at zero")
@@ -105,7 +100,7 @@ class Axis(_Settings):
         return self
 
 
-class SerialDevice(_Settings):
+class SerialDevice(Settings):
     """A device that streams over a serial port or a TCP socket, in one of the formats of drivers, with that format's options."""
 
     type: Literal["serial"] = Field(description="a stream over a serial port or a TCP socket")
@@ -115,13 +110,13 @@ class SerialDevice(_Settings):
     reconnect_s: float = Field(default=0.0, ge=0, description=_RECONNECT)
     format: Text = Field(default="ascii", description="how points are spelled on the wire, like ascii, binary or optoncdt")
     options: dict[str, Annotated[int | float | str, Field(union_mode="left_to_right")]] = Field(
-        default={}, description="options of the format, like {range_mm: 50, rate_hz: 1000, count: 5000}"
+        default_factory=dict, description="options of the format, like {range_mm: 50, rate_hz: 1000, count: 5000}"
     )
     parity: Literal["N", "E", "O"] = Field(default="N", description=_PARITY)
     axis: Axis | None = Field(default=None, description=_AXIS)
 
 
-class ModbusDevice(_Settings):
+class ModbusDevice(Settings):
     """A device whose points are read from registers, over TCP (host:port) or RTU (a port name), as its map describes."""
 
     type: Literal["modbus"] = Field(description="registers over TCP or RTU")
@@ -144,7 +139,7 @@ class ModbusDevice(_Settings):
         return Path(self.map) if isinstance(self.map, str) and self.map not in shipped_maps() else None
 
 
-class FileDevice(_Settings):
+class FileDevice(Settings):
     """A file of points in place of a device."""
 
     type: Literal["file"] = Field(description="a file of points in place of a device")
@@ -156,13 +151,13 @@ Device = Annotated[SerialDevice | ModbusDevice | FileDevice, Field(discriminator
 Axis.model_rebuild()
 
 
-class Probe(_Settings):
+class Probe(Settings):
     """The tip of the probe."""
 
     tip_radius_mm: float = Field(default=0.0, ge=0, description="the radius of the tip's ball; above 0, the points are ball centres")
 
 
-class Section(_Settings):
+class Section(Settings):
     """The plane of the section in machine coordinates; directions of any length, not parallel."""
 
     origin_mm: Vector = Field(default=(0.0, 0.0, 0.0), description="a point of the plane, which becomes the section's origin")
@@ -192,25 +187,23 @@ class Section(_Settings):
         return x_axis
 
 
-class Datum(_Settings):
+class Datum(Settings):
     """A known pose: the motion that brings section coordinates onto the nominal."""
 
     rotation_deg: float = Field(default=0.0, description="the rotation about the section's origin, counterclockwise")
     translation_mm: tuple[float, float] = Field(default=(0.0, 0.0), description="the translation after the rotation")
 
 
-class Registration(_Settings):
+class Registration(Settings):
     """How the points come onto the nominal, and how much of it they must cover."""
 
     datum: Datum | None = Field(default=None, description="a known pose, from section to nominal; null: the pose is found by a fit")
-    fit: Literal["best-fit", "minimum-zone", "none"] = Field(
+    fit: FitName = Field(
         default="best-fit",
         validate_default=True,
         description="how the pose is found; none is also the default where a datum is given",
     )
-    method: Literal["exact", "circle", "chord", "pcp", "veaw", "inversion"] = Field(
-        default="exact", description="how deviations are found: exact, or one of the published approximations"
-    )
+    method: Method = Field(default="exact", description="how deviations are found: exact, or one of the published approximations")
     coverage_min: float = Field(
         default=0.95, ge=0, le=1, description="the share of the nominal's length that must be measured before conform is proven"
     )
@@ -234,11 +227,11 @@ class Registration(_Settings):
     @classmethod
     def _outliers_are_those_of_a_fit(cls, reject: bool, info: ValidationInfo) -> bool:
         if reject and info.data.get("fit") == "none":
-            raise ValueError("false without a fit: outliers are found by fitting the other points")
+            raise ValueError("false where fit is none: outliers are found by fitting the other points")
         return reject
 
 
-class Discretisation(_Settings):
+class Discretisation(Settings):
     """How finely the nominal is sampled."""
 
     samples: int = Field(default=10_000, ge=8, le=400_000, description="the number of samples to begin with, even in the parameter")
@@ -246,7 +239,7 @@ class Discretisation(_Settings):
     step_min: float = Field(default=1e-4, gt=0, lt=1, description="the smallest step between samples, as a share of the parameter's range")
 
 
-class Plan(_Settings):
+class Plan(Settings):
     """One inspection: what, against what, with what, and where the results go."""
 
     part: Part = Field(description="a mapping with the part's name")

@@ -7,35 +7,31 @@ from these descriptions.
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from cmmlink.errors import PlanError, YamlError
 from cmmlink.plan.scan import Nominal, Part, Registration, Tolerance
-from cmmlink.plan.yaml_model import read_model
+from cmmlink.plan.yaml_model import Positive, Settings, read_model
 from drivers import PointFileError, read_text
 
-Positive = Annotated[float, Field(gt=0)]
+CutterName = Literal["auto", "open3d", "numpy"]
 
 
-class _Settings(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, str_strip_whitespace=True)
-
-
-class Mesh(_Settings):
+class Mesh(Settings):
     """The surface."""
 
     file: Path = Field(description="the surface file: STL, PLY or OBJ")
     scale: Positive = Field(default=1.0, description="how many mm a unit of the file is")
 
 
-class NominalAt(_Settings):
+class NominalAt(Settings):
     """A nominal of its own for the section at one height; scale, ends and material as for the common nominal."""
 
     height_mm: float = Field(description="one of the heights")
     file: Path = Field(description="the file of the nominal profile there")
 
 
-class Sections(_Settings):
+class Sections(Settings):
     """Where the surface is cut."""
 
     normal: tuple[float, float, float] = Field(default=(0.0, 0.0, 1.0), description="the part's axis in the scan, of any length")
@@ -63,10 +59,10 @@ class Sections(_Settings):
         return self
 
 
-class Cut(_Settings):
+class Cut(Settings):
     """How the surface is cut."""
 
-    cutter: Literal["auto", "open3d", "numpy"] = Field(
+    cutter: CutterName = Field(
         default="auto",
         description="what cuts; auto: Open3D where it is there, numpy for more than 50 sections; the points are the same",
     )
@@ -76,7 +72,7 @@ class Cut(_Settings):
     )
 
 
-class CtPlan(_Settings):
+class CtPlan(Settings):
     """One CT inspection: a surface, its sections, and what they are held against."""
 
     part: Part = Field(description="a mapping with the part's name")

@@ -11,10 +11,10 @@ import types
 import typing
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any, NoReturn, TypeVar
+from typing import Annotated, Any, NoReturn, TypeVar
 
 import yaml
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import ErrorDetails
 
 from cmmlink.errors import YamlError
@@ -36,10 +36,17 @@ _IN_OUR_WORDS = {
     "list_type": "a list in brackets",
 }
 Model = TypeVar("Model", bound=BaseModel)
+Positive = Annotated[float, Field(gt=0)]
 
 _DEEPEST = 20
 _NULL = ("", "~", "null", "Null", "NULL")
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # libyaml where the wheel has it: a hundred times faster on long lists
+
+
+class Settings(BaseModel):
+    """A group of keys: immutable, no further keys, finite numbers, text without blanks around it."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, str_strip_whitespace=True)
 
 
 def read_model(text: str, model: type[Model]) -> Model:
@@ -159,7 +166,13 @@ def _allowed(error: ErrorDetails, owner: type[BaseModel] | None, path: Path) -> 
         return f"a mapping with {', '.join(_keys(_models(known.annotation)[0]))}" if known else "a mapping"
     if kind == "float_parsing" and re.fullmatch(r"\s*[+-]?\d+,\d+\s*", str(error["input"])):
         return "a number, with a decimal point"
-    return _IN_OUR_WORDS.get(kind) or re.sub(r"^(Value error, |Input should be )", "", error["msg"])
+    return words_of_allowed(error)
+
+
+def words_of_allowed(error: ErrorDetails) -> str:
+    """What pydantic would have taken in place of a wrong value, in our words where it speaks of Python."""
+    allowed = re.sub(r"^(Value error, |Input should be )", "", error["msg"])
+    return _IN_OUR_WORDS.get(error["type"]) or re.sub(r"^(greater|less) than", r"a number \1 than", allowed)
 
 
 def _place(location: tuple[str | int, ...], document: _Document, model: type[BaseModel]) -> tuple[Path, type[BaseModel] | None]:

@@ -16,7 +16,7 @@ from pydantic import ValidationError
 
 from cmmlink.errors import PlanError, StoreError, YamlError
 from cmmlink.events import RunStarted, Sink
-from cmmlink.from_plan import planned_inspection, planned_profile
+from cmmlink.from_plan import inspection_of, profile_of
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan.scan import Device, Plan
 from cmmlink.plan.yaml_model import read_model
@@ -82,7 +82,7 @@ def replay(
     decoder = _recorded_decoder(plan.device, recorded, decoder_of)
     source = Capture(_arrivals(store, recorded, decoder, stop), decoder, _failure(recorded))
     started = RunStarted(*(recorded.header[key] for key in ("part", "serial_number", "operator", "device", "simulated")))
-    live = planned_inspection(changed, profile)
+    live = inspection_of(changed, profile)
     outcome = run_inspection(source, live, sinks, started, buffer_points=plan.buffer_points, clock=clock, stop=stop)
     facts = summary(outcome.result, outcome.counts)
     identical = None
@@ -126,7 +126,7 @@ def recorded_profile(plan: Plan, recorded: RecordedRun) -> NominalProfile:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / Path(str(recorded.header["nominal"])).name
         file.write_bytes(recorded.nominal)
-        return planned_profile(plan.model_copy(update={"nominal": plan.nominal.model_copy(update={"file": file})}))
+        return profile_of(plan.model_copy(update={"nominal": plan.nominal.model_copy(update={"file": file})}))
 
 
 def _failure(recorded: RecordedRun) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 
 from cmmlink.errors import PlanError
 from cmmlink.report.deviations_csv import write_deviations
+from cmmlink.run import FinishedRun
 from inspection import InspectionResult, NominalProfile
 
 
@@ -16,7 +17,7 @@ def prepare(folder: Path | None) -> None:
     """Make the folder and see that it takes files, before anything is measured in vain. Raises PlanError."""
     if folder is None:
         return
-    with _told_of(folder):
+    with _or_refuse(folder):
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass
@@ -24,7 +25,7 @@ def prepare(folder: Path | None) -> None:
 
 def write_results(folder: Path, facts: dict[str, Any], result: InspectionResult | None, profile: NominalProfile, title: str) -> list[str]:
     """Write result.json, and where something was judged deviations.csv and profile.png; their names. Raises PlanError."""
-    with _told_of(folder):
+    with _or_refuse(folder):
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "result.json").write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
         for name in ("deviations.csv", "profile.png"):
@@ -38,9 +39,14 @@ def write_results(folder: Path, facts: dict[str, Any], result: InspectionResult 
     return ["result.json", "deviations.csv", "profile.png"]
 
 
+def write_run(folder: Path, run: FinishedRun) -> list[str]:
+    """Write the files of a finished run; their names. Raises PlanError."""
+    return write_results(folder, run.result_json(), run.outcome.result, run.profile, run.title)
+
+
 @contextmanager
-def _told_of(folder: Path) -> Iterator[None]:
-    """Turn what the system says of a folder into a message."""
+def _or_refuse(folder: Path) -> Iterator[None]:
+    """Turn an error of the file system into one that says what to do."""
     try:
         yield
     except OSError as error:

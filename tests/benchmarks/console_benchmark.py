@@ -28,9 +28,10 @@ from numpy.typing import NDArray
 from playwright.sync_api import CDPSession, Page, sync_playwright
 
 from cmmlink.console.server import ConsoleServer
-from cmmlink.console.station import Connected, Station
+from cmmlink.console.station import Station
+from cmmlink.devices import Connected
 from cmmlink.events import Counts, Judged, RunStarted
-from cmmlink.from_plan import planned_inspection, planned_profile
+from cmmlink.from_plan import inspection_of, profile_of
 from cmmlink.plan.scan import Plan, load_plan
 from cmmlink.run_view import RunContext, RunView
 from drivers.source import Arrival, PointBatch
@@ -144,7 +145,7 @@ def serve(answer: Connection, rate: int, held: int, alone: bool) -> None:
     """Serve a run that goes on until told to end."""
     with tempfile.TemporaryDirectory() as folder:
         plan_file = write_plan(Path(folder), text=PLAN + DATUM)
-        source = Rated(planned_profile(load_plan(plan_file)), rate, held)
+        source = Rated(profile_of(load_plan(plan_file)), rate, held)
         station = Station(means({"blade.yaml": plan_file}, source.connect))
         server = ConsoleServer(station, "benchmark")
         server.start()
@@ -219,8 +220,8 @@ class Alone:
 
     def __init__(self, plan_file: Path, source: Rated) -> None:
         plan = load_plan(plan_file)
-        profile = planned_profile(plan)
-        self.whole = planned_inspection(plan, profile).add(source.points)
+        profile = profile_of(plan)
+        self.whole = inspection_of(plan, profile).add(source.points)
         self.source = source
         self.view = RunView(RunContext("1", "blade.yaml", profile, plan.tolerance.zone, 0.95, 500_000, now()), time.monotonic, now)
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from cmmlink.demo import plan_file
 from cmmlink.events import RunStarted, Sink
-from cmmlink.from_plan import planned_inspection, planned_profile
+from cmmlink.from_plan import inspection_of, profile_of
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan.scan import Datum, Plan, Registration, load_plan
 from cmmlink.record.reader import recording
@@ -44,7 +44,7 @@ def plan_with_known_pose() -> Plan:
 
 @cache
 def small_profile() -> NominalProfile:
-    return planned_profile(small_plan())
+    return profile_of(small_plan())
 
 
 def decoder_of(_: object) -> AsciiDecoder:
@@ -105,7 +105,7 @@ def record(
     """Carry out and record one run; `before` are sinks that hear of every event before the recorder."""
     plan = plan or small_plan()
     started = RunStarted(plan.part.name, "T-1", "operator", "scripted", True)
-    live = planned_inspection(plan, small_profile())
+    live = inspection_of(plan, small_profile())
     with (
         recording(folder, today) as store,
         Recorder(store, Basis.of(plan), clock=time.monotonic, today=today, acknowledge=acknowledge, commit_s=commit_s) as recorder,

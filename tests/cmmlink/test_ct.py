@@ -413,7 +413,7 @@ def test_bad_input_is_one_message_and_status_2(cmmlink: Command, blade: tuple[Pa
         ([tmp_path / "part.step", *options, "--heights", 5], "expected .stl, .ply or .obj"),
         ([mesh, *options, "--heights", 25], "misses the surface"),
         ([mesh, *options], "either heights_mm or every_mm"),
-        ([mesh, *options, "--every", 0], "every_mm"),
+        ([mesh, *options, "--every", 0], "--every is 0: expected a number greater than 0"),
         ([mesh, *options, "--every", 1e-9], "expected 1 to 100000"),
         ([mesh, *options, "--heights", 5, "--normal", 0, 0, 0], "direction"),
         ([mesh, *options, "--heights", 5, "--nominal-at", "x", nominal], "--nominal-at x="),

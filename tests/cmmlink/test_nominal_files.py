@@ -262,9 +262,9 @@ BAD: dict[str, tuple[str, str | bytes, str]] = {
     "yaml word": ("a.yaml", QUARTER.replace("0.7", "o.7"), "line 4: weights[1] is 'o.7071067811865476'; expected a number"),
     "yaml point of three": ("a.yaml", QUARTER.replace("[1, 1]", "[1, 1, 0]"), "line 3: control_points_mm[1]"),
     "yaml knots": ("a.yaml", QUARTER.replace("[0, 0, 0, 1", "[0, 0, 1"), "3 control points of degree 2 need 6 knots, got 5"),
-    "yaml weight": ("a.yaml", QUARTER.replace("[1, 0.7", "[0, 0.7"), "line 4: weights[0] is '0'; expected greater than"),
+    "yaml weight": ("a.yaml", QUARTER.replace("[1, 0.7", "[0, 0.7"), "line 4: weights[0] is '0'; expected a number greater than"),
     "yaml not closed": ("a.yaml", QUARTER + "closed: true\n", "a closed curve must end where it begins: the gap is 1.41421 mm"),
-    "yaml huge": ("a.yaml", QUARTER.replace("[1, 1]", "[1, 1e99]"), "line 3: control_points_mm[1][1] is '1e99'; expected less than"),
+    "yaml huge": ("a.yaml", QUARTER.replace("[1, 1]", "[1, 1e99]"), "line 3: control_points_mm[1][1] is '1e99'; expected a number less"),
     "yaml one place": ("a.yaml", QUARTER.replace("[1, 1], [0, 1]", "[1, 0], [1, 0]"), "the control points lie within 0 mm"),
     "yaml list": ("a.yaml", "- 1\n", "line 1: found a list of 1"),
 }

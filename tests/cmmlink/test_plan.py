@@ -106,7 +106,7 @@ MISTAKES = {
     ),
     "limits crossed": (
         SHORT.replace("upper_mm: 0.05", "upper_mm: -0.06"),
-        "line 5: tolerance.upper_mm is '-0.06'; expected a number above lower_mm, which is -0.05",
+        "line 5: tolerance.upper_mm is '-0.06'; expected a number above the lower limit, -0.05",
     ),
     "limits equal": (SHORT.replace("upper_mm: 0.05", "upper_mm: -0.05"), "line 5: tolerance.upper_mm is '-0.05'; expected a number above"),
     "uncertainty": (
@@ -117,7 +117,7 @@ MISTAKES = {
     "decimal comma": (SHORT.replace("-0.05", "-0,05"), "line 4: tolerance.lower_mm is '-0,05'; expected a number, with a decimal point"),
     "empty value": (SHORT.replace("-0.05", ""), "line 4: tolerance.lower_mm is empty; expected a number"),
     "infinite": (SHORT.replace("1e2", "inf"), "line 2: nominal.scale is 'inf'; expected a finite number"),
-    "zero scale": (SHORT.replace("1e2", "0"), "line 2: nominal.scale is '0'; expected greater than 0"),
+    "zero scale": (SHORT.replace("1e2", "0"), "line 2: nominal.scale is '0'; expected a number greater than 0"),
     "device type": (
         SHORT.replace("serial, ", "seriel, "),
         "line 6: device.type is 'seriel'; did you mean serial? Allowed: serial, modbus, file",
@@ -129,7 +129,7 @@ MISTAKES = {
     ),
     "outliers without a fit": (
         SHORT + "registration:\n  fit: none\n  reject_outliers: true\n",
-        "line 9: registration.reject_outliers is 'true'; expected false without a fit: outliers are found by fitting the other points",
+        "line 9: registration.reject_outliers is 'true'; expected false where fit is none: outliers are found by fitting the other points",
     ),
     "baud rate": (SHORT.replace("COM3", "COM3, baud_rate: 9.6k"), "line 6: device.baud_rate is '9.6k'; expected a whole number"),
     "device no mapping": (
@@ -159,7 +159,7 @@ MISTAKES = {
         "line 7: section.x_axis is a list of 3; expected a direction other than",
     ),
     "letter in vector": (SHORT + "section:\n  normal:\n  - 0\n  - a\n  - 1\n", "line 10: section.normal[1] is 'a'; expected a number"),
-    "samples": (SHORT + "discretisation: {samples: 4}\n", "line 7: discretisation.samples is '4'; expected greater than or equal to 8"),
+    "samples": (SHORT + "discretisation: {samples: 4}\n", "line 7: discretisation.samples is '4'; expected a number greater than or equal"),
     "twice": (SHORT + "out: a\nout: b\n", "line 8: out is given twice, first on line 7"),
     "twice inside": (SHORT.replace("upper_mm", "lower_mm"), "line 5: tolerance.lower_mm is given twice, first on line 4"),
     "alias": (SHORT + "out: &here x\nrecords: *here\n", "line 7: anchors (&) and aliases (*) are not supported"),

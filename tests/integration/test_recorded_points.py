@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from cmmlink.demo import part_path, plan_file
 from cmmlink.events import Event, Judged, RunStarted
-from cmmlink.from_plan import planned_inspection, planned_profile
+from cmmlink.from_plan import inspection_of, profile_of
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan.scan import Datum, Plan, Registration, load_plan
 from drivers.source import Arrival, PointBatch, ScanClosed, ScanOpened
@@ -60,7 +60,7 @@ def plan() -> Plan:
 
 @pytest.fixture(scope="module")
 def profile(plan: Plan) -> NominalProfile:
-    return planned_profile(plan)
+    return profile_of(plan)
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +77,7 @@ def carried_out(plan: Plan, profile: NominalProfile, points_mm: NDArray[np.float
             judged.append(event)
 
     started = RunStarted("part", "", "", "recorded", False)
-    source, live = Recorded(points_mm, size), planned_inspection(plan, profile)
+    source, live = Recorded(points_mm, size), inspection_of(plan, profile)
     outcome = run_inspection(source, live, [sink], started, buffer_points=size, clock=lambda: 0.0, stop=threading.Event())
     return outcome, judged
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import yaml
 
-from cmmlink.commands import decoder_of
+from cmmlink.devices import decoder_of
 from cmmlink.errors import StoreError
 from cmmlink.record.reader import reading, recorded_run
 from cmmlink.record.replay import replay

@@ -11,7 +11,7 @@ from playwright.sync_api import Browser, Page, expect, sync_playwright
 from cmmlink.console.ct_import import InspectSurface
 from cmmlink.console.server import ConsoleServer
 from cmmlink.console.station import Records, Station
-from cmmlink.from_plan import planned_profile
+from cmmlink.from_plan import profile_of
 from cmmlink.plan.scan import load_plan
 from inspection import NominalProfile, rehearse
 
@@ -48,7 +48,7 @@ def browser(request: pytest.FixtureRequest) -> Iterator[Browser]:
 @pytest.fixture(scope="session", autouse=True)
 def compiled(tmp_path_factory: pytest.TempPathFactory) -> None:
     """Compile the inspection before any page waits for it: it takes long once after installation."""
-    rehearse(planned_profile(load_plan(write_plan(tmp_path_factory.mktemp("compiled")))))
+    rehearse(profile_of(load_plan(write_plan(tmp_path_factory.mktemp("compiled")))))
 
 
 @dataclass
@@ -102,7 +102,7 @@ def make_bench(browser: Browser, tmp_path: Path) -> Iterator[MakeBench]:
         station = Station(replace(means(files, device.connect, records), ct_plans=lambda: known, inspect_surface=inspect))
         server = ConsoleServer(station, "test", host, token=TOKEN)
         server.start()
-        made.append(Bench(station, server, device, planned_profile(load_plan(files[plans[0]])), browser))
+        made.append(Bench(station, server, device, profile_of(load_plan(files[plans[0]])), browser))
         return made[-1]
 
     yield make

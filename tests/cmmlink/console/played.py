@@ -10,7 +10,8 @@ from time import monotonic
 import numpy as np
 from numpy.typing import NDArray
 
-from cmmlink.console.station import Connected, Means, Records
+from cmmlink.console.station import Means, Records
+from cmmlink.devices import Connected
 from cmmlink.plan.scan import Plan
 from drivers.errors import DeviceError
 from drivers.source import Arrival, PointBatch, ScanClosed, ScanOpened

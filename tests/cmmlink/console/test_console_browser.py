@@ -16,7 +16,7 @@ import pytest
 from numpy.typing import NDArray
 from playwright.sync_api import Browser, Page, expect
 
-from cmmlink.commands import _inspect_surface
+from cmmlink.commands.console import inspect_surface
 from cmmlink.console.ct_import import Section
 from cmmlink.console.past_runs import PastRuns, Recorded
 from cmmlink.console.protocol import RunRow
@@ -497,7 +497,7 @@ def test_surface_is_imported_with_progress_and_its_sections_opened(make_bench: M
             if section.height_mm == 8:
                 assert released.wait(60)
 
-        return _inspect_surface(file, stop, on_start, one_by_one)
+        return inspect_surface(file, stop, on_start, one_by_one)
 
     bench = make_bench(surfaces={"ct.yaml": plan}, inspect=inspect)
     page = bench.page()

@@ -16,7 +16,7 @@ from cmmlink.console.station import Refused, Station, checked, next_serial_numbe
 from cmmlink.errors import PlanError
 from cmmlink.events import RunStarted
 from cmmlink.extremes import Extremes, PointsVersion
-from cmmlink.from_plan import planned_profile
+from cmmlink.from_plan import profile_of
 from cmmlink.pipeline import RunOutcome
 from cmmlink.plan.scan import Plan, load_plan
 from drivers.errors import LinkError
@@ -33,7 +33,7 @@ class Bench:
     def __init__(self, folder: Path) -> None:
         self.device = Device()
         plan = write_plan(folder)
-        self.profile = planned_profile(load_plan(plan))
+        self.profile = profile_of(load_plan(plan))
         self.past = PastRuns(folder / "records", lambda _: None, monotonic, lambda: datetime.now().astimezone())
         self.station = Station(means({"blade.yaml": plan}, self.device.connect, self.past))
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import pytest
 
-from cmmlink import commands as cli
+from cmmlink.commands import setup
 from cmmlink.commands.open3d_doctor import look_after_open3d
 from drivers.surface.open3d_process import Open3DStatus
 
@@ -46,10 +46,10 @@ def _never(command: Sequence[str]) -> int:
 def test_the_command_says_what_was_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
     said: list[str] = []
     monkeypatch.setattr("typer.echo", said.append)
-    monkeypatch.setattr(cli, "look_after_open3d", lambda say: say("Open3D: looked at") is None)
-    assert cli.doctor() == 0
+    monkeypatch.setattr(setup, "look_after_open3d", lambda say: say("Open3D: looked at") is None)
+    assert setup.doctor() == 0
     assert said[0].startswith("cmmlink ")
     assert said[1:2] == ["inspection: compiled and working"]
     assert said[-1] == "Open3D: looked at"
-    monkeypatch.setattr(cli, "look_after_open3d", lambda _: False)
-    assert cli.doctor() == 2
+    monkeypatch.setattr(setup, "look_after_open3d", lambda _: False)
+    assert setup.doctor() == 2

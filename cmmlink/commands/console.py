@@ -1,0 +1,159 @@
+"""The console brought to the operator: the command `console`, and a single run shown on the page."""
+
+import re
+import sys
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from platformdirs import user_data_path
+
+from cmmlink import __version__
+from cmmlink.commands.options import NoBrowser, Records, records_folder
+from cmmlink.commands.output import Output, now, report_outcome, stop_on_ctrl_c
+from cmmlink.console.ct_import import Section
+from cmmlink.console.launch import CONSOLE_PORT, graphical_browser, kept_token, served, stay_while_seen
+from cmmlink.console.past_runs import PastRuns
+from cmmlink.console.station import Means, Refused
+from cmmlink.devices import Connect, connect, decoder_of, serial_ports
+from cmmlink.errors import PlanError
+from cmmlink.events import RunStarted
+from cmmlink.pipeline import RunOutcome
+from cmmlink.plan.scan import Plan
+from cmmlink.plan.surface import CtPlan, load_ct_plan
+from cmmlink.report.folder import prepare, write_run
+from cmmlink.report.stack_folder import write_stack
+from cmmlink.run import FinishedRun
+from cmmlink.run_view import Ended, RunContext
+from cmmlink.stack import SectionOutcome, inspect_stack
+from cmmlink.words import VERDICT_WORDS
+from inspection import NominalProfile
+
+if TYPE_CHECKING:
+    from cmmlink.console.server import ConsoleServer
+
+_PAGE_OPENS_S = 20.0  # a run waits so long for the page that is to show it
+_LOOK_S = 0.2
+_LONGEST_PLAN = 200_000
+_BUFFER_POINTS = 500_000
+
+
+def serve_console(
+    folder: Annotated[Path, typer.Argument(metavar="[FOLDER]", help="Folder of the station's plans.")] = Path(),
+    host: Annotated[str, typer.Option(help="Address to serve; another than 127.0.0.1 opens the console to the network.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535, help="0 takes a free one.")] = CONSOLE_PORT,
+    no_browser: NoBrowser = False,
+    records: Records = None,
+) -> int:
+    """Serve the operator console: plans, runs, history and CT import of this station on one page."""
+    if not folder.is_dir():
+        raise PlanError(f"{folder}: there is no such folder; give the folder that holds the plans")
+    past = _past_runs(records)
+    scans, surfaces = (lambda: _plans_in(folder, surfaces=False)), (lambda: _plans_in(folder, surfaces=True))
+    means = Means(scans, connect, serial_ports, past, time.monotonic, now, surfaces, inspect_surface, _writer(past))
+    token = kept_token(user_data_path("cmmlink", appauthor=False))
+    with stop_on_ctrl_c() as stop, served(means, __version__, host, port, token) as server:
+        _show(server, no_browser)
+        while not stop.wait(_LOOK_S):
+            pass
+    return 0
+
+
+def run_on_page(plan_file: Path, connect: Connect, output: Output) -> int:
+    """Carry out a plan on the console's page, and stay for the next part while the page is open."""
+    past = _past_runs(output.records)
+    write = _writer(past, output.out)
+    means = Means(lambda: {plan_file.name: plan_file}, connect, serial_ports, past, time.monotonic, now, write=write)
+    with stop_on_ctrl_c() as stop, served(means, __version__) as server:
+        station = server.station
+        _show(server, output.no_browser)
+        server.wait_for_page(_PAGE_OPENS_S)
+        try:
+            station.choose(plan_file.name)
+            station.start()
+        except Refused as refusal:
+            raise PlanError(str(refusal)) from None
+        while not station.wait(_LOOK_S):
+            if stop.is_set():
+                station.abort()
+        if station.failure is not None:
+            raise station.failure
+        assert station.outcome is not None
+        assert station.started is not None
+        assert station.view is not None
+        finished = FinishedRun(station.view.context.profile, station.started, station.outcome, past.evidence)
+        code = report_outcome(finished, replace(output, out=None))
+        if station.unwritten is not None:
+            raise station.unwritten
+        if output.out is not None:
+            typer.echo(f"results in {output.out}")
+        if server.pages and not stop.is_set():
+            sys.stderr.write("the page stays for the next part until it is closed, or Ctrl-C\n")
+            stay_while_seen(server, stop)
+    return code
+
+
+def inspect_surface(file: Path, stop: threading.Event, on_start: Callable[[int], None], on_section: Callable[[Section], None]) -> str:
+    """Inspect the surface of a CT plan for the console; says in one sentence what came of it."""
+    plan = load_ct_plan(file)
+    prepare(plan.out)
+    stack = inspect_stack(
+        plan, clock=time.monotonic, stop=stop, on_start=on_start, on_section=lambda section: on_section(_section(plan, section, file.name))
+    )
+    if plan.out is not None:
+        write_stack(plan.out, stack, plan.tolerance.zone, plan.part.name, pictures=False)
+    sentences = [f"{VERDICT_WORDS[stack.verdict]}: {len(stack.sections)} sections of {plan.mesh.file.name}", *stack.notes]
+    return ". ".join([*sentences, *([f"Results in {plan.out}"] if plan.out is not None else [])])
+
+
+def _section(plan: CtPlan, outcome: SectionOutcome, plan_name: str) -> Section:
+    height_mm, run = outcome.slice.height_mm, outcome.run
+    title = f"Section at height {height_mm:.3f} mm of {plan.mesh.file.name}"
+    context = RunContext(title, plan_name, outcome.profile, plan.tolerance.zone, plan.registration.coverage_min, _BUFFER_POINTS, now())
+    started = RunStarted(plan.part.name, plan.part.serial_number or "", "", plan.mesh.file.name, simulated=False)
+    ended = Ended(run.ending, str(run.refusal or ""), outcome.facts(), run.result)
+    return Section(height_mm, context, started, ended, outcome.warnings)
+
+
+def _past_runs(folder: Path | None) -> PastRuns:
+    return PastRuns(records_folder(folder), decoder_of, time.monotonic, now)
+
+
+def _writer(past: PastRuns, out: Path | None = None) -> Callable[[Plan, NominalProfile, RunOutcome, RunStarted], None]:
+    """What writes the results of every run on a page into a folder, or into that of its plan."""
+
+    def write(plan: Plan, profile: NominalProfile, outcome: RunOutcome, started: RunStarted) -> None:
+        folder = out or plan.out
+        if folder is not None:
+            write_run(folder, FinishedRun(profile, started, outcome, past.evidence))
+
+    return write
+
+
+def _show(server: "ConsoleServer", no_browser: bool) -> None:
+    """Say where the page is, and open it."""
+    sys.stderr.write(f"console: {server.address}\n")
+    if server.remote:
+        sys.stderr.write("WARNING: the console is open to the network, unencrypted; whoever knows this address can control it\n")
+    sys.stderr.flush()
+    browser = None if no_browser else graphical_browser()
+    if browser is not None:
+        browser.open(server.address)
+
+
+def _plans_in(folder: Path, surfaces: bool) -> dict[str, Path]:
+    """The plans of scans in a folder, or those of CT surfaces."""
+    files = (path for path in sorted(folder.iterdir()) if path.suffix in (".yaml", ".yml") and path.is_file())
+    return {path.name: path for path in files if _is_of_surface(path) == surfaces}
+
+
+def _is_of_surface(plan_file: Path) -> bool:
+    try:
+        with plan_file.open("rb") as opened:
+            return re.search(rb"^mesh\s*:", opened.read(_LONGEST_PLAN), re.MULTILINE) is not None
+    except OSError:
+        return False

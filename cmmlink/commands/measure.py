@@ -1,0 +1,159 @@
+"""Commands that measure and judge: the demonstration, a plan with its device, a file of points."""
+
+import itertools
+import math
+import sys
+import time
+from contextlib import nullcontext
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from cmmlink.commands.console import run_on_page
+from cmmlink.commands.options import (
+    Closed,
+    Headless,
+    Json,
+    NoBrowser,
+    NominalScale,
+    Out,
+    PlanFile,
+    Records,
+    RejectOutliers,
+    Uncertainty,
+    plan_from_options,
+    records_folder,
+)
+from cmmlink.commands.output import Output, now, report_outcome, stop_on_ctrl_c
+from cmmlink.demo import plan_file as demo_plan_file
+from cmmlink.devices import Connect, connect
+from cmmlink.errors import PlanError
+from cmmlink.from_plan import check_plan, inspection_of, profile_of
+from cmmlink.plan.scan import Plan, load_plan
+from cmmlink.report.folder import prepare
+from cmmlink.report.terminal import LiveTable
+from cmmlink.run import carry_out
+from cmmlink.simulated import connect_demo_device
+from inspection import FitName, Material, Method, NominalProfile
+
+_OPTION_OF = {
+    "device": "POINTS",
+    "nominal.file": "--nominal",
+    "nominal.scale": "--scale",
+    "tolerance.uncertainty_mm": "--uncertainty",
+    "tolerance": "--tolerance",
+    "probe.tip_radius_mm": "--tip-radius",
+    "registration.coverage_min": "--coverage-min",
+    "registration.reject_outliers": "--reject-outliers",
+}
+
+
+def demo(
+    headless: Headless = False,
+    seed: Annotated[int, typer.Option(min=0, metavar="N", help="Another seed is another part.")] = 1,
+    defect: Annotated[str | None, typer.Option(metavar="MM@STATION", help="A local defect, like 0.12@40.")] = None,
+    out: Out = Path("demo-result"),
+    records: Records = None,
+    as_json: Json = False,
+    no_browser: NoBrowser = False,
+) -> int:
+    """Run the whole chain on a simulated device, no set-up."""
+    plan = load_plan(demo_plan_file())
+    profile = check_plan(plan, demo_plan_file())
+    bump = None if defect is None else _defect(defect, profile.length_mm)
+    prepare(out)
+    output = Output(headless, as_json, out, records, no_browser)
+    if output.on_page:
+        seeds = itertools.count(seed)
+        return run_on_page(demo_plan_file(), lambda plan: connect_demo_device(plan, profile, next(seeds), bump), output)
+    return _run(plan, profile, lambda plan: connect_demo_device(plan, profile, seed, bump), output)
+
+
+def _defect(text: str, length_mm: float) -> tuple[float, float]:
+    """Height and station of a defect, both in mm."""
+    height, _, station = text.partition("@")
+    try:
+        bump = float(height), float(station)
+    except ValueError:
+        bump = math.nan, math.nan
+    if not (math.isfinite(bump[0]) and 0 <= bump[1] <= length_mm):
+        meaning = f"expected MM@STATION, a station between 0 and {length_mm:.1f} mm"
+        raise PlanError(f"--defect {text}: {meaning}, like 0.12@40 for 0.12 mm of excess at station 40 mm")
+    return bump
+
+
+def run(
+    plan_file: PlanFile,
+    headless: Headless = False,
+    out: Out = None,
+    records: Records = None,
+    as_json: Json = False,
+    no_browser: NoBrowser = False,
+) -> int:
+    """Acquire and inspect with the device of a plan."""
+    plan = load_plan(plan_file)
+    profile = check_plan(plan, plan_file)
+    prepare(out or plan.out)
+    output = Output(headless, as_json, out or plan.out, records or plan.records, no_browser)
+    return run_on_page(plan_file, connect, output) if output.on_page else _run(plan, profile, connect, output)
+
+
+def _run(plan: Plan, profile: NominalProfile, connect: Connect, output: Output) -> int:
+    """Carry out a plan with a record and, where somebody looks at the terminal, with a live table; report what came of it."""
+    quiet = output.headless or output.as_json or not sys.stderr.isatty()
+    table = None if quiet else LiveTable(Console(stderr=True), plan.tolerance.zone)
+    with connect(plan) as device, stop_on_ctrl_c() as stop, table or nullcontext():
+        finished = carry_out(
+            plan,
+            profile,
+            device,
+            records=records_folder(output.records),
+            clock=time.monotonic,
+            now=now,
+            stop=stop,
+            sinks=[table] if table else [],
+        )
+    return report_outcome(finished, output)
+
+
+def inspect(
+    points: Annotated[Path, typer.Argument(metavar="POINTS", help="Measured points: csv, txt, asc, xyz or npy.")],
+    nominal: Annotated[Path, typer.Option(metavar="FILE", help="The nominal profile.")],
+    tolerance: Annotated[tuple[float, float], typer.Option(metavar="LO HI", help="Deviations allowed, mm, positive out of material.")],
+    method: Annotated[Method, typer.Option(help="How deviations are found.")] = "exact",
+    fit: Annotated[FitName, typer.Option(help="How points come onto the nominal.")] = "best-fit",
+    tip_radius: Annotated[float, typer.Option(metavar="R", help="The points are centres of a ball of this radius, mm.")] = 0.0,
+    uncertainty: Uncertainty = 0.0,
+    scale: NominalScale = 1.0,
+    closed: Closed = None,
+    material: Annotated[Material | None, typer.Option(help="Side of the material, seen along the nominal.")] = None,
+    coverage_min: Annotated[
+        float, typer.Option(min=0, max=1, metavar="SHARE", help="Share of the nominal to be measured before conform is proven.")
+    ] = 0.95,
+    reject_outliers: RejectOutliers = False,
+    out: Out = None,
+    as_json: Json = False,
+) -> int:
+    """Inspect a file of points."""
+    settings = {
+        "part": {"name": points.stem.strip() or points.name},
+        "nominal": {"file": nominal, "scale": scale, "closed": closed, "material": material},
+        "tolerance": {"lower_mm": tolerance[0], "upper_mm": tolerance[1], "uncertainty_mm": uncertainty},
+        "device": {"type": "file", "file": points},
+        "probe": {"tip_radius_mm": tip_radius},
+        "registration": {"fit": fit, "method": method, "coverage_min": coverage_min, "reject_outliers": reject_outliers},
+    }
+    plan = plan_from_options(Plan, settings, _OPTION_OF)
+    profile = profile_of(plan)
+    with connect(plan) as device, stop_on_ctrl_c() as stop:
+        try:
+            inspection_of(plan, profile)
+        except ValueError as error:
+            raise PlanError(f"--tip-radius {tip_radius:g}: {error}") from None
+        prepare(out)
+        finished = carry_out(plan, profile, device, records=None, clock=time.monotonic, now=now, stop=stop)
+    if finished.outcome.refusal is not None:
+        raise PlanError(f"{points}: {finished.outcome.refusal}")
+    return report_outcome(finished, Output(headless=True, as_json=as_json, out=out))

@@ -1,0 +1,49 @@
+"""Options that several commands share, and what they mean."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, TypeVar
+
+import typer
+from pydantic import BaseModel, ValidationError
+
+from cmmlink.errors import PlanError
+from cmmlink.plan.yaml_model import words_of_allowed
+from cmmlink.record.reader import default_folder
+
+PlanFile = Annotated[Path, typer.Argument(metavar="PLAN.yaml", help="The inspection plan.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of words.")]
+RejectOutliers = Annotated[
+    bool, typer.Option("--reject-outliers", help="Fit without gross outliers and reject them; conform is then not proven.")
+]
+Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for deviations.csv, result.json and profile.png.")]
+Records = Annotated[Path | None, typer.Option("--records", metavar="DIR", help="Folder of the run records.")]
+RunName = Annotated[str, typer.Argument(metavar="RUN", help="The id of a run, the beginning of one, or last.")]
+Headless = Annotated[bool, typer.Option("--headless", help="No page, no live table.")]
+NoBrowser = Annotated[bool, typer.Option("--no-browser", help="Serve the page and print its address, but open no browser.")]
+Uncertainty = Annotated[float, typer.Option(metavar="U", help="Expanded uncertainty of a deviation, mm.")]
+NominalScale = Annotated[float, typer.Option(metavar="S", help="Units of the nominal file to mm (a chord, for airfoils).")]
+Closed = Annotated[bool | None, typer.Option("--closed/--open", help="Close the nominal, or leave it open.")]
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def records_folder(records: Path | None) -> Path:
+    """The folder of the run records: the one that was asked for, or the user's own."""
+    return records or default_folder()
+
+
+def plan_from_options(model: type[Model], settings: Mapping[str, object], option_of: Mapping[str, str]) -> Model:
+    """Validate a plan that is made of options. Raises PlanError, which names the option that is wrong.
+
+    option_of : option for a key of the plan, or for the keys below it
+    """
+    try:
+        return model.model_validate(settings)
+    except ValidationError as failure:
+        problem = failure.errors()[0]
+        place = ".".join(str(part) for part in problem["loc"])
+        option = next((option for key, option in option_of.items() if f"{place}.".startswith(f"{key}.")), place or "the options")
+        value = problem["input"]
+        found = f" is {value:g}" if isinstance(value, int | float) and not isinstance(value, bool) else ""
+        raise PlanError(f"{option}{found}: expected {words_of_allowed(problem)}") from None

@@ -1,0 +1,95 @@
+"""How commands speak: words or JSON on standard output, files in a folder, and what came of a run."""
+
+import json
+import signal
+import sys
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import typer
+from rich.console import Console
+
+from cmmlink.commands.exit_codes import DEVICE_FAILED, EXIT_OF, UNUSABLE
+from cmmlink.console.launch import graphical_browser
+from cmmlink.report.folder import write_run
+from cmmlink.report.terminal import print_summary
+from cmmlink.run import FinishedRun
+
+
+@dataclass(frozen=True, slots=True)
+class Output:
+    """What the user wants to see of a run, and where it goes."""
+
+    headless: bool
+    as_json: bool
+    out: Path | None
+    records: Path | None = None
+    no_browser: bool = False
+
+    @property
+    def on_page(self) -> bool:
+        """True when somebody can see the console's page and asked for nothing else by --headless or --json."""
+        quiet = self.headless or self.as_json
+        return not quiet and (self.no_browser or (sys.stderr.isatty() and graphical_browser() is not None))
+
+
+def now() -> datetime:
+    """Date and time of day, with the zone."""
+    return datetime.now().astimezone()
+
+
+def print_json(document: dict[str, Any]) -> None:
+    """Print one JSON object on one line."""
+    typer.echo(json.dumps(document))
+
+
+def terminal() -> Console:
+    """Standard output for words with style; lines are broken only where a person reads them."""
+    return Console(highlight=False, soft_wrap=not sys.stdout.isatty())
+
+
+def report_outcome(run: FinishedRun, output: Output) -> int:
+    """Print the outcome and write its files, each even if the other fails. Returns the exit code."""
+    outcome, evidence = run.outcome, run.evidence
+    message = str(outcome.failure or outcome.refusal or "")
+    if outcome.ending == "aborted":
+        message = message or "stopped by the operator: the scan is not complete"
+    if message:
+        sys.stderr.write(f"cmmlink: {message}\n")
+    written: Sequence[str] = ()
+    try:
+        if output.out is not None:
+            written = write_run(output.out, run)
+    finally:
+        if output.as_json:
+            print_json(run.result_json())
+        else:
+            print_summary(terminal(), outcome.result, outcome.counts, f"{run.title}, {run.started.device}")
+    if written and not output.as_json:
+        typer.echo(f"results in {output.out}: {', '.join(written)}")
+    if evidence is not None and not output.as_json:
+        typer.echo(f"recorded as run {evidence.run}")
+    if outcome.failure is not None:
+        return DEVICE_FAILED
+    return UNUSABLE if outcome.result is None else EXIT_OF[outcome.result.verdict]
+
+
+@contextmanager
+def stop_on_ctrl_c() -> Iterator[threading.Event]:
+    """Yield an event that the first Ctrl-C sets; the second one interrupts as usual."""
+    stop = threading.Event()
+
+    def interrupt(*_: object) -> None:
+        stop.set()
+        signal.signal(signal.SIGINT, before)
+
+    before = signal.signal(signal.SIGINT, interrupt)
+    try:
+        yield stop
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -1,0 +1,129 @@
+"""Commands on what was recorded: list, show, export, evaluate again, verify."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cmmlink.commands.exit_codes import EXIT_OF, NO_RECORD, UNUSABLE, fail
+from cmmlink.commands.options import Json, Out, Records, RunName, records_folder
+from cmmlink.commands.output import now, print_json, terminal
+from cmmlink.devices import decoder_of
+from cmmlink.record.export import export_run
+from cmmlink.record.reader import check_chain, describe, find_run, list_runs, reading, recorded_run
+from cmmlink.record.replay import Replay
+from cmmlink.record.replay import replay as replay_run
+from cmmlink.report.folder import write_results
+from cmmlink.report.terminal import print_summary
+from inspection import Method
+
+_DETAILS = ("run", "started", "ended", "state", "message", "verdict", "part", "serial_number", "operator", "device", "chain_sha256")
+
+
+def runs(records: Records = None, as_json: Json = False) -> int:
+    """List the recorded runs."""
+    found = list_runs(records_folder(records), now)
+    if as_json:
+        print_json({"runs": found})
+        return 0
+    for entry in found:
+        part = " ".join(filter(None, [entry["part"], entry["serial_number"]]))
+        verdict = entry["verdict"] or "-"
+        received = "-" if entry["received"] is None else entry["received"]
+        typer.echo(
+            f"{entry['run']}  {(entry['started'] or '-')[:19]:<19}  {entry['state']:<11}  {verdict:<10}  {received:>9} points  {part}"
+        )
+    if not found:
+        typer.echo(f"no run was recorded yet in {records_folder(records)}")
+    return 0
+
+
+def show(name: RunName, records: Records = None, as_json: Json = False) -> int:
+    """Show one recorded run."""
+    with reading(records_folder(records), now) as store:
+        found = describe(store, find_run(store, name))
+    if as_json:
+        print_json(found)
+        return 0
+    for key in _DETAILS:
+        if found[key]:
+            typer.echo(f"{key:<14} {found[key]}{' (simulated)' if key == 'device' and found['simulated'] else ''}")
+    for key in ("software", "recorded"):
+        typer.echo(f"{key:<14} {', '.join(f'{name} {value}' for name, value in found[key].items() if value)}")
+    for event in found["events"]:
+        told = ", ".join(f"{name} {value}" for name, value in event.items() if name not in ("event", "time_s", "after_points"))
+        typer.echo(f"  {event['time_s'] - found['clock_s']:9.3f} s  after {event['after_points']} points: {event['event']} {told}")
+    typer.echo("\n" + found["plan"].rstrip())
+    return 0
+
+
+def export(
+    name: RunName,
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files.")],
+    records: Records = None,
+    as_json: Json = False,
+) -> int:
+    """Write a recorded run as csv, npy, json and raw bytes."""
+    with reading(records_folder(records), now) as store:
+        run_id = find_run(store, name)
+        written = export_run(store, run_id, out)
+    if as_json:
+        print_json({"run": run_id, "files": [str(path) for path in written]})
+    else:
+        typer.echo("\n".join(str(path) for path in written))
+    return 0
+
+
+def replay(
+    name: RunName,
+    tolerance: Annotated[tuple[float, float] | None, typer.Option(metavar="LO HI", help="Evaluate with another tolerance, mm.")] = None,
+    method: Annotated[Method | None, typer.Option(help="Evaluate with another method.")] = None,
+    out: Out = None,
+    records: Records = None,
+    as_json: Json = False,
+) -> int:
+    """Evaluate a recorded run once more; with nothing changed the result is the same to the last bit."""
+    with reading(records_folder(records), now) as store:
+        recorded = recorded_run(store, find_run(store, name))
+        again = replay_run(store, recorded, decoder_of, tolerance=tolerance, method=method)
+    facts = again.facts | {"replay_of": recorded.run, "chain_sha256": recorded.chain_sha256, "identical": again.identical}
+    facts |= {"changed": [asdict(change) for change in again.changed], "differs": [asdict(change) for change in again.differs]}
+    if out is not None:
+        write_results(out, facts, again.outcome.result, again.profile, f"{recorded.header['part']}, run {recorded.run} replayed")
+    if as_json:
+        print_json(facts)
+    else:
+        _print_replay(again, recorded.run)
+    if again.identical is False and not again.changed:
+        return fail(f"run {recorded.run}: nothing was changed, yet the result is not the recorded one", NO_RECORD)
+    return UNUSABLE if again.outcome.result is None else EXIT_OF[again.outcome.result.verdict]
+
+
+def _print_replay(again: Replay, run_id: str) -> None:
+    heading = f"run {run_id}, evaluated again"
+    print_summary(terminal(), again.outcome.result, again.outcome.counts, heading)
+    for title, changes in (("changed", again.changed), ("differs", again.differs)):
+        for change in changes:
+            typer.echo(f"{title}: {change.key} {change.recorded} -> {change.replayed}")
+    if again.identical is None:
+        typer.echo(f"run {run_id} has no recorded result to compare with")
+    elif again.identical:
+        typer.echo(f"identical to the recorded result of run {run_id}, to the last bit")
+
+
+def verify(
+    name: Annotated[str | None, typer.Argument(metavar="[RUN]", help="One run; without it all records.")] = None,
+    records: Records = None,
+    as_json: Json = False,
+) -> int:
+    """Recompute the hash chain and name the first record that was altered."""
+    with reading(records_folder(records), now, close_interrupted=False) as store:
+        found = check_chain(store, find_run(store, name) if name else None)
+    if as_json:
+        print_json(found)
+    elif found["altered"]:
+        return fail(found["first"]["message"], NO_RECORD)
+    else:
+        typer.echo(f"nothing was altered: {found['records']} records, chain {found['chain_sha256']}")
+    return NO_RECORD if found["altered"] else 0

@@ -1,0 +1,115 @@
+"""Commands around a measurement: what a nominal says, what a plan would do, what this computer has, a simulated device."""
+
+import os
+import platform
+import textwrap
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from cmmlink import __version__
+from cmmlink.commands.exit_codes import UNUSABLE
+from cmmlink.commands.open3d_doctor import look_after_open3d
+from cmmlink.commands.options import Closed, Json, PlanFile
+from cmmlink.commands.output import print_json
+from cmmlink.demo import plan_file as demo_plan_file
+from cmmlink.devices import serial_ports, source_of, words_of
+from cmmlink.errors import PlanError
+from cmmlink.from_plan import check_plan, name_place, profile_of
+from cmmlink.nominal_files import NominalFile, load_nominal, material_side
+from cmmlink.plan.scan import load_plan
+from cmmlink.record.reader import default_folder
+from drivers import LinkError
+from inspection import rehearse
+
+
+def nominal(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The nominal profile: UIUC dat, points, or nurbs yaml.")],
+    scale: Annotated[float, typer.Option(metavar="S", help="Units of the file to mm.")] = 1.0,
+    closed: Closed = None,
+    as_json: Json = False,
+) -> int:
+    """Show what was understood of a nominal file."""
+    understood = load_nominal(file, scale, closed)
+    if as_json:
+        print_json(_nominal_json(understood))
+        return 0
+    curve = understood.curve
+    typer.echo(f"{file}: {understood.source_format}, degree {curve.degree}, {len(curve.control_points_mm)} control points")
+    typer.echo(f"{'closed' if curve.closed else 'open'}, length {curve.length_mm:.4f} mm, corners {len(curve.corners)}")
+    for note in understood.notes:
+        typer.echo(f"  {note}")
+    return 0
+
+
+def _nominal_json(understood: NominalFile) -> dict[str, Any]:
+    curve = understood.curve
+    assert curve.weights is not None
+    return {
+        "degree": curve.degree,
+        "knots": curve.knots.tolist(),
+        "control_points_mm": curve.control_points_mm.tolist(),
+        "weights": curve.weights.tolist(),
+        "closed": curve.closed,
+        "length_mm": curve.length_mm,
+        "source_format": understood.source_format,
+        "corners": len(curve.corners),
+        "material": material_side(curve),
+        "notes": list(understood.notes),
+    }
+
+
+def check(plan_file: PlanFile) -> int:
+    """Check a plan and what it names, not the device."""
+    plan = load_plan(plan_file)
+    profile = check_plan(plan, plan_file)
+    with name_place(plan_file, "device"):
+        source_of(plan)
+    zone = plan.tolerance.zone
+    typer.echo(f"{plan_file} can be run: {plan.part.name}, zone {zone.lower_mm:+g} .. {zone.upper_mm:+g} mm, {words_of(plan.device)}")
+    typer.echo(f"nominal {profile.length_mm:.3f} mm long, {len(profile)} samples, material on the {profile.material}")
+    return 0
+
+
+def doctor() -> int:
+    """Look at what cmmlink needs of this computer, and mend or name what is missing."""
+    typer.echo(f"cmmlink {__version__} on Python {platform.python_version()}, {platform.system()} {platform.machine()}")
+    rehearse(profile_of(load_plan(demo_plan_file())))
+    typer.echo("inspection: compiled and working")
+    folder = default_folder()
+    nearest = next(path for path in (folder, *folder.parents) if path.exists())
+    writable = os.access(nearest, os.W_OK)
+    typer.echo(f"records: {folder}" + ("" if writable else f" cannot be written: choose another folder with --records ({nearest})"))
+    typer.echo(f"serial ports: {', '.join(name for name, _ in serial_ports()) or 'none found'}")
+    whole = look_after_open3d(typer.echo)
+    return 0 if whole and writable else UNUSABLE
+
+
+def list_ports() -> int:
+    """List the serial ports of this computer."""
+    found = serial_ports()
+    for name, description in found:
+        typer.echo(f"{name}\t{description}")
+    if not found:
+        typer.echo("no serial port was found")
+    return 0
+
+
+def simulate(context: typer.Context, device: Annotated[str, typer.Argument(metavar="DEVICE")] = "") -> int:
+    """Serve a simulated device."""
+    from simulators import known_devices, say, settings_from  # noqa: PLC0415 - only this command knows simulators
+
+    known = known_devices()
+    if device in ("-h", "--help"):
+        typer.echo(textwrap.fill(f"cmmlink simulate DEVICE, one of: {', '.join(sorted(known))}", 80) + "\n")
+        settings_from(["--help"], "cmmlink simulate DEVICE")
+    if device not in known:
+        problem = f"no simulated device is called {device}" if device else "name the device to simulate"
+        raise PlanError(f"{problem}; known: {', '.join(sorted(known))}; `cmmlink simulate --help` shows their options")
+    settings = settings_from(context.args, f"cmmlink simulate {device}")
+    try:
+        known[device](settings, say)
+    except (ValueError, OSError) as error:
+        raise LinkError(f"the simulated device cannot serve {settings.address}: {error}") from None
+    return 0

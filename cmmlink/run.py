@@ -1,0 +1,81 @@
+"""One run of a plan, from a device made ready to a finished run with its record: the same for command line, page and files.
+
+The walk: compile what the inspection needs, open the record, hand the device's source to the pipeline, keep what ties the
+result to the record. Nothing is printed, shown or written but the record; whoever wants to follow the run gives sinks.
+"""
+
+import threading
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from cmmlink.devices import Connected
+from cmmlink.events import RunStarted, Sink
+from cmmlink.from_plan import inspection_of
+from cmmlink.pipeline import RunOutcome, run_inspection
+from cmmlink.plan.scan import Plan
+from cmmlink.record.reader import recording
+from cmmlink.record.recorder import Basis, Evidence, Recorder
+from cmmlink.result_json import identity, summary
+from inspection import NominalProfile, rehearse
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FinishedRun:
+    """A run that is over: what was measured, against what, and what came of it. `evidence` is None where nothing was recorded."""
+
+    profile: NominalProfile
+    started: RunStarted
+    outcome: RunOutcome
+    evidence: Evidence | None
+
+    @property
+    def title(self) -> str:
+        """The part, its serial number, and whether it was simulated."""
+        started = self.started
+        return " ".join(filter(None, [started.part, started.serial_number, "(SIMULATED)" if started.simulated else ""]))
+
+    def result_json(self) -> dict[str, Any]:
+        """The run as `--json` and result.json hold it."""
+        evidence = asdict(self.evidence) if self.evidence else {}
+        return summary(self.outcome.result, self.outcome.counts) | identity(self.started) | evidence
+
+
+def carry_out(
+    plan: Plan,
+    profile: NominalProfile,
+    device: Connected,
+    *,
+    records: Path | None,
+    clock: Callable[[], float],
+    now: Callable[[], datetime],
+    stop: threading.Event,
+    sinks: Sequence[Sink] = (),
+    on_ready: Callable[[], None] = lambda: None,
+) -> FinishedRun:
+    """Carry out one run of a plan to its end. Blocks the calling thread, in which all sinks are called, the recorder first.
+
+    profile : the plan's nominal, as `profile_of` gives it
+    device  : made ready for one scan; its `source.stop()` ends the scan early with a result, setting `stop` aborts it
+    records : folder of the run records; None records nothing
+    clock   : monotonic seconds of the run; now : date and time of day
+    on_ready: called when everything is compiled, just before the device is asked for points
+
+    A device that fails does not raise: the outcome says so. Raises StoreError when the record cannot be kept, PlanError when
+    the plan cannot be carried out, and whatever a sink raises.
+    """
+    rehearse(profile, plan.registration.method, plan.registration.reject_outliers)
+    live = inspection_of(plan, profile)
+    started = RunStarted(plan.part.name, plan.part.serial_number or "", plan.operator or "", device.device, device.simulated)
+    on_ready()
+    with ExitStack() as stack:
+        recorder: Recorder | None = None
+        if records is not None:
+            store = stack.enter_context(recording(records, now))
+            recorder = stack.enter_context(Recorder(store, Basis.of(plan), clock=clock, today=now))
+        listeners: list[Sink] = [*([recorder] if recorder else []), *sinks]
+        outcome = run_inspection(device.source, live, listeners, started, buffer_points=plan.buffer_points, clock=clock, stop=stop)
+    return FinishedRun(profile, started, outcome, recorder.evidence if recorder else None)

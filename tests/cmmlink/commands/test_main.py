@@ -1,0 +1,88 @@
+"""The command line as a whole: version, help, missing arguments, broken streams."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from cmmlink import __version__
+from tests.cmmlink.command import Ended, cmmlink
+from tests.cmmlink.commands.oval_files import TOLERANCE
+from tests.cmmlink.oval_part import oval_points, write_points
+
+COMMANDS = ["demo", "run", "inspect", "nominal", "check", "ports", "simulate"]
+
+
+AS_PROCESS = (sys.executable, "-m", "cmmlink")
+ROOT = Path(__file__).resolve().parents[3]
+
+
+def inspection(nominal: Path, out: Path, name: str = "points.csv") -> list[str]:
+    points = write_points(nominal.parent / name, oval_points(0.01))
+    return [*AS_PROCESS, *map(str, ("inspect", points, "--nominal", nominal, *TOLERANCE, "--fit", "none", "--out", out))]
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no full device on this system")
+def test_an_answer_that_cannot_be_written_is_not_taken_for_nonconform_and_loses_no_result(nominal: Path, tmp_path: Path) -> None:
+    with open("/dev/full", "w", encoding="utf-8") as full:
+        ended = subprocess.run(inspection(nominal, tmp_path / "a"), cwd=ROOT, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert ended.returncode == 2
+    assert ended.stderr.splitlines()[-1].startswith("cmmlink: the answer could not be written: ")
+    assert "Traceback" not in ended.stderr
+    reading, writing = os.pipe()
+    os.close(reading)  # a pipe that nobody reads
+    unread = subprocess.run(inspection(nominal, tmp_path / "b"), cwd=ROOT, stdout=writing, stderr=subprocess.PIPE, text=True, check=False)
+    os.close(writing)
+    assert (unread.returncode, "Traceback" in unread.stderr) == (2, False)
+    for folder in ("a", "b"):
+        assert json.loads((tmp_path / folder / "result.json").read_text())["verdict"] == "conform"
+
+
+def test_a_name_that_the_terminal_has_no_letters_for_costs_no_verdict(nominal: Path, tmp_path: Path) -> None:
+    latin = os.environ | {"PYTHONUTF8": "0", "PYTHONIOENCODING": "cp1252:strict"}
+    ended = subprocess.run(inspection(nominal, tmp_path / "a", "\u53f6\u7247.csv"), cwd=ROOT, env=latin, capture_output=True, check=False)
+    assert ended.returncode == 0
+    assert ended.stdout.startswith(b"CONFORM   ??, file ??.csv")
+
+
+def test_what_is_missing_is_named(nominal: Path) -> None:
+    assert cmmlink("inspect").refused() == "Missing argument 'POINTS'; `cmmlink inspect --help` shows what is allowed"
+    assert cmmlink("inspect", "p.csv", *TOLERANCE).refused().startswith("Missing option '--nominal'; ")
+    assert cmmlink("inspect", "p.csv", "--nominal", nominal).refused().startswith("Missing option '--tolerance'; ")
+    assert cmmlink("inspect", "p.csv", "--nominal", nominal, "--tolerance", -0.05).refused().startswith("Option '--tolerance' requires 2")
+    assert cmmlink("run").refused().startswith("Missing argument 'PLAN.yaml'; `cmmlink run --help`")
+
+
+def test_an_unknown_command_is_named_and_the_near_one_offered() -> None:
+    assert re.match(r"No such command 'inspcet'\. Did you mean 'inspect'\?", cmmlink("inspcet").refused())
+
+
+def test_version() -> None:
+    assert cmmlink("--version") == Ended(0, f"cmmlink {__version__}\n", "")
+
+
+@pytest.mark.parametrize("option", ["--help", "-h"])
+def test_help_lists_every_command_with_its_meaning(option: str) -> None:
+    ended = cmmlink(option)
+    assert ended.code == 0
+    for command in COMMANDS:
+        assert re.search(rf"^  {command} +[A-Z].*[a-z]\.$", ended.out, re.MULTILINE), command
+    assert "0 conform, 1 nonconform, 3 uncertain" in ended.out
+
+
+def test_no_command_shows_the_help_and_is_no_success() -> None:
+    ended = cmmlink()
+    assert ended.code == 2
+    assert ended.out == cmmlink("--help").out
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_of_a_command_says_how_to_call_it(command: str) -> None:
+    ended = cmmlink(command, "--help")
+    assert (ended.code, ended.err) == (0, "")
+    assert f"cmmlink {command} " in ended.out.splitlines()[0]
+    assert max(map(len, ended.out.splitlines())) <= 120
