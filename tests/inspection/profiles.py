@@ -220,3 +220,11 @@ def rotated(points_mm: Array, rotation_deg: float, translation_mm: ArrayLike = (
     x, y = points_mm[:, 0], points_mm[:, 1]
     moved = np.column_stack([np.cos(a) * x - np.sin(a) * y, np.sin(a) * x + np.cos(a) * y])
     return np.asarray(moved + np.asarray(translation_mm))
+
+
+def measured(name: str, count: int, seed: int, *, noise_mm: float = 0.01, start: float = 0.0, coverage: float = 1.0) -> Array:
+    """Points even in arc length over a share of the profile, on the nominal but for noise along the normal."""
+    u = even_in_arc_length(curve_of(name), round(count / coverage))
+    first = int(start * len(u))
+    u = np.roll(u, -first)[:count] if curve_of(name).closed else u[min(first, len(u) - count) :][:count]
+    return offset_points(curve_of(name), u, np.random.default_rng(seed).normal(0, noise_mm, count))

@@ -1,11 +1,17 @@
 """ISO 14253-1: conformity is proven inside the zone less U, nonconformity outside the zone plus U, the rest is not proven."""
 
+from functools import cache
+
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inspection import ToleranceZone, Verdict
+from inspection import NOT_JUDGED, NominalProfile, RigidTransform, SectionPlane, ToleranceZone, Verdict, discretize
+from inspection.scan_rows import ScanRows
+from inspection.terms import Terms
+from tests.inspection import profiles
+from tests.inspection.profiles import Array
 
 CONFORM, UNCERTAIN, NONCONFORM = Verdict.CONFORM, Verdict.UNCERTAIN, Verdict.NONCONFORM
 
@@ -76,28 +82,70 @@ def test_profile_verdict_is_that_of_its_worst_point() -> None:
     assert [v.word for v in (CONFORM, UNCERTAIN, NONCONFORM)] == ["conform", "uncertain", "nonconform"]
 
 
-def test_a_deviation_that_is_not_a_number_is_never_conform() -> None:
-    zone = ToleranceZone(-0.1, 0.1)
-    try:
-        verdict = zone.verdict([0.0, float("nan")])
-    except ValueError:
-        return
-    assert verdict is not CONFORM
+def test_a_deviation_that_is_not_a_number_is_uncertain() -> None:
+    for zone in (ToleranceZone(-0.1, 0.1), ToleranceZone(-0.1, 0.1, 0.02)):
+        assert zone.verdicts([0.0, float("nan"), 0.2]).tolist() == [CONFORM, UNCERTAIN, NONCONFORM]
+        assert zone.verdict([0.0, float("nan")]) is UNCERTAIN
+        assert zone.verdict([float("nan"), 0.2]) is NONCONFORM
+
+
+LIMITS, UNCERTAINTY = "the lower limit must be below the upper one, got ", "the uncertainty must be zero or more, got "
 
 
 @pytest.mark.parametrize(
-    ("lower", "upper", "uncertainty"),
+    ("lower", "upper", "uncertainty", "message"),
     [
-        (0.1, -0.1, 0.0),
-        (0.1, 0.1, 0.0),
-        (-0.1, 0.1, -0.01),
-        (float("nan"), 0.1, 0.0),
-        (-0.1, float("nan"), 0.0),
-        (-0.1, 0.1, float("nan")),
-        (-0.1, float("inf"), 0.0),
-        (-0.1, 0.1, float("inf")),
+        (0.1, -0.1, 0.0, LIMITS + "0.1 .. -0.1 mm"),
+        (0.1, 0.1, 0.0, LIMITS + "0.1 .. 0.1 mm"),
+        (float("nan"), 0.1, 0.0, LIMITS + "nan .. 0.1 mm"),
+        (-0.1, float("nan"), 0.0, LIMITS + "-0.1 .. nan mm"),
+        (-0.1, float("inf"), 0.0, LIMITS + "-0.1 .. inf mm"),
+        (-0.1, 0.1, -0.01, UNCERTAINTY + "-0.01 mm"),
+        (-0.1, 0.1, float("nan"), UNCERTAINTY + "nan mm"),
+        (-0.1, 0.1, float("inf"), UNCERTAINTY + "inf mm"),
     ],
 )
-def test_a_zone_that_cannot_be_is_refused(lower: float, upper: float, uncertainty: float) -> None:
-    with pytest.raises(ValueError, match=r"\d|nan|inf"):
+def test_a_zone_that_cannot_be_is_refused(lower: float, upper: float, uncertainty: float, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
         ToleranceZone(lower, upper, uncertainty)
+
+
+# ---- the compiled rule
+
+
+@cache
+def line() -> NominalProfile:
+    """The x axis from 0 to 100 mm, with the material below it: the deviation of a point is its y, to the last bit."""
+    return discretize(profiles.clamped(1, [(0.0, 0.0), (100.0, 0.0)]), samples=8, material="right")
+
+
+def judged_rows(deviation: Array, zone: ToleranceZone) -> tuple[Array, list[int]]:
+    """Deviations and verdicts that a scan's rows get from points so far off the line."""
+    rows, count = ScanRows(), len(deviation)
+    plane = SectionPlane(np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
+    rows.take_in(np.column_stack([np.linspace(1.0, 99.0, count), deviation]), plane, np.inf)
+    rows.count = count
+    rows.judge(0, count, RigidTransform.identity(), Terms(line(), zone, None, "none", "exact", 0.0, np.inf, 0.0, False))
+    return rows.deviation[:count], rows.verdicts[:count].tolist()
+
+
+def borders(zone: ToleranceZone) -> Array:
+    """Every border of a zone, and the numbers next to it."""
+    border = np.array([limit + side * zone.uncertainty_mm for limit in (zone.lower_mm, zone.upper_mm) for side in (-1.0, 0.0, 1.0)])
+    return np.concatenate([border, np.nextafter(border, -np.inf), np.nextafter(border, np.inf)])
+
+
+@settings(deadline=None)
+@given(
+    lower=st.floats(-1, 1),
+    width=st.floats(1e-6, 1),
+    share=st.floats(0, 0.499),
+    deviation=st.lists(st.floats(-3, 3), max_size=30),
+)
+def test_the_compiled_rule_is_that_of_the_zone(lower: float, width: float, share: float, deviation: list[float]) -> None:
+    zone = ToleranceZone(lower, lower + width, share * width)
+    wanted = np.concatenate([borders(zone), deviation, [np.nan]])
+    found, verdicts = judged_rows(wanted, zone)
+    assert np.array_equal(found, wanted, equal_nan=True)
+    assert verdicts[:-1] == zone.verdicts(wanted[:-1]).tolist()
+    assert verdicts[-1] == NOT_JUDGED

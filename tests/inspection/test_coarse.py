@@ -1,0 +1,57 @@
+"""Coarse poses: every direction without a flip, and what cannot be registered at all."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from inspection import NominalProfile, Registration, RegistrationError, RigidTransform, register, register_coarse, register_fine
+from tests.inspection import profiles
+from tests.inspection.best_pose import farthest_mm, optimum
+from tests.inspection.profiles import Array, curve_of, measured, nominal_of
+
+FIVE = ("P1", "P2", "P3", "GOE404", "MH42")
+
+
+@pytest.mark.parametrize("name", FIVE)
+def test_all_360_one_degree_rotations_register_without_a_flip(name: str) -> None:
+    nominal, truth, rng = nominal_of(name), measured(name, 500, 3), np.random.default_rng(4)
+    best, _ = optimum(curve_of(name), truth)
+    for degree in range(360):
+        points = profiles.rotated(truth, float(degree), rng.uniform(-200, 200, 2))
+        coarse = register_coarse(points, nominal)
+        # a flip puts points tens of millimetres off; a good coarse pose is within one
+        assert farthest_mm(coarse.nominal_from_section, points, truth) < 1.0, degree
+        if degree % 12 == 0:
+            fine = register_fine(points, nominal, coarse)
+            assert fine.converged, degree
+            assert fine.iterations <= 6, degree
+            assert farthest_mm(fine.nominal_from_section, points, best) < 1e-9, degree
+        if degree % 60 == 0:
+            assert farthest_mm(register(points, nominal).nominal_from_section, points, best) < 1e-9, degree
+
+
+CANNOT_BE: dict[str, tuple[Array, str]] = {
+    "none": (np.empty((0, 2)), "0 points: a registration needs at least 8"),
+    "one": (np.ones((1, 2)), "1 points: a registration needs at least 8"),
+    "seven": (np.random.default_rng(16).normal(0, 9, (7, 2)), "7 points: a registration needs at least 8"),
+    "one place": (np.full((50, 2), 3.0), r"all 50 points coincide at \(3, 3\)"),
+}
+
+
+@pytest.mark.parametrize("registration", [register, register_coarse])
+@pytest.mark.parametrize("case", CANNOT_BE)
+def test_points_that_cannot_be_registered_are_refused(registration: Callable[[Array, NominalProfile], Registration], case: str) -> None:
+    points, message = CANNOT_BE[case]
+    with pytest.raises(RegistrationError, match=message):
+        registration(points, nominal_of("P1"))
+
+
+def test_points_that_are_not_numbers_are_refused() -> None:
+    points = measured("P1", 50, 17)
+    points[7, 1] = np.nan
+    for registration in (register, register_coarse):
+        with pytest.raises(ValueError, match="point 8 is not finite"):
+            registration(points, nominal_of("P1"))
+    with pytest.raises(ValueError, match="point 8 is not finite"):
+        register_fine(points, nominal_of("P1"), RigidTransform.identity())
