@@ -443,6 +443,10 @@ def test_history_is_listed_opened_replayed_and_exported(make_bench: MakeBench, t
     with page.expect_download() as download:
         page.keyboard.press("x")
     assert download.value.suggested_filename.endswith("-0002.zip")
+    page.route("**/export/*", lambda route: route.abort())
+    page.keyboard.press("x")
+    expect(page.locator("#said")).to_have_text(re.compile("-0002.zip was not saved: the station cannot be reached"))
+    bench.complaints = [said for said in bench.complaints if "ERR_FAILED" not in said]
     page.keyboard.press("r")
     expect(page.locator("#banner-text")).to_contain_text("identical to the recorded result, to the last bit")
     expect(page.locator("#verdict-word")).to_have_text("NOT CONFORM")
@@ -527,8 +531,17 @@ def test_surface_is_imported_with_progress_and_its_sections_opened(make_bench: M
     worst = bench.station.ct.sections[3].ended.result["worst"]["deviation_mm"]
     assert worst == pytest.approx(0.09, abs=0.015), "0.1 mm, less what the best fit takes of a stretch so long"
     assert millimetres(page.locator("#worst-value").text_content()) == pytest.approx(worst, abs=5.1e-5)
+    page.wait_for_function(f"({INKED})('#profile') && ({INKED})('#strip')")
     page.keyboard.press("Escape")
     expect(page.locator("#banner")).to_be_hidden()
+    page.wait_for_function(f"!({INKED})('#profile') && !({INKED})('#strip')")  # nothing is left of what is no longer shown
+
+
+# Whether anything is drawn.
+INKED = """(drawing) => [...document.querySelectorAll(`${drawing} canvas`)].some(canvas => {
+    const blank = Object.assign(document.createElement('canvas'), { width: canvas.width, height: canvas.height });
+    return canvas.toDataURL() !== blank.toDataURL();
+})"""
 
 
 def surface_ring(profile: NominalProfile, station_mm: NDArray[np.float64], excess_mm: float) -> NDArray[np.float64]:
