@@ -28,12 +28,12 @@ from drivers.surface import (
     NumpyCutter,
     Open3DMissing,
     Open3DProcess,
-    Slice,
     SurfaceMesh,
+    SurfaceSection,
+    add_points_between,
     cut_surface,
     height_range_mm,
     read_stl,
-    with_points_between,
 )
 from inspection import LiveInspection, NominalProfile, RegistrationError, SectionPlane, Verdict
 
@@ -50,7 +50,7 @@ _LEAST_POINTS = 400  # on a profile's length; where a surface is coarser, points
 class SectionOutcome:
     """One section: where it was cut, what it was held against, what came of it, and what was not as it should be."""
 
-    slice: Slice
+    slice: SurfaceSection
     judged: tuple[Contour, ...]
     nominal_file: Path
     profile: NominalProfile
@@ -223,7 +223,7 @@ class _Profiles:
 
 def _slices(
     plan: CtPlan, mesh: SurfaceMesh, heights: list[float], open3d: Callable[[], Open3DProcess], notes: list[str]
-) -> Iterator[Slice]:
+) -> Iterator[SurfaceSection]:
     """Slices by the cutter of the plan; where Open3D is missing or breaks down, the rest by numpy, and a note says so."""
     cutter = _cutter(plan, len(heights), open3d, notes)
     done = 0
@@ -236,7 +236,7 @@ def _slices(
         yield from _cut(plan, mesh, heights[done:], NumpyCutter())
 
 
-def _cut(plan: CtPlan, mesh: SurfaceMesh, heights: list[float], cutter: Cutter) -> Iterator[Slice]:
+def _cut(plan: CtPlan, mesh: SurfaceMesh, heights: list[float], cutter: Cutter) -> Iterator[SurfaceSection]:
     return cut_surface(mesh, plan.sections.normal, heights, cutter=cutter, weld_mm=plan.cut.weld_mm, shortest_mm=plan.cut.shortest_mm)
 
 
@@ -253,12 +253,12 @@ def _cutter(plan: CtPlan, sections: int, open3d: Callable[[], Open3DProcess], no
     return NumpyCutter()
 
 
-def _inspect(plan: CtPlan, cut: Slice, profiles: _Profiles, clock: Callable[[], float], stop: threading.Event) -> SectionOutcome:
+def _inspect(plan: CtPlan, cut: SurfaceSection, profiles: _Profiles, clock: Callable[[], float], stop: threading.Event) -> SectionOutcome:
     """One section through the pipeline; an outline that cannot be this profile is refused before anything is fitted."""
     path, profile = profiles.at(cut.asked_mm)
     outline = _outline(cut)
     spacing_mm = profile.length_mm / _LEAST_POINTS
-    judged = tuple(with_points_between(contour, spacing_mm) for contour in outline)
+    judged = tuple(add_points_between(contour, spacing_mm) for contour in outline)
     other_part = _other_part(cut, outline, profile)
     run = _refused(judged, other_part) if other_part else _run(plan, cut, judged, profile, clock, stop)
     warnings = list(_all_warnings(cut, outline, run))
@@ -268,7 +268,12 @@ def _inspect(plan: CtPlan, cut: Slice, profiles: _Profiles, clock: Callable[[], 
 
 
 def _run(
-    plan: CtPlan, cut: Slice, judged: tuple[Contour, ...], profile: NominalProfile, clock: Callable[[], float], stop: threading.Event
+    plan: CtPlan,
+    cut: SurfaceSection,
+    judged: tuple[Contour, ...],
+    profile: NominalProfile,
+    clock: Callable[[], float],
+    stop: threading.Event,
 ) -> RunOutcome:
     registration = plan.registration
     live = LiveInspection(
@@ -287,7 +292,7 @@ def _run(
     return run_inspection(source, live, [], started, buffer_points=_BUFFER_POINTS, clock=clock, stop=stop)
 
 
-def _other_part(cut: Slice, outline: tuple[Contour, ...], profile: NominalProfile) -> RegistrationError | None:
+def _other_part(cut: SurfaceSection, outline: tuple[Contour, ...], profile: NominalProfile) -> RegistrationError | None:
     """Why a closed outline cannot be the section of a nominal that goes round: the lengths are too far apart."""
     gap_mm = float(np.hypot(*(profile.points_mm[-1] - profile.points_mm[0])))
     goes_round = profile.curve.closed or gap_mm < _ALMOST_CLOSED * profile.length_mm
@@ -312,7 +317,7 @@ def _points_in(contours: tuple[Contour, ...]) -> int:
     return sum(len(contour.points_mm) for contour in contours)
 
 
-def _outline(cut: Slice) -> tuple[Contour, ...]:
+def _outline(cut: SurfaceSection) -> tuple[Contour, ...]:
     """The contours that make the section's outline."""
     outer = cut.outer()
     if not outer or outer[0].closed:
@@ -320,7 +325,7 @@ def _outline(cut: Slice) -> tuple[Contour, ...]:
     return tuple(contour for contour in outer if not contour.closed)
 
 
-def _all_warnings(cut: Slice, outline: tuple[Contour, ...], run: RunOutcome) -> Iterator[str]:
+def _all_warnings(cut: SurfaceSection, outline: tuple[Contour, ...], run: RunOutcome) -> Iterator[str]:
     yield from cut.warnings
     beside = [contour for contour in cut.contours if not any(contour is part for part in outline)]
     if beside:

@@ -14,7 +14,7 @@ import numpy as np
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class FaultKind:
     """One entry of the catalogue: what the value means and what it is if not given; `once` acts at its point only."""
 
     meaning: str
@@ -23,26 +23,26 @@ class Kind:
     registers_only: bool = False
 
 
-CATALOGUE: Mapping[str, Kind] = MappingProxyType(
+CATALOGUE: Mapping[str, FaultKind] = MappingProxyType(
     {
-        "flip": Kind("share of bytes in which one random bit is turned over", 1e-4),
-        "lost-bytes": Kind("share of bytes that vanish", 1e-4),
-        "inserted-bytes": Kind("share of bytes before which a random byte appears", 1e-4),
-        "burst": Kind("number of bytes replaced by random ones", 300, once=True),
-        "lost-frames": Kind("share of points whose frame is not sent", 0.01),
-        "repeated-frames": Kind("share of points whose frame is sent twice", 0.01),
-        "reordered-frames": Kind("share of points whose frame is sent after the following one", 0.01),
-        "invalid": Kind("share of points that the device marks invalid", 0.01),
-        "gap": Kind("number of frames in a row that are not sent", 50, once=True),
-        "stall": Kind("seconds without points, the device being alive", 1.0, once=True),
-        "silence": Kind("seconds without any byte", math.inf, once=True),
-        "unplug": Kind("seconds for which the line is gone", 0.5, once=True),
-        "restart": Kind("seconds for which the device is gone before it begins its scan anew", 0.5, once=True),
-        "slow": Kind("seconds that each Modbus answer takes from then on", 0.3, registers_only=True),
-        "word-swap": Kind("1: the halves of 32-bit numbers in Modbus registers come swapped", 1, registers_only=True),
-        "sentinel": Kind("share of points whose registers hold the value for none", 0.01, registers_only=True),
-        "overflow": Kind("number of points that a full Modbus buffer costs; its flag stays set", 20, once=True, registers_only=True),
-        "die": Kind("exit status with which the device ends at once", 9, once=True),
+        "flip": FaultKind("share of bytes in which one random bit is turned over", 1e-4),
+        "lost-bytes": FaultKind("share of bytes that vanish", 1e-4),
+        "inserted-bytes": FaultKind("share of bytes before which a random byte appears", 1e-4),
+        "burst": FaultKind("number of bytes replaced by random ones", 300, once=True),
+        "lost-frames": FaultKind("share of points whose frame is not sent", 0.01),
+        "repeated-frames": FaultKind("share of points whose frame is sent twice", 0.01),
+        "reordered-frames": FaultKind("share of points whose frame is sent after the following one", 0.01),
+        "invalid": FaultKind("share of points that the device marks invalid", 0.01),
+        "gap": FaultKind("number of frames in a row that are not sent", 50, once=True),
+        "stall": FaultKind("seconds without points, the device being alive", 1.0, once=True),
+        "silence": FaultKind("seconds without any byte", math.inf, once=True),
+        "unplug": FaultKind("seconds for which the line is gone", 0.5, once=True),
+        "restart": FaultKind("seconds for which the device is gone before it begins its scan anew", 0.5, once=True),
+        "slow": FaultKind("seconds that each Modbus answer takes from then on", 0.3, registers_only=True),
+        "word-swap": FaultKind("1: the halves of 32-bit numbers in Modbus registers come swapped", 1, registers_only=True),
+        "sentinel": FaultKind("share of points whose registers hold the value for none", 0.01, registers_only=True),
+        "overflow": FaultKind("number of points that a full Modbus buffer costs; its flag stays set", 20, once=True, registers_only=True),
+        "die": FaultKind("exit status with which the device ends at once", 9, once=True),
     }
 )
 
@@ -81,26 +81,26 @@ class Injector:
         self._without_value: dict[int, bool] = {}
         self.tally: Counter[str] = Counter()
 
-    def invalid(self, index: int) -> bool:
+    def marks_invalid(self, index: int) -> bool:
         """Tell whether the device marks this point invalid."""
-        return self._chance("invalid", index)
+        return self._strikes("invalid", index)
 
-    def frame(self, index: int, frame: bytes) -> bytes:
+    def pass_on(self, index: int, frame: bytes) -> bytes:
         """Return what of this point's frame, and of one held back before, goes out."""
         self._index = index
-        if self._chance("lost-frames", index) or self._in_gap(index):
+        if self._strikes("lost-frames", index) or self._is_in_gap(index):
             return b""
-        if self._held is None and self._chance("reordered-frames", index):
+        if self._held is None and self._strikes("reordered-frames", index):
             self._held = frame
             return b""
-        return frame * (2 if self._chance("repeated-frames", index) else 1) + self.held()
+        return frame * (2 if self._strikes("repeated-frames", index) else 1) + self.release()
 
-    def held(self) -> bytes:
+    def release(self) -> bytes:
         """Return the frame held back, if any."""
         frame, self._held = self._held or b"", None
         return frame
 
-    def event(self, name: str, index: int) -> float | None:
+    def strike(self, name: str, index: int) -> float | None:
         """Return the value of a fault that strikes at this point, once."""
         for fault in self._faults:
             if fault.name == name and fault.at <= index and fault not in self._done:
@@ -109,30 +109,30 @@ class Injector:
                 return fault.value
         return None
 
-    def sentinel(self, index: int) -> bool:
+    def lacks_value(self, index: int) -> bool:
         """Tell whether this point has no value; the same however often it is asked."""
         if index not in self._without_value:
-            self._without_value[index] = self._chance("sentinel", index)
+            self._without_value[index] = self._strikes("sentinel", index)
         return self._without_value[index]
 
-    def arrange(self, index: int) -> list[int]:
+    def stored_at(self, index: int) -> list[int]:
         """Return which points, by their numbers, are stored when this one is taken: none, it, or it twice, or it and one held back."""
-        stored = self.frame(index, index.to_bytes(8, "big"))
+        stored = self.pass_on(index, index.to_bytes(8, "big"))
         return [int.from_bytes(stored[at : at + 8], "big") for at in range(0, len(stored), 8)]
 
-    def has(self, name: str) -> bool:
+    def expects(self, name: str) -> bool:
         """Tell whether a fault was asked for at all."""
         return any(fault.name == name for fault in self._faults)
 
-    def lasting(self, name: str, index: int) -> float:
+    def lasting_value(self, name: str, index: int) -> float:
         """Return the value of a fault that lasts from its point on; 0 before."""
         return self._share(name, index)
 
-    def reached(self, index: int) -> None:
+    def note_progress(self, index: int) -> None:
         """Take note of how far the scan is."""
         self._index = index
 
-    def before_next_event(self, index: int, due: int) -> int:
+    def next_stop(self, index: int, due: int) -> int:
         """Return `due`, or the point before it at which something is to happen once."""
         points = [fault.at for fault in self._faults if CATALOGUE[fault.name].once and index < fault.at < due]
         return min(points, default=due)
@@ -142,14 +142,14 @@ class Injector:
         for name in ("lost-bytes", "inserted-bytes", "flip"):
             share = self._share(name, self._index)
             if share and data:
-                data = self._scattered(name, share, data)
-        size = self.event("burst", self._index) if data else None
+                data = self._scatter(name, share, data)
+        size = self.strike("burst", self._index) if data else None
         if size is not None:
             length = min(int(size), len(data))
             data = self._rng.bytes(length) + data[length:]
         return data
 
-    def _scattered(self, name: str, share: float, data: bytes) -> bytes:
+    def _scatter(self, name: str, share: float, data: bytes) -> bytes:
         array = np.frombuffer(data, dtype=np.uint8)
         struck = np.flatnonzero(self._rng.random(len(array)) < share)
         if not len(struck):
@@ -166,13 +166,13 @@ class Injector:
     def _share(self, name: str, index: int) -> float:
         return max((fault.value for fault in self._faults if fault.name == name and fault.at <= index), default=0.0)
 
-    def _chance(self, name: str, index: int) -> bool:
+    def _strikes(self, name: str, index: int) -> bool:
         share = self._share(name, index)
         struck = share > 0 and self._rng.random() < share
         self.tally[name] += struck
         return bool(struck)
 
-    def _in_gap(self, index: int) -> bool:
+    def _is_in_gap(self, index: int) -> bool:
         struck = any(fault.name == "gap" and fault.at <= index < fault.at + fault.value for fault in self._faults)
         self.tally["gap"] += struck
         return struck

@@ -67,14 +67,14 @@ def walk(path_mm: NDArray[np.float64], motion: Motion) -> Walk:
     rng = np.random.default_rng(motion.seed)
     corners = _corners(path_mm, motion.closed)
     station, along, length = _stations(corners, motion)
-    surface, outward = _on_path(corners, along, station, motion.closed)
+    surface, outward = _points_on_path(corners, along, station, motion.closed)
     height = motion.tip_radius_mm + _form_error(station / length, motion.form_error_mm, rng) + _defect(station, length, motion)
     points = surface + height[:, None] * outward
     points[:, :2] += rng.normal(0.0, motion.noise_mm, (len(points), 2))
-    return Walk(np.arange(len(points)) / motion.rate_hz, _posed(points, motion))
+    return Walk(np.arange(len(points)) / motion.rate_hz, _pose(points, motion))
 
 
-def fed(path_mm: NDArray[np.float64], motion: Motion) -> Walk:
+def feed_under(path_mm: NDArray[np.float64], motion: Motion) -> Walk:
     """Feed the part under a one-dimensional sensor at constant speed along x: points (x, y(x), 0) of the open path y over x.
 
     Form error, defect and noise act along y, the direction of the beam.
@@ -136,7 +136,7 @@ def _stations(corners: NDArray[np.float64], motion: Motion) -> tuple[NDArray[np.
     return station, along, length
 
 
-def _on_path(
+def _points_on_path(
     corners: NDArray[np.float64], along: NDArray[np.float64], station: NDArray[np.float64], closed: bool
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the points at the stations and the outward normals of the segments they lie on."""
@@ -171,7 +171,7 @@ def _defect(station: NDArray[np.float64], length: float, motion: Motion) -> NDAr
     return np.asarray(np.where(away < DEFECT_WIDTH_MM / 2, bump, 0.0))
 
 
-def _posed(points: NDArray[np.float64], motion: Motion) -> NDArray[np.float64]:
+def _pose(points: NDArray[np.float64], motion: Motion) -> NDArray[np.float64]:
     c, s = math.cos(math.radians(motion.rotation_deg)), math.sin(math.radians(motion.rotation_deg))
     rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     return np.asarray(points @ rotation.T + np.array(motion.translation_mm))

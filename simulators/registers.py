@@ -80,10 +80,10 @@ class RegisterDevice:
 Maker = Callable[[Walk, Injector, bool], RegisterDevice]
 
 
-def serve_registers(settings: SimulatorSettings, announce: Announce, make: Maker, taken: Callable[..., Walk] = walk) -> None:
+def serve_registers(settings: SimulatorSettings, announce: Announce, make: Maker, move: Callable[..., Walk] = walk) -> None:
     """Serve one scan of a device made by `make(walk, injector, swapped)`."""
     logging.getLogger("pymodbus").addHandler(logging.NullHandler())
-    asyncio.run(_Service(settings, announce, make, taken(settings.path_mm, settings.motion)).run())
+    asyncio.run(_Service(settings, announce, make, move(settings.path_mm, settings.motion)).run())
 
 
 class _Service:
@@ -95,7 +95,7 @@ class _Service:
         self._make = make
         self._scan = scan
         self._injector = Injector(settings.faults, settings.motion.seed)
-        self._swapped = self._injector.has("word-swap")
+        self._swapped = self._injector.expects("word-swap")
         self._device = make(scan, self._injector, self._swapped)
         self._began_s: float | None = None
         self._stalled_until_s = 0.0
@@ -105,13 +105,13 @@ class _Service:
         self._address = settings.address
 
     async def run(self) -> None:
-        server = await self._listening()
+        server = await self._listen()
         self._announce(self._address)
         finished_s: float | None = None
         while finished_s is None or time.monotonic() < finished_s + FAREWELL_S:
             await asyncio.sleep(LOOK_S)
             if self._away_s is not None:
-                server = await self._away(server, self._away_s)
+                server = await self._go_away(server, self._away_s)
             if self._device.done and finished_s is None:
                 finished_s = time.monotonic()
                 self._announce(json.dumps({"points": self._device.count, **self._injector.tally}))
@@ -119,7 +119,7 @@ class _Service:
         if self._relay is not None:
             self._relay.close()
 
-    async def _away(self, server: ModbusBaseServer, seconds: float) -> ModbusBaseServer:
+    async def _go_away(self, server: ModbusBaseServer, seconds: float) -> ModbusBaseServer:
         """Take the server away and bring it back under the same address."""
         self._away_s = None
         await server.shutdown()  # type: ignore[no-untyped-call]
@@ -128,9 +128,9 @@ class _Service:
         await asyncio.sleep(seconds)
         if self._relay is not None:
             self._relay.plugged = True
-        return await self._listening()
+        return await self._listen()
 
-    async def _listening(self) -> ModbusBaseServer:
+    async def _listen(self) -> ModbusBaseServer:
         context = SimDevice(id=0, simdata=[SimData(0, count=self._device.size, values=0, datatype=DataType.REGISTERS)], action=self._access)
         request = _fifo_request(self._fifo)
         if self._settings.address == "pty":
@@ -140,7 +140,7 @@ class _Service:
             await serial.serve_forever(background=True)
             return serial
         host, _, port = self._address.rpartition(":")
-        server = ModbusTcpServer(context, address=(host, int(port)), custom_pdu=[request], trace_packet=self._damaged)
+        server = ModbusTcpServer(context, address=(host, int(port)), custom_pdu=[request], trace_packet=self._damage)
         await server.serve_forever(background=True)
         if not int(port):
             transport = server.transport
@@ -148,7 +148,7 @@ class _Service:
             self._address = f"{host}:{transport.sockets[0].getsockname()[1]}"
         return server
 
-    def _damaged(self, sending: bool, data: bytes) -> bytes:
+    def _damage(self, sending: bool, data: bytes) -> bytes:
         return self._injector.damage(data) if sending else data
 
     async def _access(
@@ -157,22 +157,22 @@ class _Service:
         """Let time pass, then compute the registers asked for."""
         if values is not None:
             return None
-        await self._time_passes(function, address, count)
+        await self._let_time_pass(function, address, count)
         registers[address - start : address - start + count] = self._device.read(function, address, count).tolist()
         return None
 
     async def _fifo(self, address: int) -> list[int]:
-        await self._time_passes(READ_FIFO, address, 0)
+        await self._let_time_pass(READ_FIFO, address, 0)
         return [int(register) for register in self._device.fifo(address)]
 
-    async def _time_passes(self, function: int, address: int, count: int) -> None:
+    async def _let_time_pass(self, function: int, address: int, count: int) -> None:
         if self._away_s is not None:
             await asyncio.sleep(1e6)  # about to go: no answer any more
         now_s = time.monotonic()
         self._began_s = now_s if self._began_s is None else self._began_s
         if now_s < self._silent_until_s:
             await asyncio.sleep(self._silent_until_s - now_s)
-        slow_s = self._injector.lasting("slow", self._device.taken)
+        slow_s = self._injector.lasting_value("slow", self._device.taken)
         if slow_s:
             await asyncio.sleep(slow_s)
         self._device.heartbeat = (self._device.heartbeat + 1) % 65536
@@ -183,27 +183,27 @@ class _Service:
         assert self._began_s is not None
         device, elapsed_s = self._device, time.monotonic() - self._began_s
         due = int(np.searchsorted(self._scan.time_s, elapsed_s, side="right")) if self._settings.paced else device.taken + appearing
-        due = self._injector.before_next_event(device.taken, min(due, device.count))
+        due = self._injector.next_stop(device.taken, min(due, device.count))
         device.take(max(due, device.taken))
-        self._injector.reached(device.taken)
+        self._injector.note_progress(device.taken)
         self._strike(device.taken)
 
     def _strike(self, index: int) -> None:
         """Let the faults of this point happen."""
-        status = self._injector.event("die", index)
+        status = self._injector.strike("die", index)
         if status is not None:
             os._exit(int(status))
-        stall_s = self._injector.event("stall", index)
+        stall_s = self._injector.strike("stall", index)
         if stall_s is not None:
             self._stalled_until_s = time.monotonic() + stall_s
             self._began_s = (self._began_s or 0.0) + stall_s
-        silence_s = self._injector.event("silence", index)
+        silence_s = self._injector.strike("silence", index)
         if silence_s is not None:
             self._silent_until_s = time.monotonic() + min(silence_s, 1e6)
-        away_s = self._injector.event("unplug", index)
+        away_s = self._injector.strike("unplug", index)
         if away_s is not None:
             self._away_s = away_s
-        restart_s = self._injector.event("restart", index)
+        restart_s = self._injector.strike("restart", index)
         if restart_s is not None:
             self._away_s = restart_s
             self._device = self._make(self._scan, self._injector, self._swapped)

@@ -70,12 +70,12 @@ class Device:
         return None
 
 
-def stream(settings: SimulatorSettings, device: Device, announce: Announce, taken: Callable[..., Walk] = walk) -> None:
-    """Serve one scan of any streaming device; `taken` moves the probe along the path."""
+def stream(settings: SimulatorSettings, device: Device, announce: Announce, move: Callable[..., Walk] = walk) -> None:
+    """Serve one scan of any streaming device; `move` moves the probe along the path."""
     strange = [fault.name for fault in settings.faults if CATALOGUE[fault.name].registers_only]
     if strange:
         raise ValueError(f"fault {strange[0]!r} strikes Modbus devices only")
-    scan = taken(settings.path_mm, settings.motion)
+    scan = move(settings.path_mm, settings.motion)
     injector = Injector(settings.faults, settings.motion.seed)
     line = open_line(settings.address)
     try:
@@ -100,7 +100,7 @@ class _Scan:
         count = len(self._scan.time_s)
         start_s, index = self._begin(), 0
         while index < count:
-            restart_s = self._injector.event("restart", index)
+            restart_s = self._injector.strike("restart", index)
             if restart_s is not None:
                 start_s, index = self._begin_anew(restart_s), 0
             start_s += self._trouble(index)
@@ -112,7 +112,7 @@ class _Scan:
                 self._line.plug()
                 self._unplugged = False
             self._listen(TICK_S if self._paced else 0.0)
-        self._send(self._injector.held())
+        self._send(self._injector.release())
         self._wait_until(self._line.connected)
         self._send(self._device.closing(count))
 
@@ -143,7 +143,7 @@ class _Scan:
         """Return the number of points to be sent by now: whole frames, up to the next point at which a fault is to strike."""
         count, step = len(self._scan.time_s), self._device.samples_per_frame
         taken = int(np.searchsorted(self._scan.time_s, elapsed_s, side="right")) if self._paced else index + BURST_POINTS
-        end = self._injector.before_next_event(index, count)
+        end = self._injector.next_stop(index, count)
         asked = self._device.frames_asked_for()
         if asked is not None:
             return min(taken, end, index + step * asked)
@@ -151,8 +151,8 @@ class _Scan:
 
     def _frame(self, first: int, stop: int) -> bytes:
         times, points = self._scan.time_s, self._scan.points_mm
-        samples = [Sample(i, float(times[i]), tuple(points[i].tolist()), self._injector.invalid(i)) for i in range(first, stop)]
-        return self._injector.frame(first, self._device.frame(samples))
+        samples = [Sample(i, float(times[i]), tuple(points[i].tolist()), self._injector.marks_invalid(i)) for i in range(first, stop)]
+        return self._injector.pass_on(first, self._device.frame(samples))
 
     def _send(self, data: bytes) -> None:
         if data:
@@ -162,17 +162,17 @@ class _Scan:
     def _trouble(self, index: int) -> float:
         """Let the faults of this point happen; return for how long the scan stood still."""
         began_s = time.monotonic()
-        status = self._injector.event("die", index)
+        status = self._injector.strike("die", index)
         if status is not None:
             sys.stdout.flush()
             raise SystemExit(int(status))
-        stall_s = self._injector.event("stall", index)
+        stall_s = self._injector.strike("stall", index)
         if stall_s is not None:
             self._pause(stall_s, index, alive=True)
-        silence_s = self._injector.event("silence", index)
+        silence_s = self._injector.strike("silence", index)
         if silence_s is not None:
             self._pause(silence_s, index, alive=False)
-        away_s = self._injector.event("unplug", index)
+        away_s = self._injector.strike("unplug", index)
         if away_s is not None:
             self._line.unplug()
             self._unplugged = True

@@ -9,7 +9,7 @@ from cmmlink.errors import PlanError
 from cmmlink.report.deviations_csv import write_deviations
 from cmmlink.result_keys import SectionInspected
 from cmmlink.stack import SectionOutcome, StackOutcome
-from drivers.surface import Slice
+from drivers.surface import SurfaceSection
 from inspection import ToleranceZone
 
 CONTOUR_COLUMNS = {
@@ -85,7 +85,7 @@ def section_folder(number: int, section: SectionOutcome) -> str:
     return f"section-{number:03d}_{section.slice.asked_mm:.3f}mm"
 
 
-def write_contours(cut: Slice, path: Path) -> None:
+def write_contours(cut: SurfaceSection, path: Path) -> None:
     """Write every contour point, in machine and in section coordinates; closed contours do not repeat their first point."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)

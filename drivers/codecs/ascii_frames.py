@@ -63,7 +63,7 @@ class AsciiDecoder:
         """Decode the next bytes."""
         lines = (self._pending + data).split(b"\n")
         self._pending = lines.pop()
-        self._lines(lines)
+        self._take_lines(lines)
         self._pending = self._drop_excess(self._pending)
         return self._out.hand_over()
 
@@ -82,7 +82,7 @@ class AsciiDecoder:
         self._raw_us: list[int] = []
         self._xyz: list[float] = []
 
-    def _lines(self, lines: list[bytes]) -> None:
+    def _take_lines(self, lines: list[bytes]) -> None:
         """Take whole lines: points in sequence here, where speed counts, everything else elsewhere."""
         counter = self._counter
         expected = counter.expected
@@ -98,12 +98,12 @@ class AsciiDecoder:
                     expected += 1
                     continue
             counter.expected = expected
-            self._other_line(line)
+            self._take_other_line(line)
             counter = self._counter
             expected = counter.expected
         counter.expected = expected
 
-    def _other_line(self, line: bytes) -> None:
+    def _take_other_line(self, line: bytes) -> None:
         """Take a line that is not simply the next good point."""
         rest = self._drop_excess(line)
         overlong, self._overlong = self._overlong, False
@@ -114,7 +114,7 @@ class AsciiDecoder:
         if rest[-6:] != b"*%04X\r" % crc_hqx(body, 0xFFFF):
             self._damage(len(rest) + 1, "checksum wrong" if len(rest) > 6 and rest[-6:-5] == b"*" else "not a whole line")
         elif found := POINT.fullmatch(body):
-            self._point(found)
+            self._take_point(found)
         elif found := HEARTBEAT.fullmatch(body):
             self._out.append_loss(self._counter.reach(int(found[1])))
             self._out.append(Heartbeat())
@@ -125,7 +125,7 @@ class AsciiDecoder:
         else:
             self._damage(len(rest) + 1, "sound line of unknown form")
 
-    def _point(self, found: re.Match[bytes]) -> None:
+    def _take_point(self, found: re.Match[bytes]) -> None:
         sequence, raw_us, x, y, z, flags = found.groups()
         if self._closed:
             self._out.append(Rejected(1, "sent after the end of the scan"))

@@ -63,8 +63,8 @@ class BinaryDecoder:
         data = self._pending + data
         at = 0
         while True:
-            at += self._run(data, at)
-            used = self._one(data, at)
+            at += self._take_run(data, at)
+            used = self._take_one(data, at)
             if not used:
                 break
             at += used
@@ -85,7 +85,7 @@ class BinaryDecoder:
         self._last_sequence = -1
         self._us_per_point = 0.0
 
-    def _run(self, data: bytes, start: int) -> int:
+    def _take_run(self, data: bytes, start: int) -> int:
         """Take good points in sequence, many at once; return the number of bytes used."""
         count = min((len(data) - start) // SIZE, RUN)
         if count < 2 or self._away or self._closed or self._damage:
@@ -101,11 +101,11 @@ class BinaryDecoder:
             if not count:
                 return 0
             frames = frames[:count]
-        self._batch(self._counter.expected + np.arange(count), frames["t_us"].astype(np.int64), frames["xyz"])
+        self._append_batch(self._counter.expected + np.arange(count), frames["t_us"].astype(np.int64), frames["xyz"])
         self._counter.expected += count
         return count * SIZE
 
-    def _one(self, data: bytes, at: int) -> int:
+    def _take_one(self, data: bytes, at: int) -> int:
         """Take one frame or step over what is none; return the number of bytes used, 0 if more are needed."""
         left = len(data) - at
         if left and data[at] != SYNC[0]:
@@ -114,12 +114,12 @@ class BinaryDecoder:
         if left < 2:
             return 0
         if data[at + 1] == FRAME_SYNC >> 8:
-            return self._frame(data[at : at + SIZE])
+            return self._take_frame(data[at : at + SIZE])
         if data[at + 1] == BLOCK_SYNC >> 8:
-            return self._block(data, at)
+            return self._take_block(data, at)
         return self._skip(1)
 
-    def _frame(self, frame: bytes) -> int:
+    def _take_frame(self, frame: bytes) -> int:
         if len(frame) < SIZE:
             return 0
         fields = np.frombuffer(frame, dtype=FRAME)[0]
@@ -128,7 +128,7 @@ class BinaryDecoder:
         self._out.flush()
         kind, total = int(fields["type"]), int.from_bytes(frame[10:18], "little")
         if kind == POINT:
-            self._point(fields)
+            self._take_point(fields)
         elif kind == OPENING:
             self._open(frame)
         elif kind == HEARTBEAT:
@@ -140,14 +140,14 @@ class BinaryDecoder:
             self._out.append(ScanClosed(total))
         return SIZE
 
-    def _point(self, fields: np.void) -> None:
+    def _take_point(self, fields: np.void) -> None:
         raw_us = int(fields["t_us"])
-        near = self._counter.expected + self._missed(raw_us) if self._away else None
+        near = self._counter.expected + self._estimate_missed(raw_us) if self._away else None
         self._away = False
-        if self._counts(self._counter.unwrap(int(fields["seq"]), near), int(fields["flags"])):
-            self._batch(np.array([self._placed]), np.array([raw_us]), fields["xyz"][None])
+        if self._account_for(self._counter.unwrap(int(fields["seq"]), near), int(fields["flags"])):
+            self._append_batch(np.array([self._placed]), np.array([raw_us]), fields["xyz"][None])
 
-    def _counts(self, sequence: int, flags: int) -> bool:
+    def _account_for(self, sequence: int, flags: int) -> bool:
         """Account for one frame; tell whether it is a point to hand on."""
         if self._closed:
             self._out.append(Rejected(1, "sent after the end of the scan"))
@@ -163,7 +163,7 @@ class BinaryDecoder:
             return False
         return True
 
-    def _block(self, data: bytes, at: int) -> int:
+    def _take_block(self, data: bytes, at: int) -> int:
         if len(data) - at < HEAD.itemsize:
             return 0
         head = np.frombuffer(data, dtype=HEAD, count=1, offset=at)[0]
@@ -177,20 +177,20 @@ class BinaryDecoder:
             return self._skip(1)
         self._out.flush()
         points = np.frombuffer(data, dtype=BLOCK_POINT, count=count, offset=body)
-        self._block_points(self._unwrap_32(int(head["seq"])), int(head["t_us"]) + points["dt_us"].astype(np.int64), points)
+        self._take_block_points(self._unwrap_32(int(head["seq"])), int(head["t_us"]) + points["dt_us"].astype(np.int64), points)
         return end + 4 - at
 
-    def _block_points(self, first: int, t_us: NDArray[np.int64], points: NDArray[np.void]) -> None:
+    def _take_block_points(self, first: int, t_us: NDArray[np.int64], points: NDArray[np.void]) -> None:
         self._away, self._in_blocks = False, True  # the clock of blocks does not wrap
         count = len(points)
         if first >= self._counter.expected and not points["flags"].any() and not self._closed:
             self._out.append_loss(self._counter.place(first, near=first).lost)
             self._counter.expected = first + count
-            self._batch(first + np.arange(count), t_us, points["xyz"])
+            self._append_batch(first + np.arange(count), t_us, points["xyz"])
             return
-        keep = np.array([self._counts(first + i, int(flags)) for i, flags in enumerate(points["flags"])])
+        keep = np.array([self._account_for(first + i, int(flags)) for i, flags in enumerate(points["flags"])])
         if keep.any():
-            self._batch((first + np.arange(count))[keep], t_us[keep], points["xyz"][keep])
+            self._append_batch((first + np.arange(count))[keep], t_us[keep], points["xyz"][keep])
 
     def _unwrap_32(self, seq: int) -> int:
         anchor, half = self._counter.expected, 1 << 31
@@ -204,7 +204,7 @@ class BinaryDecoder:
         count = int.from_bytes(frame[14:22], "little")
         self._out.append(ScanOpened("counted binary frames", str(int.from_bytes(frame[10:14], "little")), count or None))
 
-    def _batch(self, sequence: NDArray[np.int64], t_us: NDArray[np.int64], xyz: NDArray[np.int32]) -> None:
+    def _append_batch(self, sequence: NDArray[np.int64], t_us: NDArray[np.int64], xyz: NDArray[np.int32]) -> None:
         self._learn_pace(int(sequence[-1]), int(t_us[-1]))
         time_s = t_us / 1e6 if self._in_blocks else self._clock.seconds(t_us)
         self._out.append(PointBatch(sequence, time_s, xyz / UNITS_PER_MM))
@@ -217,7 +217,7 @@ class BinaryDecoder:
             self._us_per_point += 0.2 * (min(us, 2 * self._us_per_point) - self._us_per_point) if self._us_per_point else us
         self._last_sequence, self._last_us = sequence, raw_us
 
-    def _missed(self, raw_us: int) -> int:
+    def _estimate_missed(self, raw_us: int) -> int:
         """Estimate from the clock how many points were taken while the link was away."""
         if self._last_us is None or not self._us_per_point:
             return 0

@@ -111,14 +111,14 @@ class OptoncdtDecoder:
         data = self._text + data
         at = 0
         while True:
-            at += self._run(data, at)
+            at += self._take_run(data, at)
             found = WORDS.search(data, at)
             if found is None:
                 break
-            self._other_bytes(data[at : found.start()])
-            self._word(*found.group())
+            self._take_other_bytes(data[at : found.start()])
+            self._take_word(*found.group())
             at = found.end()
-        self._text = self._replies(data[at:])
+        self._text = self._take_replies(data[at:])
         return self._out.hand_over()
 
     def interrupted(self) -> list[Arrival]:
@@ -132,7 +132,7 @@ class OptoncdtDecoder:
         self._text, self._words, self._asked = b"", [], False
         return self._out.hand_over()
 
-    def _run(self, data: bytes, start: int) -> int:
+    def _take_run(self, data: bytes, start: int) -> int:
         """Take blocks that are whole, sound and next in order, many at once; return the number of bytes used."""
         if self._last is None or self._counter is None or self._held or self._words or self._distances.closed:
             return 0
@@ -178,26 +178,26 @@ class OptoncdtDecoder:
     def _distance_mm(self, value: Number) -> Number:
         return self._range_mm / 100.0 * (SCALE * value - 1.0)
 
-    def _other_bytes(self, data: bytes) -> None:
+    def _take_other_bytes(self, data: bytes) -> None:
         """Take what stands between two words: replies, or damage."""
-        rest = self._replies(data)
+        rest = self._take_replies(data)
         if rest:
             self._out.append(Damaged(len(rest), "neither value nor reply"))
 
-    def _replies(self, data: bytes) -> bytes:
+    def _take_replies(self, data: bytes) -> bytes:
         """Read the replies that end with a prompt; return what follows the last one."""
         *replies, rest = data.split(PROMPT)
         for reply in replies:
             if len(reply) + len(PROMPT) < SHORTEST_REPLY or not reply.replace(b"\r", b"").replace(b"\n", b"").isascii():
                 self._out.append(Damaged(len(reply) + len(PROMPT), "neither value nor reply"))
             else:
-                self._reply(reply.decode("ascii"))
+                self._take_reply(reply.decode("ascii"))
         while len(rest) > LONGEST_REPLY:
             self._out.append(Damaged(LONGEST_REPLY, "neither value nor reply"))
             rest = rest[LONGEST_REPLY:]
         return rest
 
-    def _reply(self, text: str) -> None:
+    def _take_reply(self, text: str) -> None:
         error = re.search(r"\bE\d{2}\b.*", text)
         if error:
             raise DeviceRefused(f"the sensor answered {error[0].strip()!r}; check its firmware and settings")
@@ -213,7 +213,7 @@ class OptoncdtDecoder:
         self._outputs = outputs
         self._places = [outputs.index(name) for name in ("COUNTER", "TIMESTAMPLO", "TIMESTAMPHI")]
 
-    def _word(self, low: int, middle: int, high: int) -> None:
+    def _take_word(self, low: int, middle: int, high: int) -> None:
         value = (low & 63) | (middle & 63) << 6 | (high & 63) << 12
         if self._outputs is None:
             self._out.append(Rejected(0 if high & 0x40 else 1, "came before the sensor told its outputs"))
@@ -227,9 +227,9 @@ class OptoncdtDecoder:
         self._words.append(value)
         if len(self._words) == len(self._outputs):
             words, self._words = self._words, []
-            self._complete(self._block_of(words))
+            self._take_block(self._block_of(words))
 
-    def _complete(self, block: _Block) -> None:
+    def _take_block(self, block: _Block) -> None:
         """Accept a block that follows on; hold any other until the next one confirms or contradicts its counter and clock."""
         held, self._held = self._held, None
         if self._confirms(block, self._last):

@@ -160,7 +160,7 @@ class RegisterAccount:
         points_mm = np.zeros((int(usable.sum()), 3))
         for axis, name in enumerate("xyz"):
             if name in self._fields:
-                points_mm[:, axis] = self._fields[name].scaled(values[name][usable].astype(np.float64))
+                points_mm[:, axis] = self._fields[name].to_unit(values[name][usable].astype(np.float64))
         return points_mm
 
 

@@ -63,14 +63,14 @@ POINTS_FIELDS = {
 }
 
 
-def _no_truth_value(given: object) -> object:
+def _refuse_truth_value(given: object) -> object:
     if isinstance(given, bool):  # pydantic takes true for 1, YAML takes yes and on for true
         raise ValueError("true or false where a number belongs")
     return given
 
 
-Whole = Annotated[int, BeforeValidator(_no_truth_value)]
-Number = Annotated[float, BeforeValidator(_no_truth_value)]
+Whole = Annotated[int, BeforeValidator(_refuse_truth_value)]
+Number = Annotated[float, BeforeValidator(_refuse_truth_value)]
 
 
 class _Part(BaseModel):
@@ -93,7 +93,7 @@ class RegisterField(_Part):
 
     @field_validator("scale")
     @classmethod
-    def _divides(cls, scale: float) -> float:
+    def _refuse_zero_scale(cls, scale: float) -> float:
         if scale == 0.0 or not math.isfinite(1.0 / scale):  # ticks per second are 1 / scale
             raise ValueError("a scale of 0, or too close to it, makes every value the same")
         return scale
@@ -103,7 +103,7 @@ class RegisterField(_Part):
         """The number of registers it takes."""
         return np.dtype(NUMPY_TYPES[self.type]).itemsize // 2
 
-    def scaled(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def to_unit(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return scale * value + offset; a scale like 1e-5 divides by 100,000, which rounds once and not twice."""
         whole = round(1.0 / self.scale) if 0.0 < abs(self.scale) < 1.0 else 0
         exact = whole != 0 and 1.0 / whole == self.scale
@@ -126,7 +126,7 @@ class Block(_Part):
         return max(self.registers, *(field.at + field.registers for field in self.fields.values()), 0)
 
     @model_validator(mode="after")
-    def _fits(self) -> "Block":
+    def _refuse_what_does_not_fit(self) -> "Block":
         if self.size > MOST_REGISTERS:
             raise ValueError(f"{self.size} registers; one answer carries at most {MOST_REGISTERS}")
         if self.at + self.size * self.entries > 65536:
@@ -149,10 +149,10 @@ class RegisterMap(_Part):
     points: Block = Field(description="the points")
 
     @model_validator(mode="after")
-    def _complete(self) -> "RegisterMap":
-        _only(self.status, STATUS_FIELDS, "status")
-        _only(self.pop, POP_FIELDS, "pop")
-        _only(self.points, POINTS_FIELDS, "points")
+    def _refuse_what_is_missing(self) -> "RegisterMap":
+        _refuse_unknown_fields(self.status, STATUS_FIELDS, "status")
+        _refuse_unknown_fields(self.pop, POP_FIELDS, "pop")
+        _refuse_unknown_fields(self.points, POINTS_FIELDS, "points")
         named = set(self.points.fields) | (set(self.pop.fields) if self.pop else set())
         if not named & {"x", "y", "z"}:
             raise ValueError("points: none of x, y, z is named")
@@ -167,7 +167,7 @@ class RegisterMap(_Part):
         return self
 
 
-def _only(block: Block | None, names: Mapping[str, str], where: str) -> None:
+def _refuse_unknown_fields(block: Block | None, names: Mapping[str, str], where: str) -> None:
     unknown = sorted(set(block.fields) - set(names)) if block else []
     if unknown:
         raise ValueError(f"{where}: field {unknown[0]!r} is none of {', '.join(sorted(names))}")

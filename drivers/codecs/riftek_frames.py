@@ -66,10 +66,10 @@ class RiftekDecoder:
             raise ProtocolError("the RIFTEK burst counter cannot tell what was lost while the link was away; begin the scan anew")
         for byte in data:
             if byte < 0x80:
-                self._end_of_burst()
+                self._end_burst()
                 self._out.append(Damaged(1, "byte of no answer"))
             elif self._burst and (byte ^ self._burst[0]) & 0x70:
-                self._end_of_burst()
+                self._end_burst()
                 self._burst = bytes([byte])
             elif len(self._burst) < 64:
                 self._burst += bytes([byte])
@@ -84,15 +84,15 @@ class RiftekDecoder:
         self._burst, self._away = b"", True
         return self._out.hand_over()
 
-    def _end_of_burst(self) -> None:
+    def _end_burst(self) -> None:
         bursts, self._burst = self._burst, b""
         if len(bursts) % 4:
             self._out.append(Damaged(len(bursts), "burst of a wrong length"))
             return
         for start in range(0, len(bursts), 4):  # more than one where three in a row were lost between them
-            self._result(bursts[start : start + 4])
+            self._take_result(bursts[start : start + 4])
 
-    def _result(self, burst: bytes) -> None:
+    def _take_result(self, burst: bytes) -> None:
         counter = burst[0] >> 4 & 3
         lost = 0 if self._last_count is None else (counter - self._last_count - 1) % 4
         self._last_count = counter

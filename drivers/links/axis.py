@@ -7,7 +7,8 @@ are unit vectors in machine coordinates; the sensor's points are (0, 0, distance
 import queue
 import threading
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -83,9 +84,6 @@ class FollowedAxis:
         self._sensor = sensor
         self._axis = axis
         self._beam = beam
-        self._times_s: list[float] = []
-        self._positions_mm: list[float] = []
-        self._waiting: deque[tuple[PointBatch, NDArray[np.float64]]] = deque()
 
     def stop(self) -> None:
         """End `arrivals` soon."""
@@ -94,47 +92,83 @@ class FollowedAxis:
 
     def arrivals(self) -> Iterator[Arrival]:
         """Yield the sensor's arrivals with its points in machine coordinates, and what goes wrong with the axis."""
-        inbox: queue.Queue[tuple[ScanSource, Arrival | Exception | None]] = queue.Queue(maxsize=10_000)
-        threads = [threading.Thread(target=_deliver, args=(source, inbox), daemon=True) for source in (self._sensor, self._axis)]
+        inbox: queue.Queue[Delivery] = queue.Queue(maxsize=10_000)
+        sources = {"sensor": self._sensor, "axis": self._axis}
+        threads = [
+            threading.Thread(target=_deliver, args=(source, name == "axis", inbox), name=name, daemon=True)
+            for name, source in sources.items()
+        ]
         for thread in threads:
             thread.start()
         try:
-            yield from self._merged(inbox)
+            yield from merge(iter(inbox.get, None), self._beam)
         finally:
             self.stop()
             while any(thread.is_alive() for thread in threads):
-                _empty(inbox)
+                _take_one(inbox)
 
-    def _merged(self, inbox: "queue.Queue[tuple[ScanSource, Arrival | Exception | None]]") -> Iterator[Arrival]:
-        last_s = {id(self._sensor): 0.0, id(self._axis): 0.0}
-        while True:
-            source, arrival = inbox.get()
-            if arrival is None or isinstance(arrival, Exception):
-                yield from self._left_over()
-                if isinstance(arrival, Exception):
-                    raise arrival
-                if source is self._axis:
-                    raise LinkError("the axis ended before the sensor's scan did")
-                return
-            if isinstance(arrival, WireBytes):
-                last_s[id(source)] = arrival.time_s
-            if isinstance(arrival, PointBatch):
-                at_s = last_s[id(source)] + (arrival.time_s - arrival.time_s[-1])
-                if source is self._axis:
-                    self._times_s += at_s.tolist()
-                    self._positions_mm += arrival.points_mm[:, 0].tolist()
-                else:
-                    self._waiting.append((arrival, at_s))
-                yield from self._placed()
-            elif isinstance(arrival, ScanClosed):
-                yield from self._left_over()
-                yield arrival
-                return
-            elif source is self._sensor or isinstance(arrival, Damaged | LinkDown | LinkUp):
-                yield arrival
 
-    def _placed(self) -> Iterator[Arrival]:
-        """Yield what lies between known positions; forget positions no longer needed."""
+@dataclass(frozen=True, slots=True)
+class Delivery:
+    """What one of the two sources said, or how it ended: None in good order, else with the exception."""
+
+    from_axis: bool
+    said: Arrival | Exception | None
+
+
+def merge(deliveries: Iterable[Delivery], beam: Beam) -> Iterator[Arrival]:
+    """Merge what a sensor and its axis say, in the order in which it is delivered; see `FollowedAxis`."""
+    last_s = {True: 0.0, False: 0.0}  # when bytes last came from the axis, and from the sensor
+    path = _Path(beam)
+    for delivery in deliveries:
+        said, from_axis = delivery.said, delivery.from_axis
+        if said is None or isinstance(said, Exception | ScanClosed):
+            yield from path.reject_left_over()
+            yield from _end(delivery)
+            return
+        if isinstance(said, WireBytes):
+            last_s[from_axis] = said.time_s
+        if isinstance(said, PointBatch):
+            at_s = last_s[from_axis] + (said.time_s - said.time_s[-1])
+            if from_axis:
+                path.add_positions(at_s, said)
+            else:
+                path.add_distances(at_s, said)
+            yield from path.place()
+        elif not from_axis or isinstance(said, Damaged | LinkDown | LinkUp):
+            yield said
+
+
+def _end(delivery: Delivery) -> Iterator[Arrival]:
+    """End as the source did: a closed scan is the end of both, an axis that ends before it is a lost link."""
+    if isinstance(delivery.said, Exception):
+        raise delivery.said
+    if delivery.said is not None:
+        yield delivery.said
+    elif delivery.from_axis:
+        raise LinkError("the axis ended before the sensor's scan did")
+
+
+class _Path:
+    """Where the axis was, and the distances that wait to be placed on it."""
+
+    def __init__(self, beam: Beam) -> None:
+        self._beam = beam
+        self._times_s: list[float] = []
+        self._positions_mm: list[float] = []
+        self._waiting: deque[tuple[PointBatch, NDArray[np.float64]]] = deque()
+
+    def add_positions(self, at_s: NDArray[np.float64], batch: PointBatch) -> None:
+        """Take positions of the axis, which are the x of its points, at the times `at_s`, (m,)."""
+        self._times_s += at_s.tolist()
+        self._positions_mm += batch.points_mm[:, 0].tolist()
+
+    def add_distances(self, at_s: NDArray[np.float64], batch: PointBatch) -> None:
+        """Take distances of the sensor, which are the z of its points, at the times `at_s`, (m,)."""
+        self._waiting.append((batch, at_s))
+
+    def place(self) -> Iterator[Arrival]:
+        """Yield what lies between known positions; forget positions that are no longer needed."""
         while self._waiting and self._times_s and self._waiting[0][1][-1] <= self._times_s[-1]:
             batch, at_s = self._waiting.popleft()
             known = at_s >= self._times_s[0]
@@ -147,28 +181,26 @@ class FollowedAxis:
             oldest = int(np.searchsorted(self._times_s, at_s[-1])) - 1
             del self._times_s[: max(0, oldest)], self._positions_mm[: max(0, oldest)]
 
-    def _left_over(self) -> Iterator[Arrival]:
-        """Reject what no position came for any more."""
-        yield from self._placed()
+    def reject_left_over(self) -> Iterator[Arrival]:
+        """Reject the distances for which no position came any more."""
+        yield from self.place()
         count = sum(len(batch) for batch, _ in self._waiting)
         self._waiting.clear()
         if count:
             yield Rejected(count, "taken after the axis last told its position")
 
 
-def _deliver(source: ScanSource, inbox: "queue.Queue[tuple[ScanSource, Arrival | Exception | None]]") -> None:
-    """Pass on everything a source says, and how it ended."""
+def _deliver(source: ScanSource, from_axis: bool, inbox: "queue.Queue[Delivery]") -> None:
+    """Pass on everything that a source says, and how it ended; whatever it raises is raised again by `merge`."""
     try:
         for arrival in source.arrivals():
-            inbox.put((source, arrival))
-        inbox.put((source, None))
+            inbox.put(Delivery(from_axis, arrival))
+        inbox.put(Delivery(from_axis, None))
     except Exception as error:
-        inbox.put((source, error))
+        inbox.put(Delivery(from_axis, error))
 
 
-def _empty(inbox: "queue.Queue[tuple[ScanSource, Arrival | Exception | None]]") -> None:
-    """Let a delivering thread go on to its end."""
-    try:
+def _take_one(inbox: "queue.Queue[Delivery]") -> None:
+    """Make room for a thread that still delivers, so that it can come to its end."""
+    with suppress(queue.Empty):
         inbox.get(timeout=WAIT_S)
-    except queue.Empty:
-        return

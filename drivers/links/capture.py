@@ -31,7 +31,7 @@ class Capture:
             for arrival in self._recorded:
                 if self._stopped.is_set():
                     return
-                yield from [arrival] if self._decoder is None else _decoded(arrival, self._decoder)
+                yield from [arrival] if self._decoder is None else _decode(arrival, self._decoder)
             if self._failure:
                 raise DeviceError(self._failure)
         except DeviceError:
@@ -40,7 +40,7 @@ class Capture:
             raise
 
 
-def _decoded(arrival: Arrival, decoder: Decoder) -> Iterator[Arrival]:
+def _decode(arrival: Arrival, decoder: Decoder) -> Iterator[Arrival]:
     if isinstance(arrival, LinkDown):
         yield from decoder.interrupted()  # what the source did when the link was lost
     if isinstance(arrival, WireBytes | LinkDown | LinkUp):

@@ -23,7 +23,7 @@ from drivers.codecs.register_decoder import RegisterDecoder
 from drivers.codecs.register_map import RegisterMap
 from drivers.codecs.register_pdus import READ_FIFO
 from drivers.errors import LinkError
-from drivers.links.reconnect import kept_up
+from drivers.links.reconnect import keep_up
 from drivers.source import Arrival, Damaged, ScanClosed, WireBytes
 
 TRIES = 3  # of one request, before the link counts as lost
@@ -80,14 +80,14 @@ class ModbusScanner:
 
     def arrivals(self) -> Iterator[Arrival]:
         """Open the link, yield what arrives, end after `ScanClosed`."""
-        return kept_up(lambda: closing(self._opened()), self._scan, reconnect_s=self._reconnect_s, stopped=self._stopped, clock=self._clock)
+        return keep_up(lambda: closing(self._open()), self._scan, reconnect_s=self._reconnect_s, stopped=self._stopped, clock=self._clock)
 
     def _scan(self, client: ModbusBaseSyncClient) -> Iterator[Arrival]:
         last_news_s = self._clock()
         self._decoder.interrupted()
         while not self._stopped.is_set():
             request = self._decoder.request()
-            answer = self._asked(client, request)
+            answer = self._ask(client, request)
             if answer is None:
                 return
             yield WireBytes(self._clock(), request + answer)
@@ -103,7 +103,7 @@ class ModbusScanner:
             if self._decoder.idle:
                 self._stopped.wait(self._poll_s)
 
-    def _asked(self, client: ModbusBaseSyncClient, request: bytes) -> bytes | None:
+    def _ask(self, client: ModbusBaseSyncClient, request: bytes) -> bytes | None:
         """Return the data unit of the answer, asking again where it did not come; None when told to stop."""
         failure: ModbusException | None = None
         for _ in range(TRIES):
@@ -130,7 +130,7 @@ class ModbusScanner:
         if not self._stopped.is_set() and not client.connect():
             raise LinkError(f"{self._address}: the link was lost and does not open again")
 
-    def _opened(self) -> ModbusBaseSyncClient:
+    def _open(self) -> ModbusBaseSyncClient:
         if not (log := logging.getLogger("pymodbus")).handlers:
             log.addHandler(logging.NullHandler())  # what it logs reaches the operator as an error of ours, not as stray lines
         host, colon, port = self._address.rpartition(":")

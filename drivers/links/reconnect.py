@@ -18,8 +18,8 @@ LONGEST_WAIT_S = 2.0
 Link = TypeVar("Link")
 
 
-def kept_up(
-    opened: Callable[[], AbstractContextManager[Link]],
+def keep_up(
+    open_link: Callable[[], AbstractContextManager[Link]],
     scan: Callable[[Link], Iterator[Arrival]],
     *,
     reconnect_s: float,
@@ -34,7 +34,7 @@ def kept_up(
     wait_s = FIRST_WAIT_S
     while not stopped.is_set():
         try:
-            with opened() as link:
+            with open_link() as link:
                 for arrival in scan(link):
                     if down_since_s is not None:
                         yield LinkUp(clock() - down_since_s)

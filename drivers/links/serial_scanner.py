@@ -11,10 +11,9 @@ from collections.abc import Callable, Iterator
 from contextlib import closing
 
 import serial
-from serial.tools import list_ports
 
 from drivers.errors import DeviceError, LinkError, ProtocolError
-from drivers.links.reconnect import kept_up
+from drivers.links.reconnect import keep_up
 from drivers.source import Arrival, Damaged, Decoder, ScanClosed, WireBytes
 
 POLL_S = 0.05  # how long a read waits before it looks whether to stop
@@ -23,6 +22,8 @@ LARGEST_READ = 1 << 16
 
 def ports() -> list[tuple[str, str]]:
     """Return the serial ports of this computer: name and what the system says of it."""
+    from serial.tools import list_ports  # noqa: PLC0415 - it looks through the system's devices, for nobody but who asks
+
     return [(port.device, port.description) for port in list_ports.comports()]
 
 
@@ -56,7 +57,7 @@ class SerialScanner:
 
     def arrivals(self) -> Iterator[Arrival]:
         """Open the link, yield what arrives, end after `ScanClosed`."""
-        return kept_up(lambda: closing(self._open()), self._scan, reconnect_s=self._reconnect_s, stopped=self._stopped, clock=self._clock)
+        return keep_up(lambda: closing(self._open()), self._scan, reconnect_s=self._reconnect_s, stopped=self._stopped, clock=self._clock)
 
     def _scan(self, port: serial.Serial) -> Iterator[Arrival]:
         watch = _Watch(self._silence_s, self._clock())
@@ -72,12 +73,12 @@ class SerialScanner:
                 if any(isinstance(arrival, ScanClosed) for arrival in found):
                     self._write(port, self._decoder.request())
                     return
-                self._judge(watch.saw(data, found, self._clock()))
+                self._raise_if_dead(watch.note_read(data, found, self._clock()))
         except DeviceError:  # whatever ends the scan, the begun frame is accounted for
             yield from self._decoder.interrupted()
             raise
 
-    def _judge(self, state: str) -> None:
+    def _raise_if_dead(self, state: str) -> None:
         """Raise what the watch found."""
         if state == "silent":
             raise LinkError(f"{self._address}: silent for {self._silence_s:g} s; is the device switched on and scanning?")
@@ -127,7 +128,7 @@ class _Watch:
         self._patience_s = patience_s
         self._last_byte_s = self._last_sound_s = now_s
 
-    def saw(self, data: bytes, found: list[Arrival], now_s: float) -> str:
+    def note_read(self, data: bytes, found: list[Arrival], now_s: float) -> str:
         """Take note of one read; return "silent", "garbled" or "" if all is well."""
         if not data:
             return "silent" if now_s - self._last_byte_s > self._patience_s else ""

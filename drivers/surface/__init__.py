@@ -3,7 +3,7 @@
 Open3D itself is loaded only by the child process of `Open3DProcess`.
 """
 
-from drivers.surface.contour_source import Contour, ContourSource, Gap, Slice, with_points_between
+from drivers.surface.contour_source import Contour, ContourSource, Gap, SurfaceSection, add_points_between
 from drivers.surface.cut import Cutter, NumpyCutter, cut_surface, height_range_mm
 from drivers.surface.open3d_process import Open3DMissing, Open3DProcess, Open3DStatus, mend_open3d, open3d_status
 from drivers.surface.section_axes import SectionAxes
@@ -19,13 +19,13 @@ __all__ = [
     "Open3DProcess",
     "Open3DStatus",
     "SectionAxes",
-    "Slice",
     "SurfaceMesh",
+    "SurfaceSection",
+    "add_points_between",
     "cut_surface",
     "height_range_mm",
     "mend_open3d",
     "open3d_status",
     "read_stl",
     "surface_of",
-    "with_points_between",
 ]

@@ -46,7 +46,7 @@ class Gap:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Slice:
+class SurfaceSection:
     """One section of a surface.
 
     asked_mm, height_mm : the height asked for and the one cut, along the unit normal from the machine's origin
@@ -105,7 +105,7 @@ class ContourSource:
         self._stopped.set()
 
 
-def with_points_between(contour: Contour, spacing_mm: float) -> Contour:
+def add_points_between(contour: Contour, spacing_mm: float) -> Contour:
     """Set evenly spaced points on every piece longer than `spacing_mm`: they lie on the facets as much as the corners do."""
     arrays = [contour.points_mm, contour.section_mm]
     if contour.closed:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.errors import MeshError
-from drivers.surface.contour_source import Contour, Gap, Slice
+from drivers.surface.contour_source import Contour, Gap, SurfaceSection
 from drivers.surface.contours import ChainedSection, chain_sections
 from drivers.surface.section_axes import SectionAxes, axes_of
 from drivers.surface.stl_file import SurfaceMesh
@@ -49,7 +49,7 @@ def cut_surface(
     weld_mm: float = WELD_MM,
     shortest_mm: float | None = None,
     workers: int = 2,
-) -> Iterator[Slice]:
+) -> Iterator[SurfaceSection]:
     """Cut by the planes of these heights along the unit normal; slices come in the order of the heights.
 
     `cutter` is a `NumpyCutter` or an `Open3DProcess`. Loose ends within `weld_mm` are one point;
@@ -57,26 +57,28 @@ def cut_surface(
     Raises `MeshError` for a plane that misses the surface.
     """
     axes = axes_of(normal)
-    heights = _checked_heights(heights_mm)
+    heights = _check_heights(heights_mm)
     if not weld_mm > 0:
         raise MeshError(f"weld {weld_mm} mm: the welding distance must be positive")
     moved, corners, plane = _select(mesh, axes, heights)
     starts = np.searchsorted(plane, np.arange(len(heights) + 1))
 
-    def cut_batch(batch: tuple[int, int]) -> list[Slice]:
+    def cut_batch(batch: tuple[int, int]) -> list[SurfaceSection]:
         first, last = batch
         where = slice(starts[first], starts[last])
-        triangles = _local(corners[where], axes, moved[plane[where]])
+        triangles = _to_plane(corners[where], axes, moved[plane[where]])
         segments, of_plane = _cut_each(cutter, triangles, plane[where] - first, last - first)
         chained = chain_sections(segments, of_plane, last - first, weld_mm, shortest_mm)
         counts = np.diff(starts[first : last + 1]).tolist()
         levels = zip(heights[first:last].tolist(), moved[first:last].tolist(), counts, strict=True)
-        return [_slice(section, axes, *level, cutter.name) for section, level in zip(chained, levels, strict=True)]
+        return [_section(each, axes, *level, cutter.name) for each, level in zip(chained, levels, strict=True)]
 
-    yield from _ahead(cut_batch, list(_batches(starts)), workers)
+    yield from _work_ahead(cut_batch, list(_batches(starts)), workers)
 
 
-def _ahead(work: Callable[[tuple[int, int]], list[Slice]], batches: list[tuple[int, int]], workers: int) -> Iterator[Slice]:
+def _work_ahead(
+    work: Callable[[tuple[int, int]], list[SurfaceSection]], batches: list[tuple[int, int]], workers: int
+) -> Iterator[SurfaceSection]:
     """Results in order, by `workers` threads (numpy lets go of the interpreter), never more than twice as many waiting."""
     with ThreadPoolExecutor(workers, thread_name_prefix="cut") as pool:
         waiting = deque(pool.submit(work, batch) for batch in batches[: 2 * workers])
@@ -112,7 +114,7 @@ class NumpyCutter:
         return segments
 
 
-def _checked_heights(heights_mm: Sequence[float]) -> NDArray[np.float64]:
+def _check_heights(heights_mm: Sequence[float]) -> NDArray[np.float64]:
     heights = np.array(heights_mm, dtype=np.float64)
     if heights.ndim != 1 or not len(heights) or not np.isfinite(heights).all():
         raise MeshError(f"heights {list(heights_mm)}: at least one finite height in mm is needed")
@@ -155,12 +157,12 @@ def _gather(mesh: SurfaceMesh, axes: SectionAxes, heights: NDArray[np.float64]) 
     for corners in mesh.pieces():
         low, high = _span(corners, axes)
         found.low_mm, found.high_mm = min(found.low_mm, float(low.min())), max(found.high_mm, float(high.max()))
-        triangle, rank = _straddling(low, high, sorted_heights)
+        triangle, rank = _find_straddling(low, high, sorted_heights)
         found.corners.append(np.take(corners, triangle, axis=0))
         found.planes.append(order[rank])
         level = np.flatnonzero(high - low <= 2.0 * tolerance)
         if len(level):
-            _, rank = _straddling(np.nextafter(high[level] - tolerance, -np.inf), low[level] + tolerance, sorted_heights)
+            _, rank = _find_straddling(np.nextafter(high[level] - tolerance, -np.inf), low[level] + tolerance, sorted_heights)
             found.flat += np.bincount(order[rank], minlength=len(heights))
     return found
 
@@ -171,7 +173,7 @@ def _span(corners: NDArray[np.floating], axes: SectionAxes) -> tuple[NDArray[np.
     return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
 
 
-def _straddling(
+def _find_straddling(
     low: NDArray[np.float64], high: NDArray[np.float64], sorted_heights: NDArray[np.float64]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Pairs (triangle, rank of plane) with low < height <= high."""
@@ -196,7 +198,7 @@ def _select(
     corners, plane = np.concatenate(found.corners), np.concatenate(found.planes)
     if found.flat.any():
         in_plane = np.flatnonzero(found.flat)
-        moved[in_plane] = _beside_facets(mesh, axes, heights[in_plane])
+        moved[in_plane] = _move_off_facets(mesh, axes, heights[in_plane])
         again = _gather(mesh, axes, moved[in_plane])
         stay = found.flat[plane] == 0
         corners = np.concatenate([corners[stay], *again.corners])
@@ -216,7 +218,7 @@ def _refuse_misses(mesh: SurfaceMesh, heights: NDArray[np.float64], found: _Pass
         )
 
 
-def _beside_facets(mesh: SurfaceMesh, axes: SectionAxes, heights: NDArray[np.float64]) -> NDArray[np.float64]:
+def _move_off_facets(mesh: SurfaceMesh, axes: SectionAxes, heights: NDArray[np.float64]) -> NDArray[np.float64]:
     """Move each height by the smallest step that leaves no facet in the plane, up or down, whichever cuts more of the surface."""
     step = max(1e-4, 4.0 * _flatness_mm(mesh))
     tries = heights[:, None, None] + np.array([[1.0, -1.0], [2.0, -2.0], [3.0, -3.0]]) * step
@@ -244,7 +246,7 @@ def _batches(starts: NDArray[np.intp]) -> Iterator[tuple[int, int]]:
         first = last
 
 
-def _local(corners: NDArray[np.floating], axes: SectionAxes, heights: NDArray[np.float64]) -> NDArray[np.float64]:
+def _to_plane(corners: NDArray[np.floating], axes: SectionAxes, heights: NDArray[np.float64]) -> NDArray[np.float64]:
     """Corners as in-plane x, y and height above their plane, (t, 3, 3); the same arithmetic as in the selection."""
     x, y, z = corners[:, :, 0], corners[:, :, 1], corners[:, :, 2]
     local = np.empty(corners.shape)
@@ -264,27 +266,27 @@ def _cut_each(
     return np.concatenate(parts), np.repeat(np.arange(planes), [len(part) for part in parts])
 
 
-def _slice(section: ChainedSection, axes: SectionAxes, asked: float, height: float, triangles: int, cutter: str) -> Slice:
+def _section(chained: ChainedSection, axes: SectionAxes, asked: float, height: float, triangles: int, cutter: str) -> SurfaceSection:
     contours = tuple(
         Contour(axes.machine_mm(chain.section_mm, height), chain.section_mm, chain.closed, chain.hole, chain.length_mm)
-        for chain in section.chains
+        for chain in chained.chains
     )
     gaps = tuple(_gap(contour.points_mm) for contour in contours if not contour.closed)
-    branches = axes.machine_mm(section.branches_mm, height)
-    made = Slice(
+    branches = axes.machine_mm(chained.branches_mm, height)
+    made = SurfaceSection(
         asked_mm=asked,
         height_mm=height,
         axes=axes,
         contours=contours,
-        set_aside=len(section.set_aside_mm),
-        set_aside_mm=section.set_aside_mm,
+        set_aside=len(chained.set_aside_mm),
+        set_aside_mm=chained.set_aside_mm,
         gaps=gaps,
         branches_mm=branches,
         triangles=triangles,
         cutter=cutter,
         warnings=(),
     )
-    return replace(made, warnings=tuple(_all_warnings(section, made)))
+    return replace(made, warnings=tuple(_warnings(chained, made)))
 
 
 def _gap(points_mm: NDArray[np.float64]) -> Gap:
@@ -292,27 +294,27 @@ def _gap(points_mm: NDArray[np.float64]) -> Gap:
     return Gap((last[0], last[1], last[2]), (first[0], first[1], first[2]), dist(last, first))
 
 
-def _all_warnings(section: ChainedSection, slice_: Slice) -> Iterator[str]:
-    gaps, branches = slice_.gaps, slice_.branches_mm
-    if slice_.height_mm != slice_.asked_mm:
-        yield f"facets lie in the plane at {slice_.asked_mm:g} mm: it was moved by {slice_.height_mm - slice_.asked_mm:+.2g} mm"
-    if not slice_.contours:
-        yield f"nothing is left of the section at {slice_.asked_mm:g} mm: no surface is cut there, or every piece is below the limit"
+def _warnings(chained: ChainedSection, section: SurfaceSection) -> Iterator[str]:
+    gaps, branches = section.gaps, section.branches_mm
+    if section.height_mm != section.asked_mm:
+        yield f"facets lie in the plane at {section.asked_mm:g} mm: it was moved by {section.height_mm - section.asked_mm:+.2g} mm"
+    if not section.contours:
+        yield f"nothing is left of the section at {section.asked_mm:g} mm: no surface is cut there, or every piece is below the limit"
     if gaps:
         places = "; ".join(f"{_place(gap.from_mm)} to {_place(gap.to_mm)}, {gap.width_mm:.4f} mm" for gap in gaps[:_NAMED])
-        yield f"{len(gaps)} open contour(s), left open: {places}{_more(len(gaps))}"
+        yield f"{len(gaps)} open contour(s), left open: {places}{_rest_of(len(gaps))}"
     if len(branches):
         places = "; ".join(_place(branch) for branch in branches[:_NAMED])
-        yield f"more than two segments meet at {len(branches)} place(s): {places}{_more(len(branches))}"
-    if section.repeated:
-        yield f"{section.repeated} segment(s) were there twice (facets given twice, or folded): one of each was kept"
-    if section.set_aside_open:
-        yield f"{section.set_aside_open} of the {slice_.set_aside} pieces set aside are open"
+        yield f"more than two segments meet at {len(branches)} place(s): {places}{_rest_of(len(branches))}"
+    if chained.repeated:
+        yield f"{chained.repeated} segment(s) were there twice (facets given twice, or folded): one of each was kept"
+    if chained.set_aside_open:
+        yield f"{chained.set_aside_open} of the {section.set_aside} pieces set aside are open"
 
 
 def _place(point: Sequence[float] | NDArray[np.float64]) -> str:
     return f"({point[0]:.4f}, {point[1]:.4f}, {point[2]:.4f})"
 
 
-def _more(count: int) -> str:
+def _rest_of(count: int) -> str:
     return f" and {count - _NAMED} more" if count > _NAMED else ""

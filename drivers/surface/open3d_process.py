@@ -277,7 +277,7 @@ def _missing_libraries() -> list[str]:
 
 
 def _cut(open3d: Any, triangles: NDArray[np.float64]) -> tuple[dict[str, Any], list[NDArray[Any]]]:
-    """Slice at height zero, in float64; the unit normal is z because heights are."""
+    """SurfaceSection at height zero, in float64; the unit normal is z because heights are."""
     core = open3d.core
     corners = core.Tensor.from_numpy(triangles.reshape(-1, 3).copy())
     indices = core.Tensor.from_numpy(np.arange(3 * len(triangles), dtype=np.int64).reshape(-1, 3))

@@ -29,12 +29,12 @@ class SectionAxes:
 
     def height_mm(self, x_mm: NDArray[np.floating], y_mm: NDArray[np.floating], z_mm: NDArray[np.floating]) -> NDArray[np.float64]:
         """Heights of machine points. Element by element and always in one order: equal points have bit-equal heights."""
-        return _along(self.normal, x_mm, y_mm, z_mm)
+        return _dot(self.normal, x_mm, y_mm, z_mm)
 
     def section_mm(self, points_mm: NDArray[np.floating]) -> NDArray[np.float64]:
         """(..., 3) machine points to (..., 2) in the plane's axes; bit-equal points stay bit-equal."""
         x, y, z = points_mm[..., 0], points_mm[..., 1], points_mm[..., 2]
-        return np.stack([_along(self.x, x, y, z), _along(self.y, x, y, z)], axis=-1)
+        return np.stack([_dot(self.x, x, y, z), _dot(self.y, x, y, z)], axis=-1)
 
     def machine_mm(self, section_mm: NDArray[np.float64], height_mm: float) -> NDArray[np.float64]:
         """(m, 2) points in the plane at `height_mm` back to (m, 3) machine points."""
@@ -54,9 +54,7 @@ def axes_of(normal: Sequence[float]) -> SectionAxes:
     return SectionAxes(x, np.cross(unit, x) + 0.0, unit + 0.0)  # + 0.0 turns -0.0 into 0.0
 
 
-def _along(
-    direction: NDArray[np.float64], x: NDArray[np.floating], y: NDArray[np.floating], z: NDArray[np.floating]
-) -> NDArray[np.float64]:
+def _dot(direction: NDArray[np.float64], x: NDArray[np.floating], y: NDArray[np.floating], z: NDArray[np.floating]) -> NDArray[np.float64]:
     """Dot products without BLAS, whose rounding depends on the position in the array; zero components cost nothing."""
     total: NDArray[np.float64] | None = None
     for part, coordinate in zip(direction, (x, y, z), strict=True):

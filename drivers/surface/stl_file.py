@@ -76,7 +76,7 @@ def read_stl(path: Path, scale: float = 1.0) -> SurfaceMesh:
         raise MeshError(f"{path}: the file is empty (0 bytes); export the surface again")
     promised = int.from_bytes(head[80:84], "little") if size >= HEADER_BYTES else None
     if promised is not None and size == HEADER_BYTES + RECORD.itemsize * promised:
-        return _checked(lambda: _binary_pieces(path, promised, scale), str(path), "binary STL")
+        return _check(lambda: _binary_pieces(path, promised, scale), str(path), "binary STL")
     if text:
         corners, warnings = _text_corners(path)
         return surface_of(corners * scale, str(path), "ASCII STL", warnings)
@@ -92,17 +92,17 @@ def surface_of(corners_mm: NDArray[np.floating], source: str, kind: str, warning
         for start in range(0, len(corners_mm), _CHUNK_TRIANGLES):
             yield corners_mm[start : start + _CHUNK_TRIANGLES]
 
-    return _checked(pieces, source, kind, warnings)
+    return _check(pieces, source, kind, warnings)
 
 
-def _checked(pieces: Callable[[], Iterator[NDArray[np.floating]]], source: str, kind: str, warnings: tuple[str, ...] = ()) -> SurfaceMesh:
+def _check(pieces: Callable[[], Iterator[NDArray[np.floating]]], source: str, kind: str, warnings: tuple[str, ...] = ()) -> SurfaceMesh:
     """One pass over the surface: its box, its number of triangles, and the error for the first that cannot be used."""
     count = 0
     lower, upper = np.full(3, np.inf), np.full(3, -np.inf)
     for piece in pieces():
         low, high = _box(piece)
         if not (low.min() >= -FARTHEST_MM and high.max() <= FARTHEST_MM):  # false for NaN as well
-            raise MeshError(_unusable(piece, count, source, kind == "binary STL"))
+            raise MeshError(_complaint(piece, count, source, kind == "binary STL"))
         lower, upper = np.minimum(lower, low), np.maximum(upper, high)
         count += len(piece)
     if count == 0:
@@ -120,7 +120,7 @@ def _box(corners: NDArray[np.floating]) -> tuple[NDArray[np.float64], NDArray[np
     return low.astype(np.float64), high.astype(np.float64)
 
 
-def _unusable(corners: NDArray[np.floating], first: int, source: str, binary: bool) -> str:
+def _complaint(corners: NDArray[np.floating], first: int, source: str, binary: bool) -> str:
     """Name the first coordinate that is not finite or beyond `FARTHEST_MM`; `first` triangles came before corners[0]."""
     triangle, corner, axis = (int(i) for i in np.argwhere(~(np.abs(corners) <= FARTHEST_MM))[0])
     number = first + triangle + 1
@@ -159,12 +159,12 @@ def _binary_pieces(path: Path, count: int, scale: float) -> Iterator[NDArray[np.
         file.seek(HEADER_BYTES)
         for start in range(0, count, _CHUNK_TRIANGLES):
             wanted = min(_CHUNK_TRIANGLES, count - start)
-            _fill(file, records[:wanted].view(np.uint8).data, path)
+            _read_all(file, records[:wanted].view(np.uint8).data, path)
             corners[:wanted] = records["corners"][:wanted]
             yield corners[:wanted] if scale == 1.0 else corners[:wanted] * np.float64(scale)
 
 
-def _fill(file: FileIO, buffer: memoryview, path: Path) -> None:
+def _read_all(file: FileIO, buffer: memoryview, path: Path) -> None:
     got = 0
     while got < len(buffer):
         more = file.readinto(buffer[got:])
@@ -187,7 +187,7 @@ def _text_corners(path: Path) -> tuple[NDArray[np.float64], tuple[str, ...]]:
                 count += len(pieces[-1])
                 commas = commas or b"," in text[:cut]
             rest, offset = text[cut:], offset + cut
-    left = _without_solid_lines(rest)
+    left = _blank_solid_lines(rest)
     if left.strip():
         place = offset + len(left.rstrip()) - len(left.split()[-1])
         raise MeshError(f"{path}: the text breaks off in triangle {count + 1} (byte {place}); export or copy the file again")
@@ -197,7 +197,7 @@ def _text_corners(path: Path) -> tuple[NDArray[np.float64], tuple[str, ...]]:
     return np.concatenate(pieces), warnings
 
 
-def _without_solid_lines(text: bytes) -> bytes:
+def _blank_solid_lines(text: bytes) -> bytes:
     """Blank `solid NAME` and `endsolid NAME`, every byte keeping its place."""
     text = text.replace(b"\xef\xbb\xbf", b"   ")
     return _SOLID_LINES.sub(lambda line: b" " * len(line.group()), text) if b"solid" in text else text
@@ -205,7 +205,7 @@ def _without_solid_lines(text: bytes) -> bytes:
 
 def _facets(text: bytes, first: int, offset: int, source: str) -> NDArray[np.float64]:
     """(n, 3, 3) corners of a piece of text that holds whole facets only, or the error with its place."""
-    body = _without_solid_lines(text).replace(b",", b".")
+    body = _blank_solid_lines(text).replace(b",", b".")
     words = body.split()
     count = len(words) // _FACET_WORDS
     whole = len(words) == count * _FACET_WORDS and all(words[at::_FACET_WORDS].count(keyword) == count for at, keyword in _KEYWORDS.items())
@@ -214,10 +214,10 @@ def _facets(text: bytes, first: int, offset: int, source: str) -> NDArray[np.flo
             return np.column_stack([np.array(words[at::_FACET_WORDS]).astype(np.float64) for at in _CORNER_WORDS]).reshape(-1, 3, 3)
         except ValueError:
             pass  # the word at fault is sought below
-    raise MeshError(_first_bad_word(body, first, offset, source))
+    raise MeshError(_complaint_of_text(body, first, offset, source))
 
 
-def _first_bad_word(body: bytes, first: int, offset: int, source: str) -> str:
+def _complaint_of_text(body: bytes, first: int, offset: int, source: str) -> str:
     for index, match in enumerate(re.finditer(rb"\S+", body)):
         place = index % _FACET_WORDS
         expected = _KEYWORDS.get(place)

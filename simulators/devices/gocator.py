@@ -30,9 +30,9 @@ class Gocator(RegisterDevice):
 
     def take(self, taken: int) -> None:
         """Queue the messages up to `taken`."""
-        dropped = self.injector.event("overflow", taken)
+        dropped = self.injector.strike("overflow", taken)
         for index in range(self.taken, taken):
-            self._queue += self.injector.arrange(index)
+            self._queue += self.injector.stored_at(index)
         if dropped or len(self._queue) > QUEUE:
             self.overflow = 1
             self._queue = self._queue[: max(0, min(QUEUE, len(self._queue) - int(dropped or 0)))]
@@ -58,7 +58,7 @@ class Gocator(RegisterDevice):
         x, y, _ = self.scan.points_mm[index]
         for at, value in ((988, round(x * 1000)), (992, round(self.scan.time_s[index] * 1e6)), (996, FIRST_FRAME + index)):
             registers[at : at + 4] = self.numbers(np.array([value]), ">i8")[0]
-        invalid = self.injector.sentinel(index)
+        invalid = self.injector.lacks_value(index)
         value = NO_VALUE if invalid else round(y * 1000) & 0xFFFFFFFF
         registers[MEASUREMENTS_AT : MEASUREMENTS_AT + 2] = self.numbers(np.array([value]), ">u4")[0]
         registers[MEASUREMENTS_AT + 2] = 2 if invalid else 1

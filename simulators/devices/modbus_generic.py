@@ -35,9 +35,9 @@ class RingDevice(RegisterDevice):
 
     def take(self, taken: int) -> None:
         """Write the points up to `taken`, but those the device drops."""
-        dropped = self.injector.event("overflow", taken)
+        dropped = self.injector.strike("overflow", taken)
         for index in range(self.taken, taken):
-            for number in self.injector.arrange(index):
+            for number in self.injector.stored_at(index):
                 self.ring[len(self.stored) % ENTRIES] = self.entries[number]
                 self.stored.append(number)
         if dropped:
@@ -70,13 +70,13 @@ class RingDevice(RegisterDevice):
     def _encode(self) -> None:
         index = np.arange(self.count)
         units = np.round(self.scan.points_mm * 1e5).astype(np.int64) & 0xFFFFFFFF
-        units[[i for i in range(self.count) if self.injector.sentinel(i)], 1] = NO_VALUE
+        units[[i for i in range(self.count) if self.injector.lacks_value(i)], 1] = NO_VALUE
         self.entries[:, 0] = index % 65536
         self.entries[:, 1:3] = self.numbers(np.round(self.scan.time_s * 1e6).astype(np.int64) % 2**32, ">u4")
         for axis in range(3):
             self.entries[:, 3 + 2 * axis : 5 + 2 * axis] = self.numbers(units[:, axis], ">u4")
         if self.with_flags:
-            self.entries[:, 9] = [self.injector.invalid(i) for i in range(self.count)]
+            self.entries[:, 9] = [self.injector.marks_invalid(i) for i in range(self.count)]
         rows = self.entries[:, :-1].astype(">u2")
         self.entries[:, -1] = [crc_hqx(row.tobytes(), 0xFFFF) for row in rows]
 

@@ -6,7 +6,7 @@ words, and adds the values asked for with OUTADD_RS422 to every distance.
 
 from collections.abc import Sequence
 
-from simulators.motion import fed
+from simulators.motion import feed_under
 from simulators.settings import Announce, SimulatorSettings
 from simulators.stream import Device, Sample, stream
 
@@ -67,7 +67,7 @@ def _word(value: int, *, first: bool) -> bytes:
 
 def serve(settings: SimulatorSettings, announce: Announce) -> None:
     """Serve one scan."""
-    stream(settings, OptoncdtDevice(), announce, taken=fed)
+    stream(settings, OptoncdtDevice(), announce, move=feed_under)
 
 
 DEVICES = {"optoncdt": serve}

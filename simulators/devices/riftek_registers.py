@@ -6,7 +6,7 @@
 import numpy as np
 
 from simulators.faults import Injector
-from simulators.motion import Walk, fed
+from simulators.motion import Walk, feed_under
 from simulators.registers import RegisterDevice, Words, serve_registers
 from simulators.settings import Announce, SimulatorSettings
 
@@ -36,7 +36,7 @@ class RiftekRegisters(RegisterDevice):
 
 def serve(settings: SimulatorSettings, announce: Announce) -> None:
     """Serve the sensor while the part is fed under it."""
-    serve_registers(settings, announce, RiftekRegisters, taken=fed)
+    serve_registers(settings, announce, RiftekRegisters, move=feed_under)
 
 
 DEVICES = {"riftek-modbus": serve}

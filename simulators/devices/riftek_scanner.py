@@ -6,7 +6,7 @@ request 8; request 1 identifies, request 6 gives one result. The ASCII sensor an
 
 from collections.abc import Sequence
 
-from simulators.motion import fed
+from simulators.motion import feed_under
 from simulators.settings import Announce, SimulatorSettings
 from simulators.stream import Device, Sample, stream
 
@@ -94,12 +94,12 @@ class RiftekAsciiDevice(Device):
 
 def serve(settings: SimulatorSettings, announce: Announce) -> None:
     """Serve one binary stream."""
-    stream(settings, RiftekDevice(), announce, taken=fed)
+    stream(settings, RiftekDevice(), announce, move=feed_under)
 
 
 def serve_ascii(settings: SimulatorSettings, announce: Announce) -> None:
     """Serve one scan of ASCII answers."""
-    stream(settings, RiftekAsciiDevice(), announce, taken=fed)
+    stream(settings, RiftekAsciiDevice(), announce, move=feed_under)
 
 
 DEVICES = {"riftek": serve, "riftek-ascii": serve_ascii}

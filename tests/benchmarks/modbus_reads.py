@@ -25,12 +25,12 @@ WARM_UP = 500
 def reads() -> None:
     with tempfile.TemporaryDirectory() as folder, simulated("modbus-ring", "127.0.0.1:0", Path(folder), rate_hz=1.0, count=10) as device:
         scanner = ModbusScanner(device.address, load_map("generic-ring"))
-        client = scanner._opened()
+        client = scanner._open()
         request = bytes.fromhex("03 0064 007D")
         times_s = []
         for _ in range(WARM_UP + READS):
             start_s = time.perf_counter()
-            answer = scanner._asked(client, request)
+            answer = scanner._ask(client, request)
             times_s.append(time.perf_counter() - start_s)
             assert answer is not None
             assert len(answer) == 2 + 250

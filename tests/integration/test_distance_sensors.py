@@ -12,7 +12,7 @@ from drivers.codecs.riftek_frames import RiftekAsciiDecoder, RiftekDecoder
 from drivers.links.axis import Beam, ConstantFeed
 from drivers.links.serial_scanner import SerialScanner
 from drivers.source import Decoder, ScanClosed
-from simulators.motion import Motion, fed
+from simulators.motion import Motion, feed_under
 from tests.drivers.codecs.streams import account
 from tests.integration.simulated import Simulated, simulated
 
@@ -34,7 +34,7 @@ def running_sensor(sensor: str, folder: Path, *options: str, count: int) -> Abst
 @pytest.mark.parametrize("sensor", SENSORS)
 def test_a_fed_sensor_gives_the_surface(sensor: str, tmp_path: Path) -> None:
     make, within_mm = SENSORS[sensor]
-    truth_mm = fed(SURFACE_MM, Motion(SPEED_MM_S, RATE_HZ, count=COUNT)).points_mm
+    truth_mm = feed_under(SURFACE_MM, Motion(SPEED_MM_S, RATE_HZ, count=COUNT)).points_mm
     with running_sensor(sensor, tmp_path, count=COUNT) as running:
         source = ConstantFeed(SerialScanner(running.address, make()), BEAM, SPEED_MM_S)
         book = account(source.arrivals())
@@ -46,7 +46,7 @@ def test_a_fed_sensor_gives_the_surface(sensor: str, tmp_path: Path) -> None:
 
 def test_lost_values_keep_the_others_in_their_place(tmp_path: Path) -> None:
     faults = ["--fault=lost-frames:0.05", "--fault=invalid:0.05"]
-    truth_mm = fed(SURFACE_MM, Motion(SPEED_MM_S, RATE_HZ, count=COUNT)).points_mm
+    truth_mm = feed_under(SURFACE_MM, Motion(SPEED_MM_S, RATE_HZ, count=COUNT)).points_mm
     with running_sensor("optoncdt", tmp_path, *faults, count=COUNT + 50) as running:
         decoder = OptoncdtDecoder(50.0, rate_hz=RATE_HZ, count=COUNT)
         book = account(ConstantFeed(SerialScanner(running.address, decoder), BEAM, SPEED_MM_S).arrivals())

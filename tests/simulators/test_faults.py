@@ -10,8 +10,8 @@ DATA = bytes(range(256)) * 400
 
 def frames(injector: Injector, count: int) -> list[int]:
     """The numbers in the order in which they go out."""
-    sent = [number for index in range(count) for number in injector.arrange(index)]
-    held = injector.held()
+    sent = [number for index in range(count) for number in injector.stored_at(index)]
+    held = injector.release()
     return [*sent, int.from_bytes(held, "big")] if held else sent
 
 
@@ -74,10 +74,10 @@ def test_frames_are_lost_repeated_and_reordered_as_counted() -> None:
 def test_a_gap_and_events_strike_once_at_their_point() -> None:
     injector = Injector([Fault("gap", 5, 10), Fault("stall", 2.0, 12)], seed=1)
     assert frames(injector, 30) == [*range(10), *range(15, 30)]
-    assert [injector.event("stall", index) for index in (11, 12, 13)] == [None, 2.0, None]
-    assert injector.before_next_event(0, 30) == 10
-    assert injector.before_next_event(10, 30) == 12
-    assert injector.before_next_event(12, 30) == 30
+    assert [injector.strike("stall", index) for index in (11, 12, 13)] == [None, 2.0, None]
+    assert injector.next_stop(0, 30) == 10
+    assert injector.next_stop(10, 30) == 12
+    assert injector.next_stop(12, 30) == 30
 
 
 def test_the_same_seed_gives_the_same_damage() -> None:

@@ -1,17 +1,23 @@
 """Distances and axis positions to points, against closed forms."""
 
-import queue
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pytest
 
 from drivers.errors import LinkError, ProtocolError
-from drivers.links.axis import Beam, ConstantFeed, FollowedAxis
+from drivers.links.axis import Beam, ConstantFeed, Delivery, FollowedAxis, merge
 from drivers.source import Arrival, Damaged, Lost, PointBatch, ScanClosed, WireBytes
 from tests.drivers.codecs.streams import account
 
 BEAM = Beam(origin_mm=(1.0, 2.0, 3.0), distance_direction=(0.0, -1.0, 0.0), axis_direction=(0.6, 0.0, 0.8))
+
+ALONG_X = Beam((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
+
+
+def deliveries(axis: Sequence[Arrival], sensor: Sequence[Arrival]) -> list[Delivery]:
+    """Say all of the axis, then all of the sensor, then the sensor's end: threads would make it another order each time."""
+    return [*(Delivery(True, said) for said in axis), *(Delivery(False, said) for said in sensor), Delivery(False, None)]
 
 
 class Listed:
@@ -52,8 +58,7 @@ def test_a_sensor_without_a_clock_cannot_be_placed_by_a_constant_feed() -> None:
 def test_what_the_axis_lost_is_not_what_the_sensor_lost() -> None:
     axis: list[Arrival] = [WireBytes(100.0, b"axis"), Lost(7, "gap"), Damaged(3, "noise"), batch(0, [0.0], [0.0], 0)]
     sensor: list[Arrival] = [WireBytes(100.0, b"sensor"), batch(0, [1.0], [1.0], 2), ScanClosed(1)]
-    source = FollowedAxis(Listed([]), Listed([]), BEAM)
-    book = account(merged(source, [*axis, *sensor], axis_arrivals=4))
+    book = account(merge(deliveries(axis, sensor), BEAM))
     assert dict(book.counts) == {("Damaged", "noise"): 3, ("WireBytes", ""): 6}
     assert len(book.points_mm) == 1
 
@@ -65,10 +70,9 @@ def test_a_direction_must_be_a_unit_vector() -> None:
 
 def test_positions_of_a_second_source_are_interpolated_and_never_extrapolated() -> None:
     """The axis moves at 4 mm/s from clock time 100; the sensor's clock runs from elsewhere, its last point of a batch is now."""
-    axis = Listed([WireBytes(100.0 + i, b"") if k == 0 else batch(i, [0.0], [4.0 * i], 0) for i in range(6) for k in range(2)])
-    sensor = Listed([WireBytes(101.0, b""), batch(0, [7.0, 8.5], [1.0, 2.0], 2), WireBytes(103.5, b""), batch(2, [11.0], [3.0], 2)])
-    source = FollowedAxis(sensor, axis, Beam((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)))
-    book = account(merged(source, [*axis._arrivals, *sensor._arrivals], axis_arrivals=12))
+    axis: list[Arrival] = [WireBytes(100.0 + i, b"") if k == 0 else batch(i, [0.0], [4.0 * i], 0) for i in range(6) for k in range(2)]
+    sensor: list[Arrival] = [WireBytes(101.0, b""), batch(0, [7.0, 8.5], [1.0, 2.0], 2), WireBytes(103.5, b""), batch(2, [11.0], [3.0], 2)]
+    book = account(merge(deliveries(axis, sensor), ALONG_X))
     assert book.points_mm == [(4.0 * 1.0, 0.0, 2.0), (4.0 * 3.5, 0.0, 3.0)]
     assert book.counts["Rejected", "taken before the axis told its position"] == 1
 
@@ -82,20 +86,10 @@ def test_points_without_a_later_position_are_rejected() -> None:
         batch(1, [2.5], [1.0], 2),
         ScanClosed(2),
     ]
-    source = FollowedAxis(Listed([]), Listed([]), Beam((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)))
-    book = account(merged(source, [*axis, *sensor], axis_arrivals=4))
+    book = account(merge(deliveries(axis, sensor), ALONG_X))
     assert book.points_mm == [(2.5, 0.0, 1.0)]
     assert book.counts["Rejected", "taken after the axis last told its position"] == 1
     assert book.others == [ScanClosed(2)]
-
-
-def merged(source: FollowedAxis, arrivals: list[Arrival | Exception] | list[Arrival], axis_arrivals: int) -> Iterator[Arrival]:
-    """Run the merging in a fixed order: threads would make it another each time."""
-    inbox: queue.Queue[tuple[object, Arrival | Exception | None]] = queue.Queue()
-    for number, arrival in enumerate(arrivals):
-        inbox.put((source._axis if number < axis_arrivals else source._sensor, arrival))
-    inbox.put((source._sensor, None))
-    return source._merged(inbox)  # type: ignore[arg-type]
 
 
 def test_two_threads_deliver_and_end() -> None:

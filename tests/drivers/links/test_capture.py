@@ -21,7 +21,7 @@ def scan_bytes(*faults: str) -> bytes:
     device, injector = AsciiDevice(), Injector([Fault.parse(fault) for fault in faults], seed=3)
     points = np.random.default_rng(3).normal(size=(COUNT, 3)).tolist()
     samples = [Sample(index, index * 1e-3, tuple(point)) for index, point in enumerate(points)]
-    frames = (injector.frame(sample.index, device.frame([sample])) for sample in samples)
+    frames = (injector.pass_on(sample.index, device.frame([sample])) for sample in samples)
     return device.opening(COUNT) + b"".join(map(injector.damage, frames)) + device.closing(COUNT)
 
 

@@ -7,7 +7,7 @@ from contextlib import nullcontext
 import pytest
 
 from drivers.errors import LinkError, ProtocolError
-from drivers.links.reconnect import kept_up
+from drivers.links.reconnect import keep_up
 from drivers.source import Arrival, LinkDown, LinkUp, ScanClosed, WireBytes
 
 
@@ -39,7 +39,7 @@ def run(opens: list[bool], scans: list[list[Arrival | Exception]], reconnect_s: 
                 raise arrival
             yield arrival
 
-    return kept_up(opened, scan, reconnect_s=reconnect_s, stopped=stopped, clock=lambda: stopped.now_s)
+    return keep_up(opened, scan, reconnect_s=reconnect_s, stopped=stopped, clock=lambda: stopped.now_s)
 
 
 DATA, END = WireBytes(0.0, b"x"), ScanClosed(1)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from drivers.errors import MeshError
 from drivers.source import PointBatch, ScanClosed, ScanOpened
-from drivers.surface.contour_source import ContourSource, Slice, with_points_between
+from drivers.surface.contour_source import ContourSource, SurfaceSection, add_points_between
 from drivers.surface.cut import Cutter, NumpyCutter, cut_surface, height_range_mm
 from drivers.surface.open3d_process import Open3DProcess
 from drivers.surface.stl_file import SurfaceMesh, read_stl, surface_of
@@ -34,7 +34,7 @@ def mesh_of(triangles: NDArray[np.floating]) -> SurfaceMesh:
     return surface_of(triangles, "test surface", "STL")
 
 
-def cut(triangles: NDArray[np.floating], height_mm: float, normal: tuple[float, float, float] = (0, 0, 1)) -> Slice:
+def cut(triangles: NDArray[np.floating], height_mm: float, normal: tuple[float, float, float] = (0, 0, 1)) -> SurfaceSection:
     (found,) = cut_surface(mesh_of(triangles), normal, [height_mm], cutter=NumpyCutter())
     return found
 
@@ -141,7 +141,7 @@ def test_a_contour_is_a_source_of_points_like_any_scan() -> None:
 
 def test_points_between_corners_are_even_lie_on_the_pieces_and_keep_the_corners() -> None:
     (contour,) = cut(CUBE, 4.0).contours
-    dense = with_points_between(contour, 0.3)
+    dense = add_points_between(contour, 0.3)
     closing = np.concatenate([dense.section_mm, dense.section_mm[:1]])
     steps = np.linalg.norm(np.diff(closing, axis=0), axis=1)
     assert steps.max() < 0.3 + 1e-12
@@ -150,9 +150,9 @@ def test_points_between_corners_are_even_lie_on_the_pieces_and_keep_the_corners(
     assert {tuple(p) for p in contour.points_mm} <= {tuple(p) for p in dense.points_mm}
     assert np.all(np.min(np.abs(np.concatenate([dense.section_mm, 10 - dense.section_mm], axis=1)), axis=1) == 0)
     assert np.array_equal(dense.points_mm[:, :2], dense.section_mm)
-    assert with_points_between(contour, 10.0) is contour
+    assert add_points_between(contour, 10.0) is contour
     (line,) = cut(np.delete(CUBE, [10, 11], axis=0), 5.0, (1, 0, 0)).contours
-    ends = with_points_between(line, 0.3).section_mm[[0, -1]]
+    ends = add_points_between(line, 0.3).section_mm[[0, -1]]
     assert np.array_equal(ends, line.section_mm[[0, -1]])
 
 
