@@ -99,7 +99,7 @@ export class Strip extends Drawing {
    * @param {number} upper
    */
   labelLimits(pen, lower, upper) {
-    const { zone, sheet } = this, line = sheet.text * 1.15, apart = Math.max(0, line - (lower - upper)) / 2;
+    const { zone, sheet } = this, line = sheet.text * 1.3, apart = Math.max(0, line - (lower - upper)) / 2;
     this.yLabel(pen, upper - apart, signed(zone.upper_mm, 3), INK.text);
     this.yLabel(pen, upper - apart - line, "upper", INK.soft);
     this.yLabel(pen, lower + apart, signed(zone.lower_mm, 3), INK.text);
