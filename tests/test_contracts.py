@@ -1,4 +1,4 @@
-"""What the project promises to itself: exported names, layout, walls, the README's example."""
+"""What the project promises to itself: exported names, layout, walls, and pages that say what is so."""
 
 import ast
 import contextlib
@@ -6,8 +6,10 @@ import io
 import re
 import subprocess
 import sys
+import textwrap
 import tomllib
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -15,6 +17,8 @@ import pytest
 import cmmlink
 import inspection
 from cmmlink.plan.scan import load_plan
+from cmmlink.plan.surface import load_ct_plan
+from drivers import load_map
 from tests.cmmlink.command import cmmlink as cmmlink_command
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -146,37 +150,67 @@ def test_every_library_that_is_imported_is_declared() -> None:
     assert undeclared == {}
 
 
-def examples(language: str) -> list[str]:
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    return re.findall(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
+WALKED = ROOT / "docs" / "add-a-device.md"  # its Python files are added to a copy of the tree by a test of their own
+
+
+def blocks(language: str, pages: Sequence[Path] = PAGES) -> list[tuple[str, str]]:
+    """The blocks of a language in the pages, each with the name of its page; those in lists are indented."""
+    pattern = re.compile(rf"^( *)```{language}\n(.*?)^ *```", re.MULTILINE | re.DOTALL)
+    return [(relative(page), textwrap.dedent(text)) for page in pages for _, text in pattern.findall(page.read_text(encoding="utf-8"))]
 
 
 def test_the_readme_has_examples_of_every_kind() -> None:
-    assert all(examples(language) for language in ("python", "yaml", "sh"))
+    assert all(blocks(language, [ROOT / "README.md"]) for language in ("python", "yaml", "sh"))
 
 
-@pytest.mark.parametrize("example", [text for text in examples("yaml") if text.startswith("part:")])
-def test_the_plans_of_the_readme_can_be_read(example: str, tmp_path: Path) -> None:
-    plan = tmp_path / "plan.yaml"
-    plan.write_text(example, encoding="utf-8")
-    assert load_plan(plan).part.name
+@pytest.mark.parametrize("page", PAGES, ids=relative)
+def test_the_links_of_a_page_lead_somewhere(page: Path) -> None:
+    targets = re.findall(r"\]\(([^)\s#]+)[^)]*\)", page.read_text(encoding="utf-8"))
+    assert [target for target in targets if not target.startswith("https://") and not (page.parent / target).exists()] == []
 
 
-def test_the_readme_calls_commands_that_exist_with_options_they_have() -> None:
-    calls = re.findall(r"\bcmmlink ([a-z]+) ?([^`#\n]*)", "".join(examples("sh")))
-    assert {"run", "inspect"} <= {command for command, _ in calls}
-    for command, arguments in calls:
+@pytest.mark.parametrize("page", PAGES, ids=relative)
+def test_the_files_that_a_page_names_are_there(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    made = set(re.findall(r"^`(\S+\.py)`$", text, re.MULTILINE)) if page == WALKED else set()
+    named = set(re.findall(rf"(?:\b|`)((?:{'|'.join([*PACKAGES, 'tests', 'docs'])})/[\w./-]*\w)", text))
+    assert sorted(name for name in named - made if not (ROOT / name).exists()) == []
+
+
+@pytest.mark.parametrize(("page", "text"), blocks("yaml"))
+def test_the_plans_and_maps_of_a_page_can_be_read(page: str, text: str, tmp_path: Path) -> None:
+    file = tmp_path / "given.yaml"
+    file.write_text(text, encoding="utf-8")
+    if text.startswith("device: {"):  # one device a line, as it would stand in a plan
+        for device in re.split(r"^(?=device:)", text, flags=re.MULTILINE)[1:]:
+            file.write_text(f"part: {{name: a}}\nnominal: {{file: b}}\ntolerance: {{lower_mm: 0, upper_mm: 1}}\n{device}", encoding="utf-8")
+            load_plan(file)
+    elif text.startswith("device:"):
+        load_map(file)
+    elif "\nmesh:" in text:
+        load_ct_plan(file)
+    else:
+        load_plan(file)
+
+
+def test_pages_call_commands_that_exist_with_options_they_have() -> None:
+    text = "".join(text for _, text in blocks("sh"))
+    calls = re.findall(r"\bcmmlink ([a-z]+) ?([^`#\n]*)", text)
+    assert {"run", "inspect", "ct", "replay"} <= {command for command, _ in calls}
+    for command in {command for command, _ in calls}:
         described = cmmlink_command(command, "--help")
         assert described.code == 0, command
-        assert [option for option in re.findall(r"--[a-z-]+", arguments) if option not in described.out] == [], command
+        used = {option for other, arguments in calls if other == command for option in re.findall(r"--[a-z-]+", arguments)}
+        assert [option for option in used if option not in described.out] == [], command
 
 
-@pytest.mark.parametrize("example", examples("python"))
-def test_the_examples_of_the_readme_print_what_they_say(example: str, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("page", "text"), blocks("python", [page for page in PAGES if page != WALKED]))
+def test_the_python_of_a_page_prints_what_it_says(page: str, text: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """What a block prints stands in it as comments: behind `print(...)`, or in lines of their own after it."""
     monkeypatch.chdir(ROOT)
     out = io.StringIO()
     with contextlib.redirect_stdout(out):
-        exec(compile(example, "README.md", "exec"), {"__name__": "readme"})
-    said = [line.partition("# ")[2].strip() for line in example.splitlines() if "print(" in line or line.startswith("# ")]
+        exec(compile(text, page, "exec"), {"__name__": "page"})
+    said = [line.partition("# ")[2].strip() for line in text.splitlines() if "print(" in line or line.startswith("# ")]
     assert [line.strip() for line in out.getvalue().splitlines()] == [line for line in said if line]
