@@ -137,7 +137,8 @@ def _number(word: str, choice: Mapping[str, Any]) -> str:
 
 def _default(key: Mapping[str, Any]) -> str:
     """The default as YAML spells it; of a mapping only that it has defaults of its own."""
-    value = key.get("default")
+    made: object = {"object": {}, "array": []}.get(str(key.get("type")))  # by a factory, of which the schema does not tell
+    value = key.get("default", made)
     if isinstance(value, dict):
         return "its own defaults" if value else "`{}`"
     spelled = yaml.safe_dump(value, default_flow_style=True, width=1000).removesuffix("...\n").strip()

@@ -25,7 +25,7 @@ class Outer(BaseModel):
     one: Inner = Field(default=Inner(), description="one")
     other: Inner | None = Field(default=None, description="the other")
     inners: list[Inner] = Field(default=[], description="several")
-    named: dict[str, int] = Field(default={}, description="by name")
+    named: dict[str, int] = Field(default_factory=dict, description="by name")
 
 
 def keys_of(model: type[BaseModel]) -> dict[str, Key]:
