@@ -16,13 +16,13 @@ from cmmlink import __version__
 from cmmlink.commands.options import NoBrowser, Records, records_folder
 from cmmlink.commands.output import Output, now, report_outcome, stop_on_ctrl_c
 from cmmlink.console.ct_import import Section
-from cmmlink.console.launch import CONSOLE_PORT, graphical_browser, kept_token, served, stay_while_seen
+from cmmlink.console.launch import CONSOLE_PORT, graphical_browser, kept_token, serve, stay_while_seen
 from cmmlink.console.past_runs import PastRuns
-from cmmlink.console.station import Means, Refused
+from cmmlink.console.refused import Refused
+from cmmlink.console.station_setup import StationSetup
 from cmmlink.devices import Connect, connect, decoder_of, serial_ports
 from cmmlink.errors import PlanError
 from cmmlink.events import RunStarted
-from cmmlink.pipeline import RunOutcome
 from cmmlink.plan.scan import Plan
 from cmmlink.plan.surface import CtPlan, load_ct_plan
 from cmmlink.report.folder import prepare, write_run
@@ -31,7 +31,6 @@ from cmmlink.run import FinishedRun
 from cmmlink.run_view import Ended, RunContext
 from cmmlink.stack import SectionOutcome, inspect_stack
 from cmmlink.words import VERDICT_WORDS
-from inspection import NominalProfile
 
 if TYPE_CHECKING:
     from cmmlink.console.server import ConsoleServer
@@ -54,9 +53,9 @@ def serve_console(
         raise PlanError(f"{folder}: there is no such folder; give the folder that holds the plans")
     past = _past_runs(records)
     scans, surfaces = (lambda: _plans_in(folder, surfaces=False)), (lambda: _plans_in(folder, surfaces=True))
-    means = Means(scans, connect, serial_ports, past, time.monotonic, now, surfaces, inspect_surface, _writer(past))
+    setup = StationSetup(scans, connect, serial_ports, past, time.monotonic, now, surfaces, inspect_surface, _write_for())
     token = kept_token(user_data_path("cmmlink", appauthor=False))
-    with stop_on_ctrl_c() as stop, served(means, __version__, host, port, token) as server:
+    with stop_on_ctrl_c() as stop, serve(setup, __version__, host, port, token) as server:
         _show(server, no_browser)
         while not stop.wait(_LOOK_S):
             pass
@@ -66,9 +65,9 @@ def serve_console(
 def run_on_page(plan_file: Path, connect: Connect, output: Output) -> int:
     """Carry out a plan on the console's page, and stay for the next part while the page is open."""
     past = _past_runs(output.records)
-    write = _writer(past, output.out)
-    means = Means(lambda: {plan_file.name: plan_file}, connect, serial_ports, past, time.monotonic, now, write=write)
-    with stop_on_ctrl_c() as stop, served(means, __version__) as server:
+    write = _write_for(output.out)
+    setup = StationSetup(lambda: {plan_file.name: plan_file}, connect, serial_ports, past, time.monotonic, now, write=write)
+    with stop_on_ctrl_c() as stop, serve(setup, __version__) as server:
         station = server.station
         _show(server, output.no_browser)
         server.wait_for_page(_PAGE_OPENS_S)
@@ -77,18 +76,17 @@ def run_on_page(plan_file: Path, connect: Connect, output: Output) -> int:
             station.start()
         except Refused as refusal:
             raise PlanError(str(refusal)) from None
-        while not station.wait(_LOOK_S):
+        job = station.job
+        assert job is not None
+        while not job.wait(_LOOK_S):
             if stop.is_set():
-                station.abort()
-        if station.failure is not None:
-            raise station.failure
-        assert station.outcome is not None
-        assert station.started is not None
-        assert station.view is not None
-        finished = FinishedRun(station.view.context.profile, station.started, station.outcome, past.evidence)
-        code = report_outcome(finished, replace(output, out=None))
-        if station.unwritten is not None:
-            raise station.unwritten
+                job.abort()
+        if job.failure is not None:
+            raise job.failure
+        assert job.finished is not None
+        code = report_outcome(job.finished, replace(output, out=None))
+        if job.unwritten is not None:
+            raise job.unwritten
         if output.out is not None:
             typer.echo(f"results in {output.out}")
         if server.pages and not stop.is_set():
@@ -123,13 +121,13 @@ def _past_runs(folder: Path | None) -> PastRuns:
     return PastRuns(records_folder(folder), decoder_of, time.monotonic, now)
 
 
-def _writer(past: PastRuns, out: Path | None = None) -> Callable[[Plan, NominalProfile, RunOutcome, RunStarted], None]:
+def _write_for(out: Path | None = None) -> Callable[[Plan, FinishedRun], None]:
     """What writes the results of every run on a page into a folder, or into that of its plan."""
 
-    def write(plan: Plan, profile: NominalProfile, outcome: RunOutcome, started: RunStarted) -> None:
+    def write(plan: Plan, run: FinishedRun) -> None:
         folder = out or plan.out
         if folder is not None:
-            write_run(folder, FinishedRun(profile, started, outcome, past.evidence))
+            write_run(folder, run)
 
     return write
 

@@ -2,56 +2,51 @@
 
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import datetime
-from typing import Literal
+from itertools import islice
 
-from cmmlink.console.protocol import AlarmList, AlarmRow
+from cmmlink.console.protocol import AlarmList, AlarmRow, Severity
 from cmmlink.events import Arrived, Event, Judged, RunFinished, RunStarted
 from drivers import Damaged, LinkDown, LinkUp, Lost, Rejected
 
-Severity = Literal["fault", "warning"]
-_MOST = 200  # alarms kept; the oldest acknowledged ones go first
-
-
-@dataclass(frozen=True, slots=True)
-class Alarm:
-    """One thing that went wrong. `active` says that it is still so; `count` how much of it there was."""
-
-    number: int
-    severity: Severity
-    what: str
-    detail: str
-    count: int
-    since: datetime
-    active: bool
-    acknowledged: bool
+_MOST_KEPT = 200  # the oldest acknowledged ones go first
+_MOST_SHOWN = 50
 
 
 class Alarms:
-    """The list of alarms, and a sink that fills it from a run."""
+    """The list of alarms, and a sink that fills it from a run. Guarded by its own lock; readers of `shown` do not take it."""
 
     def __init__(self, now: Callable[[], datetime]) -> None:
         self._now = now
-        self._alarms: dict[int, Alarm] = {}
+        self._alarms: dict[int, AlarmRow] = {}  # in the order of their numbers
         self._of_this_run: dict[tuple[str, str], int] = {}
         self._number = self._stalls = 0
         self._lock = threading.RLock()
+        self._shown = AlarmList(False, ())
 
     def __call__(self, event: Event) -> None:
         """Take one event of a run."""
         if isinstance(event, RunStarted):
-            self._of_this_run.clear()
-            self._stalls = 0
-            self.clear_active()
+            self._begin_run()
         elif isinstance(event, Arrived):
-            self._arrived(event)
+            self._take_arrival(event)
         elif isinstance(event, Judged):
             if event.counts.stalls > self._stalls:
                 self.raise_alarm("warning", "Buffer full", "the device was made to wait", event.counts.stalls - self._stalls)
                 self._stalls = event.counts.stalls
         else:
-            self._finished(event)
+            self._take_end(event)
+
+    @property
+    def shown(self) -> AlarmList:
+        """The newest alarms as a page shows them. Waits for nobody."""
+        return self._shown
+
+    @property
+    def fault(self) -> bool:
+        """Whether a fault is active, or was and nobody has seen it."""
+        return self._shown.fault
 
     def raise_alarm(self, severity: Severity, what: str, detail: str, count: int = 1, active: bool = False) -> None:
         """Raise an alarm; within one run the same again is counted up, and a fault asks to be acknowledged again."""
@@ -61,42 +56,42 @@ class Alarms:
                 alarm = self._alarms[known]
                 seen = alarm.acknowledged and severity != "fault"
                 self._alarms[known] = replace(alarm, count=alarm.count + count, active=active, acknowledged=seen)
-                return
-            self._number += 1
-            self._of_this_run[(what, detail)] = self._number
-            self._alarms[self._number] = Alarm(self._number, severity, what, detail, count, self._now(), active, False)
-            self._forget_old()
+            else:
+                self._number += 1
+                self._of_this_run[(what, detail)] = self._number
+                since = self._now().strftime("%H:%M:%S")
+                self._alarms[self._number] = AlarmRow(self._number, severity, what, detail, count, since, active, False)
+                self._drop_oldest()
+            self._publish()
 
     def acknowledge(self, number: int | None = None) -> int:
-        """Mark one alarm, or all, as seen; gives how many were not seen before."""
+        """Mark one alarm, or all, as seen; returns how many were not seen before."""
         with self._lock:
-            open_ones = [alarm for alarm in self._alarms.values() if not alarm.acknowledged and number in (None, alarm.number)]
-            for alarm in open_ones:
+            unseen = [alarm for alarm in self._alarms.values() if not alarm.acknowledged and number in (None, alarm.number)]
+            for alarm in unseen:
                 self._alarms[alarm.number] = replace(alarm, acknowledged=True)
-            return len(open_ones)
+            self._publish()
+            return len(unseen)
 
     def clear_active(self) -> None:
-        """Say that nothing is wrong any more, of what lasts."""
+        """Mark every lasting alarm as over."""
         with self._lock:
-            for alarm in self._alarms.values():
-                if alarm.active:
-                    self._alarms[alarm.number] = replace(alarm, active=False)
+            for alarm in [alarm for alarm in self._alarms.values() if alarm.active]:
+                self._alarms[alarm.number] = replace(alarm, active=False)
+            self._publish()
 
-    def newest_first(self) -> list[Alarm]:
+    def newest_first(self) -> list[AlarmRow]:
         """All alarms kept."""
         with self._lock:
-            return sorted(self._alarms.values(), key=lambda alarm: -alarm.number)
+            return list(reversed(self._alarms.values()))
 
-    def snapshot(self, most: int) -> AlarmList:
-        """The newest alarms as a page shows them."""
-        return AlarmList(self.fault, tuple(_row_of(alarm) for alarm in self.newest_first()[:most]))
+    def _begin_run(self) -> None:
+        with self._lock:
+            self._of_this_run.clear()
+            self._stalls = 0
+            self.clear_active()
 
-    @property
-    def fault(self) -> bool:
-        """Whether a fault is there, or was and nobody has seen it."""
-        return any(alarm.severity == "fault" and (alarm.active or not alarm.acknowledged) for alarm in self.newest_first())
-
-    def _arrived(self, event: Arrived) -> None:
+    def _take_arrival(self, event: Arrived) -> None:
         arrival = event.arrival
         if isinstance(arrival, LinkDown):
             self.raise_alarm("fault", "Link lost", arrival.reason, active=True)
@@ -109,27 +104,19 @@ class Alarms:
         elif isinstance(arrival, Rejected):
             self.raise_alarm("warning", "Points rejected", arrival.reason, arrival.count)
 
-    def _finished(self, event: RunFinished) -> None:
+    def _take_end(self, event: RunFinished) -> None:
         if event.ending == "interrupted":
             self.clear_active()
             self.raise_alarm("fault", "Device failed", event.message, active=True)
         elif event.result is None:
             self.raise_alarm("fault", "No part found", event.message)
 
-    def _forget_old(self) -> None:
-        surplus = len(self._alarms) - _MOST
+    def _drop_oldest(self) -> None:
+        surplus = len(self._alarms) - _MOST_KEPT
         for number in sorted(self._alarms, key=lambda one: (not self._alarms[one].acknowledged, one))[: max(surplus, 0)]:
             del self._alarms[number]
 
-
-def _row_of(alarm: Alarm) -> AlarmRow:
-    return AlarmRow(
-        number=alarm.number,
-        severity=alarm.severity,
-        what=alarm.what,
-        detail=alarm.detail,
-        count=alarm.count,
-        since=alarm.since.strftime("%H:%M:%S"),
-        active=alarm.active,
-        acknowledged=alarm.acknowledged,
-    )
+    def _publish(self) -> None:
+        """Replace what pages are shown; called with the lock held."""
+        fault = any(alarm.severity == "fault" and (alarm.active or not alarm.acknowledged) for alarm in self._alarms.values())
+        self._shown = AlarmList(fault, tuple(islice(reversed(self._alarms.values()), _MOST_SHOWN)))

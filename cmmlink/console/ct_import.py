@@ -2,9 +2,8 @@
 
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
 
 from cmmlink.console.protocol import SectionRow, SurfaceState
 from cmmlink.events import RunStarted
@@ -25,51 +24,59 @@ class Section:
 
 
 InspectSurface = Callable[[Path, threading.Event, Callable[[int], None], Callable[[Section], None]], str]
-"""Inspect the surface of a CT plan: file, stop, hears the number of sections, hears each section; gives a sentence on the whole."""
+"""Inspect the surface of a CT plan. Arguments: its file, the event that aborts it, what is called with the number of sections,
+and what is called with each section. Returns a sentence on the whole."""
 
 
 class CtImport:
-    """The import that goes on, or the last one; `version` rises with every change."""
+    """The inspection of a surface that goes on, or the last one.
+
+    Guarded by its own lock, which is held only while values are replaced; readers of `state` do not take it.
+    """
 
     def __init__(self, clock: Callable[[], float]) -> None:
         self._clock = clock
+        self._lock = threading.Lock()
         self._began_s = 0.0
-        self.plan = self._message = ""
-        self.state: Literal["none", "reading", "inspecting", "done", "failed"] = "none"
-        self.sections: list[Section] = []
-        self._total = self.version = 0
+        self._sections: list[Section] = []
+        self._state = SurfaceState("", "none", "", 0, 0, None, ())
+
+    @property
+    def state(self) -> SurfaceState:
+        """How far it is, and the sections judged so far. Waits for nobody."""
+        return self._state
 
     def begin(self, plan: str) -> None:
-        """A new import begins: the surface is read."""
-        self.plan, self.state, self._message, self._total = plan, "reading", "", 0
-        self.sections = []
-        self.version += 1
+        """Begin with another surface, which is read first."""
+        with self._lock:
+            self._sections = []
+            self._state = SurfaceState(plan, "reading", "", 0, 0, None, ())
 
     def expect(self, sections: int) -> None:
-        """So many sections will come."""
-        self._total, self.state, self._began_s = sections, "inspecting", self._clock()
-        self.version += 1
+        """Note how many sections will come."""
+        with self._lock:
+            self._began_s = self._clock()
+            self._state = replace(self._state, state="inspecting", total=sections)
 
     def add(self, section: Section) -> None:
-        """One more section was judged."""
-        self.sections.append(section)
-        self.version += 1
+        """Add a section that was judged."""
+        row = _row_of(section)
+        with self._lock:
+            self._sections.append(section)
+            done, state = len(self._sections), self._state
+            rows = (*state.sections, row) if done <= _MOST_SHOWN else state.sections
+            remaining_s = round((self._clock() - self._began_s) / done * (state.total - done))
+            self._state = replace(state, done=done, remaining_s=remaining_s, sections=rows)
 
     def end(self, message: str, failed: bool = False) -> None:
-        """The import is over."""
-        self._message, self.state = message, "failed" if failed else "done"
-        self.version += 1
+        """Note that it is over."""
+        with self._lock:
+            self._state = replace(self._state, state="failed" if failed else "done", message=message, remaining_s=None)
 
-    def snapshot(self) -> SurfaceState:
-        """Everything in numbers and words."""
-        done = len(self.sections)
-        rows = tuple(_row_of(section) for section in self.sections[:_MOST_SHOWN])
-        return SurfaceState(self.plan, self.state, self._message, done, self._total, self._remaining_s(done), rows)
-
-    def _remaining_s(self, done: int) -> float | None:
-        if self.state != "inspecting" or not done:
-            return None
-        return round((self._clock() - self._began_s) / done * (self._total - done))
+    def section(self, index: int) -> Section | None:
+        """Give the section at a place in the list, None where there is none."""
+        with self._lock:
+            return self._sections[index] if 0 <= index < len(self._sections) else None
 
 
 def _row_of(section: Section) -> SectionRow:

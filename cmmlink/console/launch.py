@@ -9,7 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cmmlink.console.station import Means, Station
+from cmmlink.console.station import Station
+from cmmlink.console.station_setup import StationSetup
 from cmmlink.errors import PlanError
 
 if TYPE_CHECKING:
@@ -22,11 +23,11 @@ _GONE_S = 5.0  # a page that is loaded anew is away for a moment only
 
 
 @contextmanager
-def served(means: Means, version: str, host: str = "127.0.0.1", port: int = 0, token: str | None = None) -> Iterator["ConsoleServer"]:
+def serve(setup: StationSetup, version: str, host: str = "127.0.0.1", port: int = 0, token: str | None = None) -> Iterator["ConsoleServer"]:
     """Serve a station's page. Raises PlanError where the address cannot be had."""
     from cmmlink.console.server import ConsoleServer  # noqa: PLC0415 - the web server takes a while that only a page need pay
 
-    station = Station(means)
+    station = Station(setup)
     try:
         server = ConsoleServer(station, version, host, port, token)
     except OSError as error:

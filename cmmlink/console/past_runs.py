@@ -3,8 +3,7 @@
 import shutil
 import tempfile
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
@@ -15,9 +14,8 @@ from cmmlink.errors import StoreError
 from cmmlink.events import Counts, RunStarted, Sink
 from cmmlink.plan.scan import Device, Plan
 from cmmlink.record.bodies import unpack_document, unpack_judged
-from cmmlink.record.export import export_run
-from cmmlink.record.reader import find_run, list_runs, reading, recorded_run, recording
-from cmmlink.record.recorder import Basis, Evidence, Recorder
+from cmmlink.record.export import export_run as export_files
+from cmmlink.record.reader import find_run, list_runs, reading, recorded_run
 from cmmlink.record.replay import Replay, recorded_plan, recorded_profile, replay
 from cmmlink.record.store import Store
 from cmmlink.result_json import summary
@@ -30,7 +28,7 @@ _STARTED = ("part", "serial_number", "operator", "device", "simulated")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Recorded:
+class OpenedRun:
     """One run as the records hold it."""
 
     run: str
@@ -46,22 +44,13 @@ class PastRuns:
     """The records in a folder.
 
     decoder_of : the decoder of a plan's device, None for one without wire bytes
-    evidence   : what ties the result of the last run to its record
     """
 
     folder: Path
     decoder_of: Callable[[Device], Decoder | None]
     clock: Callable[[], float]
     today: Callable[[], datetime]
-    evidence: Evidence | None = None
     _known: dict[str, RunRow] = field(default_factory=dict)
-
-    @contextmanager
-    def recorder(self, plan: Plan, started: RunStarted) -> Iterator[Sink]:
-        """Give the sink that writes the record of a run. Raises StoreError."""
-        with recording(self.folder, self.today) as store, Recorder(store, Basis.of(plan), clock=self.clock, today=self.today) as recorder:
-            yield recorder
-        self.evidence = recorder.evidence
 
     def runs(self) -> Sequence[RunRow]:
         """All runs, newest first. Raises StoreError."""
@@ -72,7 +61,7 @@ class PastRuns:
                 self._known.update((entry["run"], _line(entry, _facts(store, entry["run"]))) for entry in unknown)
         return [self._known[entry["run"]] for entry in entries]
 
-    def opened(self, run: str) -> Recorded:
+    def open_run(self, run: str) -> OpenedRun:
         """Give one run as it was recorded. Raises StoreError, RunError."""
         with reading(self.folder, self.today) as store:
             recorded = recorded_run(store, find_run(store, run))
@@ -80,7 +69,7 @@ class PastRuns:
         end = recorded.end or {"state": "interrupted", "message": "the run is being recorded", "received": 0}
         received = end["received"] or 0
         facts = recorded.facts or summary(None, Counts(received=received, rejected=received, rejected_by_reason={"not judged": received}))
-        return Recorded(
+        return OpenedRun(
             recorded.run,
             plan := recorded_plan(recorded),
             recorded_profile(plan, recorded),
@@ -89,17 +78,17 @@ class PastRuns:
             Ended(end["state"], end["message"], facts, unpack_judged(bodies) if bodies else None),
         )
 
-    def replayed(self, run: str, sinks: Sequence[Sink], stop: threading.Event) -> str:
+    def replay_run(self, run: str, sinks: Sequence[Sink], stop: threading.Event) -> str:
         """Measure a run again from its record; say whether the result is identical. Raises StoreError, RunError, PlanError."""
         with reading(self.folder, self.today) as store:
             recorded = recorded_run(store, find_run(store, run))
             return _compared(replay(store, recorded, self.decoder_of, clock=self.clock, sinks=sinks, stop=stop), recorded.run)
 
-    def exported(self, run: str, folder: Path) -> Path:
+    def export_run(self, run: str, folder: Path) -> Path:
         """Write one run as a zip archive into a folder. Raises StoreError, RunError, PlanError."""
         with tempfile.TemporaryDirectory(dir=folder) as files, reading(self.folder, self.today) as store:
             run = find_run(store, run)
-            export_run(store, run, Path(files))
+            export_files(store, run, Path(files))
             return Path(shutil.make_archive(str(folder / run), "zip", files))
 
 

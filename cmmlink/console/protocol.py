@@ -8,8 +8,8 @@ text, told apart by `do`; each gets one `Answer` with the same `number`. The fir
 """
 
 import json
-from dataclasses import asdict, dataclass
-from typing import Literal
+from dataclasses import dataclass, fields
+from typing import Any, Literal
 
 from cmmlink.run_state import RunState
 from cmmlink.words import VERDICT_NAMES, VERDICT_WORDS, VerdictName
@@ -26,6 +26,8 @@ HEADER = (("kind", "<u4"), ("generation", "<u4"), ("rows", "<u4"), ("flags", "<u
 HEADER_BYTES = 32
 POINTS, NOMINAL = 1, 2  # kinds
 CLOSED = 1  # flag of a nominal
+
+Severity = Literal["fault", "warning"]
 
 WORDS_OF_VERDICTS = {VERDICT_NAMES[verdict]: VERDICT_WORDS[verdict] for verdict in VERDICT_WORDS}
 
@@ -86,7 +88,7 @@ class ChosenPlan:
 class DeviceTest:
     """The last test of the device."""
 
-    state: Literal["none", "testing", "passed", "failed"]
+    state: Literal["none", "testing", "passed", "failed", "aborted"]
     message: str
 
 
@@ -112,7 +114,7 @@ class AlarmRow:
     """One thing that went wrong: how often, since when (time of day), whether it still is so, whether somebody has seen it."""
 
     number: int
-    severity: Literal["fault", "warning"]
+    severity: Severity
     what: str
     detail: str
     count: int
@@ -253,9 +255,9 @@ class ImportSurface:
 
 @dataclass(frozen=True, slots=True)
 class Plain:
-    """A command that needs no more words. `everything`: say all again that the station said since its hello."""
+    """A command that needs no more words."""
 
-    do: Literal["start", "end", "abort", "test", "take control", "live", "devices", "everything"]
+    do: Literal["start", "end", "abort", "test", "take control", "live", "devices"]
 
 
 Message = Hello | Alive | Answer | Control | StationState | AlarmList | ShownRun | History | SurfaceState
@@ -264,4 +266,8 @@ Command = Choose | Enter | Acknowledge | OfRun | OpenSection | ImportSurface | P
 
 def json_of(message: Message) -> str:
     """The message as it is sent."""
-    return json.dumps(asdict(message), separators=(",", ":"))
+    return json.dumps(message, default=_values_by_name, separators=(",", ":"))
+
+
+def _values_by_name(record: Any) -> dict[str, Any]:
+    return {field.name: getattr(record, field.name) for field in fields(record)}

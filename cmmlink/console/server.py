@@ -1,12 +1,13 @@
-"""The server of the page: static files, one socket, and who may do what.
+"""The server of the page: its files, one socket a page, and which page is in control.
 
-Safe by default: only the addresses it was told to serve, only pages it served itself (Host and Origin are checked), only
-browsers that know the token. Of the machine's files it reads none but its own page; plans and records come through the station.
+Safe by default: only the addresses it was told to serve, only pages it served itself, only browsers that know the token
+(guard.py). Of the machine's files it reads none but its own page; plans and records come through the station.
+
+Its event loop waits for nothing but its sockets: it reads snapshots that the station has published, and whatever takes time - a
+command, packing what is drawn, looking for plans - is done by other threads.
 """
 
 import asyncio
-import contextlib
-import hmac
 import json
 import secrets
 import socket
@@ -14,74 +15,76 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Awaitable, Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Awaitable, Iterator
+from dataclasses import asdict, dataclass, field
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import anyio.to_thread
 import uvicorn
 from starlette.applications import Starlette
 from starlette.background import BackgroundTask
-from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import Request
 from starlette.responses import FileResponse, PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
-from starlette.types import ASGIApp, Receive, Scope, Send
-from starlette.types import Message as AsgiMessage
+from starlette.types import ASGIApp
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from cmmlink.console.commands import Received, action_of, read_json, receive
 from cmmlink.console.drawing import nominal_message, points_message
-from cmmlink.console.protocol import TOO_MANY_PAGES, WRONG_TOKEN, Alive, Answer, Control, Hello, History, Message, ShownRun, json_of
-from cmmlink.console.station import Refused, Station
+from cmmlink.console.guard import Guard, is_remote, knows_token
+from cmmlink.console.protocol import (
+    TOO_MANY_PAGES,
+    WRONG_TOKEN,
+    Alive,
+    Answer,
+    Control,
+    Device,
+    Hello,
+    Message,
+    OfRun,
+    OpenSection,
+    Plain,
+    ShownRun,
+    json_of,
+)
+from cmmlink.console.refused import Refused
+from cmmlink.console.station import Station
 from cmmlink.extremes import PointsVersion
 from cmmlink.run_view import RunView
 
 _PERIOD_S = 1 / 30  # at most so often a page is sent something
 _ALIVE_S = 0.5
+_LIST_PLANS_S = 1.0
 _TOKEN_WITHIN_S = 5.0
 _LARGEST_COMMAND = 16 * 1024
 _MOST_PAGES = 16
-_MOST_HISTORY = 500
-_MOST_ALARMS = 50
-_NOTHING_SEEN = PointsVersion(-1, 0)
-_LOOPBACK = ("127.0.0.1", "::1", "localhost")
+_BROKEN_DOWN = 1011  # close code: the page connects again and is sent everything
+_UNSEEN = PointsVersion(-1, 0)
 _MEDIA = {
     "html": "text/html; charset=utf-8",
     "css": "text/css; charset=utf-8",
     "js": "text/javascript; charset=utf-8",
     "svg": "image/svg+xml",
 }
-_HEADERS = {
-    "content-security-policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; "
-    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
-    "x-content-type-options": "nosniff",
-    "x-frame-options": "DENY",
-    "referrer-policy": "no-referrer",
-    "cross-origin-opener-policy": "same-origin",
-    "cross-origin-resource-policy": "same-origin",
-    "cache-control": "no-store",
-}
 
 
 @dataclass(eq=False)
 class _Page:
-    """One connected browser: what it was sent, and what it looks at."""
+    """One connected browser: what it was sent, and what it looks at. Belongs to the event loop.
+
+    generation : of the points it was sent last; counted for each page, because runs number theirs alike
+    """
 
     socket: WebSocket
     number: int
     opened: RunView | None = None
     nominal_of: RunView | None = None
-    seen: PointsVersion = _NOTHING_SEEN
+    seen: PointsVersion = _UNSEEN
     generation: int = 0
-    sent: dict[str, str] = field(default_factory=dict)
+    sent: dict[str, Message] = field(default_factory=dict)
     sending: asyncio.Lock = field(default_factory=asyncio.Lock)
-
-    def forget(self) -> None:
-        """Take it that the page knows nothing, so that it is sent everything."""
-        self.sent.clear()
-        self.nominal_of = None
 
 
 class ConsoleServer:
@@ -95,13 +98,14 @@ class ConsoleServer:
     def __init__(self, station: Station, version: str, host: str = "127.0.0.1", port: int = 0, token: str | None = None) -> None:
         self.station, self._version = station, version
         self.token = token or secrets.token_urlsafe(24)
-        self.remote = host not in _LOOPBACK
-        self._host, self._socket = host, _listening(host, port)
+        self.remote = is_remote(host)
+        self._host, self._socket = host, _listen_at(host, port)
         self.port: int = self._socket.getsockname()[1]
         self._pages: list[_Page] = []
         self._controller: _Page | None = None
         self._seen = 0
         self._ever = threading.Event()
+        self._stopped = threading.Event()
         config = uvicorn.Config(
             self._application(),
             log_config=None,
@@ -117,6 +121,7 @@ class ConsoleServer:
         )
         self._server = uvicorn.Server(config)
         self._thread = threading.Thread(target=self._server.run, kwargs={"sockets": [self._socket]}, name="console", daemon=True)
+        self._lister = threading.Thread(target=self._keep_listing_plans, name="plans", daemon=True)
 
     @property
     def address(self) -> str:
@@ -132,9 +137,11 @@ class ConsoleServer:
     def start(self) -> None:
         """Serve until `stop`."""
         self._thread.start()
+        self._lister.start()
 
     def stop(self) -> None:
-        """Tell every page, and end."""
+        """Close every page's socket, and end."""
+        self._stopped.set()
         self._server.should_exit = True
         if self._thread.is_alive():
             self._thread.join(5.0)
@@ -144,48 +151,39 @@ class ConsoleServer:
         """Wait until a browser has connected."""
         return self._ever.wait(timeout_s)
 
+    def _keep_listing_plans(self) -> None:
+        """Look for plans now and then while a page is open. A thread of its own: a folder on a network may not answer for long."""
+        while not self._stopped.wait(_LIST_PLANS_S):
+            if self._pages:
+                self.station.list_plans()
+
     def _application(self) -> ASGIApp:
         files = {path.name: (path.read_bytes(), _MEDIA[path.name.rpartition(".")[2]]) for path in _static_files()}
         app = Starlette(
             routes=[
-                Route("/", lambda _: _served(files["index.html"])),
+                Route("/", lambda _: _file_response(files["index.html"])),
                 Route("/export/{run}", self._export),
-                Route("/{name}", lambda request: _served(files.get(request.path_params["name"]))),
+                Route("/{name}", lambda request: _file_response(files.get(request.path_params["name"]))),
                 WebSocketRoute("/live", self._live),
             ]
         )
-        return _Guard(app, self._hosts())
-
-    def _hosts(self) -> Callable[[str], bool]:
-        """Which Host headers are ours: names of this machine, with our port."""
-        names = {"127.0.0.1", "localhost", "[::1]"} | ({socket.gethostname().lower(), self._host.lower()} if self.remote else set())
-        own = {f"{name}:{self.port}" for name in names} | (names if self.port == 80 else set())
-
-        def ours(host: str) -> bool:
-            # A foreign name that resolves to us (rebinding) is never a bare address, so addresses may pass where we serve others.
-            return host.lower() in own or (self.remote and _is_address(host, self.port))
-
-        return ours
+        return Guard(app, self._host, self.port)
 
     async def _export(self, request: Request) -> Response:
-        given = request.headers.get("authorization", "").removeprefix("Bearer ")
-        if not self._knows(given):
+        if not knows_token(request.headers.get("authorization", "").removeprefix("Bearer "), self.token):
             return PlainTextResponse("the token is wrong or missing", 401)
         folder = tempfile.TemporaryDirectory()
         try:
-            archive = await anyio.to_thread.run_sync(self.station.exported, request.path_params["run"], Path(folder.name))
+            archive = await anyio.to_thread.run_sync(self.station.export_run, request.path_params["run"], Path(folder.name))
         except Refused as refusal:
             folder.cleanup()
             return PlainTextResponse(str(refusal), 404)
         return FileResponse(archive, media_type="application/zip", background=BackgroundTask(folder.cleanup))
 
-    def _knows(self, token: object) -> bool:
-        return isinstance(token, str) and hmac.compare_digest(token.encode(), self.token.encode())
-
     async def _live(self, websocket: WebSocket) -> None:
         """One page, from its token to its end."""
         await websocket.accept()
-        if not await self._introduced(websocket):
+        if not await self._gives_token(websocket):
             await websocket.close(WRONG_TOKEN, "wrong token")
             return
         if len(self._pages) >= _MOST_PAGES:
@@ -196,84 +194,74 @@ class ConsoleServer:
         self._pages.append(page)
         self._controller = self._controller or page
         self._ever.set()
-        showing = asyncio.create_task(self._show(page))
         try:
-            await self._listen(page)
+            await self._serve(page)
         finally:
-            showing.cancel()
-            with contextlib.suppress(asyncio.CancelledError, WebSocketDisconnect, RuntimeError, OSError):
-                await showing
             self._pages.remove(page)
             if self._controller is page:
                 self._controller = None
 
-    async def _introduced(self, websocket: WebSocket) -> bool:
+    async def _gives_token(self, websocket: WebSocket) -> bool:
         try:
-            first = _parsed(await asyncio.wait_for(websocket.receive_text(), _TOKEN_WITHIN_S))
+            first = read_json(await asyncio.wait_for(websocket.receive_text(), _TOKEN_WITHIN_S))
         except (TimeoutError, WebSocketDisconnect, KeyError):
             return False
-        return self._knows(first.get("token"))
+        return knows_token(first.get("token"), self.token)
+
+    async def _serve(self, page: _Page) -> None:
+        """Show and listen until the page is gone; a defect in showing closes its socket, so that it connects again."""
+        tasks = [asyncio.create_task(self._show(page)), asyncio.create_task(self._listen(page))]
+        try:
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in tasks:
+                task.cancel()
+            ends = await asyncio.gather(*tasks, return_exceptions=True)
+        for defect in ends:
+            if isinstance(defect, Exception) and not isinstance(defect, (WebSocketDisconnect, RuntimeError, OSError)):
+                self.station.alarms.raise_alarm("fault", "Defect in the program", repr(defect))
+                await page.socket.close(_BROKEN_DOWN, "the station cannot show this page")
 
     async def _listen(self, page: _Page) -> None:
         while True:
             try:
-                command = _parsed(await page.socket.receive_text())
+                received = receive(await page.socket.receive_text())
             except (WebSocketDisconnect, KeyError):
                 return
-            number = command.get("number")
             try:
-                ok, message = True, await self._obey(page, command)
+                ok, message = True, await self._obey(page, received)
             except Refused as refusal:
                 ok, message = False, str(refusal)
-            answer = Answer(number if isinstance(number, int) else None, str(command.get("do"))[:40], ok, message)
-            await _send(page, json_of(answer))
+            await _send(page, json_of(Answer(received.number, received.do, ok, message)))
 
-    async def _obey(self, page: _Page, command: Mapping[str, Any]) -> str:
-        """Carry out one command; its answer in words. Raises Refused."""
-        do = command.get("do")
-        if do == "take control":
+    async def _obey(self, page: _Page, received: Received) -> str:
+        """Carry out one command; returns its answer in words. Raises Refused."""
+        command = received.command()
+        action = action_of(command, self.station)
+        if action is not None:
+            self._controller = self._controller or page
+            if self._controller is not page:
+                raise Refused("another page is in control; this one watches")
+            page.opened = None if received.do in ("start", "replay") else page.opened
+            return await anyio.to_thread.run_sync(action)
+        if isinstance(command, OfRun):
+            page.opened = await anyio.to_thread.run_sync(self.station.open_run, command.run)
+        elif isinstance(command, OpenSection):
+            page.opened = await anyio.to_thread.run_sync(self.station.open_section, command.section)
+        elif isinstance(command, Plain):
+            return await self._obey_plain(page, command)
+        return "opened"
+
+    async def _obey_plain(self, page: _Page, command: Plain) -> str:
+        """Carry out what any page may ask of the server."""
+        if command.do == "take control":
             self._controller = page
             return "this page is in control"
-        if do == "everything":
-            page.forget()
-            return "everything is sent again"
-        if do == "live":
+        if command.do == "live":
             page.opened = None
             return "the station as it is now"
-        if do == "open":
-            page.opened = await anyio.to_thread.run_sync(self.station.opened, _text(command, "run"))
-            return "opened"
-        if do == "section":
-            index = _maybe_number(command, "section")
-            page.opened = await anyio.to_thread.run_sync(self.station.section, -1 if index is None else index)
-            return "opened"
-        if do == "devices":
-            return json.dumps(await anyio.to_thread.run_sync(self.station.devices))
-        work = self._work(command)
-        if work is None:
-            raise Refused(f"there is no command {str(do)[:40]!r}")
-        if self._controller is None:
-            self._controller = page
-        if self._controller is not page:
-            raise Refused("another page is in control; this one watches")
-        page.opened = None if do in ("start", "replay") else page.opened
-        return await anyio.to_thread.run_sync(work)
-
-    def _work(self, command: Mapping[str, Any]) -> Callable[[], str] | None:
-        """What a command of the one in control asks of the station."""
-        station = self.station
-        works: dict[str, Callable[[], str]] = {
-            "choose": lambda: station.choose(_text(command, "plan")),
-            "enter": lambda: station.enter(*(_maybe_text(command, key) for key in ("serial_number", "operator", "address"))),
-            "start": station.start,
-            "end": station.end_scan,
-            "abort": station.abort,
-            "test": station.test_device,
-            "acknowledge": lambda: station.acknowledge(_maybe_number(command, "alarm")),
-            "replay": lambda: station.replay(_text(command, "run")),
-            "import": lambda: station.import_ct(_text(command, "plan")),
-        }
-        return works.get(str(command.get("do")))
+        found = await anyio.to_thread.run_sync(self.station.devices)
+        return json.dumps([asdict(Device(address, description)) for address, description in found])
 
     async def _show(self, page: _Page) -> None:
         """Send what changed, never more than the newest, at most 30 times a second."""
@@ -283,69 +271,50 @@ class ConsoleServer:
             began_s = time.monotonic()
             await self._show_points(page)
             for message in self._newest(page):
-                text = json_of(message)
-                if page.sent.get(message.type) != text:
-                    page.sent[message.type] = text
-                    await _send(page, text)
+                if page.sent.get(message.type) != message:
+                    page.sent[message.type] = message
+                    await _send(page, await anyio.to_thread.run_sync(json_of, message))
             if began_s - alive_s >= _ALIVE_S:
                 alive_s = began_s
                 await _send(page, json_of(Alive(self.station.now_ms())))
             await asyncio.sleep(max(_PERIOD_S - (time.monotonic() - began_s), 0.005))
 
     def _newest(self, page: _Page) -> Iterator[Message]:
-        """What the page is shown now, without what it certainly knows already."""
+        """What the page is shown now: snapshots that the station has published."""
         station, view = self.station, page.opened or self.station.view
         yield Control(self._controller is page, self._controller is not None, len(self._pages))
-        yield station.state()
-        yield station.alarms.snapshot(_MOST_ALARMS)
+        yield station.state
+        yield station.alarms.shown
         yield ShownRun(view.state() if view else None, page.opened is not None)
-        if _anew(page, "history version", station.history_version):
-            yield History(station.history[:_MOST_HISTORY])
-        if _anew(page, "ct version", station.ct.version):
-            yield station.ct.snapshot()
+        yield station.history
+        yield station.ct.state
 
     async def _show_points(self, page: _Page) -> None:
         view = page.opened or self.station.view
         if view is None:
             return
         if page.nominal_of is not view:
+            page.nominal_of, page.seen = view, _UNSEEN
             await _send(page, await anyio.to_thread.run_sync(nominal_message, view.context.profile))
-            page.nominal_of, page.seen = view, _NOTHING_SEEN
-        if page.seen == view.newest_points:
-            return
-        changed, verdict_at = view.points_since(page.seen)
-        page.generation += changed.seen.generation != page.seen.generation  # for this page alone: runs number theirs alike
-        page.seen = changed.seen
-        await _send(page, points_message(changed, page.generation, verdict_at))
+        if page.seen != view.newest_points:
+            packed = await anyio.to_thread.run_sync(_pack_changes, view, page.seen, page.generation)
+            page.seen, page.generation = packed.seen, packed.generation
+            await _send(page, packed.message)
 
 
-class _Guard:
-    """Refuses requests that are not meant for us, and puts the security headers on every answer."""
+class _Packed(NamedTuple):
+    """Points packed for one page, and what the page has seen with them."""
 
-    def __init__(self, app: ASGIApp, ours: Callable[[str], bool]) -> None:
-        self._app, self._ours = app, ours
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        headers = Headers(scope=scope)
-        host, origin = headers.get("host", ""), headers.get("origin")
-        refusal: Response | None = None
-        if not self._ours(host):
-            refusal = PlainTextResponse("this address is not served here", 400)
-        elif (scope["type"] == "websocket" or origin is not None) and origin != f"http://{host}":
-            refusal = PlainTextResponse("pages of other origins are not served", 403)
-        if scope["type"] == "websocket":
-            await (WebSocket(scope, receive, send).send_denial_response(refusal) if refusal else self._app(scope, receive, send))
-            return
-        await (refusal or self._app)(scope, receive, _with_headers(send))
+    message: bytes
+    seen: PointsVersion
+    generation: int
 
 
-def _with_headers(send: Send) -> Send:
-    async def sending(message: AsgiMessage) -> None:
-        if message["type"] == "http.response.start":
-            MutableHeaders(scope=message).update(_HEADERS)
-        await send(message)
-
-    return sending
+def _pack_changes(view: RunView, seen: PointsVersion, generation: int) -> _Packed:
+    """Pack the points that changed after what a page has `seen`; `generation` is that of the message before."""
+    changed, verdict_at = view.points_since(seen)
+    generation += changed.seen.generation != seen.generation
+    return _Packed(points_message(changed, generation, verdict_at), changed.seen, generation)
 
 
 def _static_files() -> list[Any]:
@@ -353,11 +322,11 @@ def _static_files() -> list[Any]:
     return [path for path in folder.iterdir() if path.name.rpartition(".")[2] in _MEDIA]
 
 
-def _served(file: tuple[bytes, str] | None) -> Response:
+def _file_response(file: tuple[bytes, str] | None) -> Response:
     return Response(file[0], media_type=file[1]) if file else PlainTextResponse("there is no such page", 404)
 
 
-def _listening(host: str, port: int) -> socket.socket:
+def _listen_at(host: str, port: int) -> socket.socket:
     """A bound socket. Raises OSError when the address is taken or is none of this machine."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     listening = socket.socket(family, socket.SOCK_STREAM)
@@ -372,51 +341,7 @@ def _listening(host: str, port: int) -> socket.socket:
     return listening
 
 
-def _is_address(host: str, port: int) -> bool:
-    name, _, given = host.rpartition(":")
-    if given != str(port):
-        return False
-    for family, text in ((socket.AF_INET, name), (socket.AF_INET6, name.strip("[]"))):
-        with contextlib.suppress(OSError):
-            socket.inet_pton(family, text)
-            return True
-    return False
-
-
 async def _send(page: _Page, message: str | bytes) -> None:
     async with page.sending:
         sent: Awaitable[None] = page.socket.send_text(message) if isinstance(message, str) else page.socket.send_bytes(message)
         await sent
-
-
-def _anew(page: _Page, what: str, version: int) -> bool:
-    """Whether the page was not told this version yet; from now on it was."""
-    before, page.sent[what] = page.sent.get(what), str(version)
-    return before != str(version)
-
-
-def _parsed(text: str) -> dict[str, Any]:
-    """A JSON object, or an empty one where the text is none."""
-    try:
-        value = json.loads(text)
-    except (ValueError, RecursionError):
-        return {}
-    return value if isinstance(value, dict) else {}
-
-
-def _text(command: Mapping[str, Any], key: str) -> str:
-    value = command.get(key)
-    if not isinstance(value, str):
-        raise Refused(f"the command needs a text {key!r}")
-    return value
-
-
-def _maybe_text(command: Mapping[str, Any], key: str) -> str | None:
-    return _text(command, key) if command.get(key) is not None else None
-
-
-def _maybe_number(command: Mapping[str, Any], key: str) -> int | None:
-    value = command.get(key)
-    if value is not None and not isinstance(value, int):
-        raise Refused(f"the command needs a whole number {key!r}")
-    return value

@@ -37,7 +37,7 @@ from cmmlink.run_view import RunContext, RunView
 from drivers.source import Arrival, PointBatch
 from inspection import LiveUpdate, NominalProfile
 from tests.cmmlink.console.conftest import FLAGS
-from tests.cmmlink.console.played import PLAN, means, measured, opened, write_plan
+from tests.cmmlink.console.played import PLAN, measured, opened, setup_of, write_plan
 
 BATCH_S = 0.01
 ROUNDS = 10
@@ -146,12 +146,12 @@ def serve(answer: Connection, rate: int, held: int, alone: bool) -> None:
     with tempfile.TemporaryDirectory() as folder:
         plan_file = write_plan(Path(folder), text=PLAN + DATUM)
         source = Rated(profile_of(load_plan(plan_file)), rate, held)
-        station = Station(means({"blade.yaml": plan_file}, source.connect))
+        station = Station(setup_of({"blade.yaml": plan_file}, source.connect))
         server = ConsoleServer(station, "benchmark")
         server.start()
         station.choose("blade.yaml")
         if alone:
-            station.view = Alone(plan_file, source).start()
+            station.show(Alone(plan_file, source).start())
         else:
             station.start()
         answer.send(server.address)

@@ -6,7 +6,7 @@ import { List } from "./list.js";
 /** @import { ChosenPlan, Command, Device, StationState } from "./protocol.js" */
 /** @import { Outcome } from "./link.js" */
 
-const TEST_SIGNS = { none: "", testing: "\u2026 ", passed: "\u2713 ", failed: "\u2715 " };
+const TEST_SIGNS = { none: "", testing: "\u2026 ", passed: "\u2713 ", failed: "\u2715 ", aborted: "\u2013 " };
 
 export class PartView {
   /**

@@ -63,7 +63,7 @@ export interface ChosenPlan {
 
 /** The last test of the device. */
 export interface DeviceTest {
-  readonly state: "none" | "testing" | "passed" | "failed";
+  readonly state: "none" | "testing" | "passed" | "failed" | "aborted";
   readonly message: string;
 }
 
@@ -264,9 +264,9 @@ export interface ImportSurface {
   readonly do: "import";
 }
 
-/** A command that needs no more words. `everything`: say all again that the station said since its hello. */
+/** A command that needs no more words. */
 export interface Plain {
-  readonly do: "start" | "end" | "abort" | "test" | "take control" | "live" | "devices" | "everything";
+  readonly do: "start" | "end" | "abort" | "test" | "take control" | "live" | "devices";
 }
 
 /** A device that can be seen now. The answer to `devices` is a JSON list of them. */

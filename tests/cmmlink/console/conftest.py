@@ -10,12 +10,13 @@ from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 from cmmlink.console.ct_import import InspectSurface
 from cmmlink.console.server import ConsoleServer
-from cmmlink.console.station import Records, Station
+from cmmlink.console.station import Station
+from cmmlink.console.station_setup import Records
 from cmmlink.from_plan import profile_of
 from cmmlink.plan.scan import load_plan
 from inspection import NominalProfile, rehearse
 
-from .played import Device, means, write_plan
+from .played import Device, setup_of, write_plan
 
 TOKEN = "token-of-this-test"
 FLAGS = [
@@ -99,7 +100,7 @@ def make_bench(browser: Browser, tmp_path: Path) -> Iterator[MakeBench]:
         files = {name: write_plan(tmp_path, name) for name in plans}
         device = Device()
         known = surfaces or {}
-        station = Station(replace(means(files, device.connect, records), ct_plans=lambda: known, inspect_surface=inspect))
+        station = Station(replace(setup_of(files, device.connect, records), ct_plans=lambda: known, inspect_surface=inspect))
         server = ConsoleServer(station, "test", host, token=TOKEN)
         server.start()
         made.append(Bench(station, server, device, profile_of(load_plan(files[plans[0]])), browser))

@@ -10,7 +10,7 @@ from time import monotonic
 import numpy as np
 from numpy.typing import NDArray
 
-from cmmlink.console.station import Means, Records
+from cmmlink.console.station_setup import Records, StationSetup
 from cmmlink.devices import Connected
 from cmmlink.plan.scan import Plan
 from drivers.errors import DeviceError
@@ -102,11 +102,11 @@ class Device:
         return nullcontext(Connected(self.source, "played scanner", True))
 
 
-def means(
+def setup_of(
     plans: Mapping[str, Path],
     connect: Callable[[Plan], AbstractContextManager[Connected]],
     records: Records | None = None,
     devices: Sequence[tuple[str, str]] = (("played", "the device of this test"),),
-) -> Means:
-    """A station's means with the device played."""
-    return Means(lambda: plans, connect, lambda: devices, records, monotonic, lambda: datetime.now().astimezone())
+) -> StationSetup:
+    """What a station needs, with the device played."""
+    return StationSetup(lambda: plans, connect, lambda: devices, records, monotonic, lambda: datetime.now().astimezone())

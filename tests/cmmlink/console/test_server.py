@@ -2,9 +2,14 @@
 
 import http.client
 import json
+import struct
+import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 import pytest
@@ -13,10 +18,14 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from cmmlink.console.launch import kept_token
+from cmmlink.console.protocol import NOMINAL, POINTS
 from cmmlink.console.server import ConsoleServer
 from cmmlink.console.station import Station
+from cmmlink.from_plan import profile_of
+from cmmlink.plan.scan import load_plan
+from cmmlink.run_view import RunContext, RunView
 
-from .played import Device, means, write_plan
+from .played import Device, setup_of, write_plan
 
 TOKEN = "a-token-for-this-test-of-32-characters"
 HELLO = json.dumps({"token": TOKEN})
@@ -24,7 +33,7 @@ HELLO = json.dumps({"token": TOKEN})
 
 @pytest.fixture
 def server(tmp_path: Path) -> Iterator[ConsoleServer]:
-    server = ConsoleServer(Station(means({"blade.yaml": write_plan(tmp_path)}, Device().connect)), "test", token=TOKEN)
+    server = ConsoleServer(Station(setup_of({"blade.yaml": write_plan(tmp_path)}, Device().connect)), "test", token=TOKEN)
     server.start()
     yield server
     server.stop()
@@ -187,7 +196,7 @@ def test_server_is_bound_to_this_machine_alone(server: ConsoleServer) -> None:
 
 
 def test_open_server_takes_addresses_but_no_foreign_names(tmp_path: Path) -> None:
-    server = ConsoleServer(Station(means({}, Device().connect)), "test", "0.0.0.0", token=TOKEN)
+    server = ConsoleServer(Station(setup_of({}, Device().connect)), "test", "0.0.0.0", token=TOKEN)
     server.start()
     assert server.remote
     assert got(server, "/", Host=f"192.0.2.7:{server.port}").status == 200
@@ -206,3 +215,85 @@ def test_token_is_kept_and_readable_by_its_owner_alone(tmp_path: Path) -> None:
     (folder / "console-token").write_text("short", encoding="ascii")
     assert len(kept_token(folder)) >= 32
     assert kept_token(tmp_path / "other") != token
+
+
+def heard(socket: ClientConnection, kind: str, times: int = 1) -> dict[str, Any]:
+    """The message of a kind, after so many of them."""
+    while True:
+        message = socket.recv(timeout=10)
+        if isinstance(message, str) and (content := json.loads(message))["type"] == kind:
+            times -= 1
+            if not times:
+                return dict(content)
+
+
+def test_pages_hear_of_the_station_while_a_command_and_the_folder_of_plans_take_long(tmp_path: Path) -> None:
+    """Nothing that the event loop does waits for a plan that is checked, or for a folder that does not answer."""
+    released, listing, checking = threading.Event(), threading.Event(), threading.Event()
+    plan = write_plan(tmp_path)
+    blocked = [False]
+
+    def plans() -> dict[str, Path]:
+        if blocked[0]:
+            (listing if threading.current_thread().name == "plans" else checking).set()
+            assert released.wait(60.0)
+        return {"blade.yaml": plan}
+
+    station = Station(replace(setup_of({}, Device().connect), plans=plans))
+    server = ConsoleServer(station, "test", token=TOKEN)
+    server.start()
+    try:
+        with joined(server) as page, joined(server) as other:
+            blocked[0] = True
+            page.send(json.dumps({"do": "choose", "plan": "blade.yaml", "number": 1}))
+            assert checking.wait(20.0)
+            assert listing.wait(20.0)
+            for socket in (page, other):
+                heard(socket, "alive", times=3)
+            assert answered(other, {"do": "live"})["ok"]
+            blocked[0] = False
+            released.set()
+            assert heard(page, "answer")["ok"]
+    finally:
+        released.set()
+        server.stop()
+
+
+def test_every_connection_begins_with_a_hello_and_everything(server: ConsoleServer) -> None:
+    """What a page knows ends with its connection, on both sides: the hello says so, and all of it follows."""
+    kinds = ("hello", "control", "station", "alarms", "run", "history", "ct")
+    heard_of = []
+    for _ in range(2):
+        with joined(server) as socket:
+            heard_of.append([json.loads(socket.recv(timeout=10)) for _ in kinds])
+    assert [[message["type"] for message in messages] for messages in heard_of] == [list(kinds)] * 2
+    assert heard_of[0][1:] == heard_of[1][1:]
+
+
+def test_points_of_another_run_are_another_generation_for_the_page(server: ConsoleServer, tmp_path: Path) -> None:
+    """Every view numbers its generations from 0: what the page drew of one run must not stay under the next."""
+    plan = load_plan(write_plan(tmp_path))
+    context = RunContext("1", "", profile_of(plan), plan.tolerance.zone, 0.95, 1000, datetime(2026, 11, 22, 12))
+    kinds: list[tuple[int, int]] = []
+    with joined(server) as socket:
+        for expected in (2, 4):
+            server.station.show(RunView(context, monotonic, datetime.now))
+            while len(kinds) < expected:
+                message = socket.recv(timeout=10)
+                if isinstance(message, bytes):
+                    kinds.append(struct.unpack("<2I", message[:8]))
+    assert kinds == [(NOMINAL, 0), (POINTS, 1), (NOMINAL, 0), (POINTS, 2)]
+
+
+def test_page_that_cannot_be_shown_is_closed_to_connect_again(server: ConsoleServer, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken() -> float:
+        raise ValueError("no time")
+
+    with joined(server) as socket:
+        heard(socket, "alive")
+        monkeypatch.setattr(server.station, "now_ms", broken)
+        assert closing_code(socket) == 1011
+    monkeypatch.undo()
+    assert [alarm.detail for alarm in server.station.alarms.newest_first()] == ["ValueError('no time')"]
+    with joined(server) as socket:
+        heard(socket, "alive")

@@ -1,0 +1,72 @@
+"""What the operator chose and entered for the next part."""
+
+import re
+from dataclasses import dataclass, replace
+
+from cmmlink.console.choice import CheckedPlan, Choice
+from cmmlink.console.device_test import UNTESTED
+from cmmlink.console.protocol import DeviceTest
+from cmmlink.console.refused import Refused, answer_errors
+from cmmlink.plan.scan import FileDevice
+
+_LONGEST_NAME = 120
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Entry:
+    """The chosen plan, the last test of its device, and what belongs to the next part."""
+
+    serial_number: str = ""
+    operator: str = ""
+    address: str = ""
+    choice: Choice | None = None
+    test: DeviceTest = UNTESTED
+
+    def with_choice(self, choice: Choice) -> "Entry":
+        """The entry with a plan chosen; another plan than before brings a serial number and an address of its own."""
+        if self.choice is not None and self.choice.name == choice.name:
+            return replace(self, choice=choice)
+        plan = choice.checked.plan if choice.checked else None
+        address = str(getattr(plan.device, "address", "")) if plan else ""
+        serial_number = (plan.part.serial_number or "") if plan else ""
+        operator = self.operator or ((plan.operator or "") if plan else "")
+        return Entry(serial_number, operator, address, choice)
+
+    def with_values(self, serial_number: str | None, operator: str | None, address: str | None) -> "Entry":
+        """The entry with new values; None leaves one as it is. Raises Refused."""
+        return replace(
+            self,
+            serial_number=self.serial_number if serial_number is None else _printable(serial_number, "serial number"),
+            operator=self.operator if operator is None else _printable(operator, "operator"),
+            address=self.address if address is None else _printable(address, "address"),
+        )
+
+    def planned(self) -> CheckedPlan:
+        """The chosen plan with the part and the address that were entered, and its nominal. Raises Refused."""
+        if self.choice is None:
+            raise Refused("choose a plan first")
+        checked = self.choice.checked
+        if checked is None:
+            raise Refused(self.choice.shown.problem)
+        plan = checked.plan
+        if self.address and not isinstance(plan.device, FileDevice):
+            with answer_errors():
+                plan = plan.with_address(self.address)
+        part = plan.part.model_copy(update={"serial_number": self.serial_number or None})
+        return CheckedPlan(plan.model_copy(update={"part": part, "operator": self.operator or None}), checked.profile)
+
+
+def next_serial_number(serial_number: str) -> str:
+    """Count the last number in a serial number up by one, keeping its width: B-0099 becomes B-0100."""
+    found = re.fullmatch(r"(.*?)(\d+)(\D*)", serial_number)
+    if not found:
+        return ""
+    head, digits, tail = found.groups()
+    return f"{head}{int(digits) + 1:0{len(digits)}d}{tail}"
+
+
+def _printable(text: str, what: str) -> str:
+    text = text.strip()
+    if len(text) > _LONGEST_NAME or not text.isprintable():
+        raise Refused(f"the {what} must be printable and at most {_LONGEST_NAME} characters long")
+    return text

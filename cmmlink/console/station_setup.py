@@ -1,0 +1,60 @@
+"""What a station needs from outside: plans, devices, records, clocks. The command line provides it."""
+
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Protocol
+
+from cmmlink.console.ct_import import InspectSurface
+from cmmlink.console.past_runs import OpenedRun
+from cmmlink.console.protocol import RunRow
+from cmmlink.devices import Connect
+from cmmlink.events import Sink
+from cmmlink.plan.scan import Plan
+from cmmlink.run import FinishedRun
+
+
+class Records(Protocol):
+    """What the station asks of its records."""
+
+    @property
+    def folder(self) -> Path:
+        """Where runs are recorded."""
+
+    def runs(self) -> Sequence[RunRow]:
+        """All runs, newest first."""
+
+    def open_run(self, run: str) -> OpenedRun:
+        """Give one run as it was recorded."""
+
+    def replay_run(self, run: str, sinks: Sequence[Sink], stop: threading.Event) -> str:
+        """Measure a run again from its record; returns a sentence that says whether the result is identical."""
+
+    def export_run(self, run: str, folder: Path) -> Path:
+        """Write one run as a zip archive into a folder."""
+
+
+@dataclass(frozen=True, slots=True)
+class StationSetup:
+    """Everything a station needs from outside.
+
+    plans   : name -> file, looked up anew each time
+    connect : opens the device of a plan for one scan
+    devices : addresses of devices that can be seen now, with a description each
+    records : None where nothing is recorded
+    clock   : monotonic, s; now : date and time of day
+    ct_plans, inspect_surface : plans of CT surfaces, and what inspects one; None where that is not possible
+    write   : writes the results of a run where its plan wants them
+    """
+
+    plans: Callable[[], Mapping[str, Path]]
+    connect: Connect
+    devices: Callable[[], Sequence[tuple[str, str]]]
+    records: Records | None
+    clock: Callable[[], float]
+    now: Callable[[], datetime]
+    ct_plans: Callable[[], Mapping[str, Path]] = dict
+    inspect_surface: InspectSurface | None = None
+    write: Callable[[Plan, FinishedRun], None] = lambda *_: None

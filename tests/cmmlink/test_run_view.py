@@ -1,0 +1,142 @@
+"""The newest state of a run: what it says, and that nobody waits for it."""
+
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from datetime import datetime
+
+import numpy as np
+import pytest
+
+from cmmlink.events import Arrived, Counts, Judged, RunFinished, RunStarted
+from cmmlink.extremes import Extremes, PointsVersion
+from cmmlink.run_view import RunContext, RunView
+from drivers import Arrival, LinkDown, LinkUp, PointBatch, ScanClosed, ScanOpened
+from inspection import LiveUpdate, NominalProfile, NurbsCurve, State, ToleranceZone, discretize
+
+UNSEEN = PointsVersion(-1, 0)
+NOON = datetime(2026, 11, 22, 12)
+
+
+@pytest.fixture(scope="module")
+def profile() -> NominalProfile:
+    return discretize(NurbsCurve.interpolate(np.array([[0.0, 0.0], [50.0, 10.0], [100.0, 0.0], [150.0, 5.0]])), material="left")
+
+
+class Played:
+    """A view whose clock and events the test plays."""
+
+    def __init__(self, profile: NominalProfile) -> None:
+        self.now_s = 100.0
+        self.profile = profile
+        context = RunContext("7", "blade.yaml", profile, ToleranceZone(-0.05, 0.05, 0.01), 0.95, 5000, NOON)
+        self.view = RunView(context, lambda: self.now_s, lambda: NOON)
+        self.view(RunStarted("blade", "B-1", "Ada", "COM3", False))
+
+    def arrive(self, arrival: Arrival) -> None:
+        self.view(Arrived(self.now_s, arrival))
+
+    def judge(self, first: int, deviation_mm: list[float], state: State = "provisional", received: int | None = None) -> None:
+        m = len(deviation_mm)
+        station = np.linspace(0, self.profile.length_mm, m)
+        deviation = np.array(deviation_mm)
+        foot = np.column_stack([station, np.zeros(m)])
+        actual = foot + np.column_stack([np.zeros(m), deviation])
+        verdicts = np.select([np.abs(deviation) > 0.06, np.abs(deviation) > 0.04], [2, 1], 0).astype(np.int8)
+        update = LiveUpdate(state, first, first + m, actual, foot, station, deviation, verdicts, 0.003, None)
+        count = first + m if received is None else received
+        self.view(Judged(self.now_s, 0.02, update, Counts(received=count, judged=first + m)))
+
+
+@pytest.fixture
+def played(profile: NominalProfile) -> Played:
+    return Played(profile)
+
+
+def points(count: int) -> PointBatch:
+    return PointBatch(np.arange(count), np.zeros(count), np.zeros((count, 3)))
+
+
+def test_phases_follow_the_device_and_the_operator(played: Played) -> None:
+    view = played.view
+    assert (view.state().phase, view.state().verdict.why) == ("preparing", "preparing the inspection")
+    view.await_device()
+    assert (view.state().phase, view.state().link) == ("starting", "connecting")
+    played.arrive(ScanOpened("scanner", "S-9", 400))
+    state = view.state()
+    assert (state.phase, state.link, state.device, state.expected) == ("measuring", "up", "scanner S-9", 400)
+    played.arrive(LinkDown("unplugged"))
+    assert view.state().link == "down"
+    played.arrive(LinkUp(0.5))
+    assert view.state().link == "up"
+    view.end_soon()
+    played.arrive(points(3))
+    assert view.state().phase == "ending", "what still arrives does not make it measure again"
+    played.arrive(ScanClosed(None))
+    assert view.state().link == "closed"
+    assert not view.over
+    view(RunFinished("complete", None, Counts(received=3, rejected=3), "the points do not fit"))
+    assert view.over
+    state = view.state()
+    assert (state.phase, state.ending, state.message) == ("finished", "complete", "the points do not fit")
+    assert (state.verdict.word, state.verdict.final, state.verdict.why) == ("NOT PROVEN", True, "no part found")
+
+
+def test_rate_and_sign_of_life_fade_when_nothing_comes(played: Played) -> None:
+    for step in range(11):
+        played.now_s = 100.0 + 0.1 * step
+        played.arrive(points(100))
+        played.judge(100 * step, [0.0] * 100)
+    assert played.view.state().rate_per_s == pytest.approx(1000.0)
+    assert played.view.state().streaming
+    played.now_s += 4.0
+    assert played.view.state().rate_per_s == pytest.approx(250.0)
+    assert not played.view.state().streaming
+
+
+def test_verdict_so_far_counts_what_is_out_and_begins_anew_with_the_points(played: Played) -> None:
+    played.arrive(ScanOpened("scanner", "S-9", 3))
+    played.judge(0, [0.0, 0.2, -0.03])
+    state = played.view.state()
+    assert (state.verdict.word, state.verdict.why, state.out_of_tolerance) == ("NOT CONFORM", "1 point out so far, provisional", 1)
+    assert state.worst is not None
+    assert (state.worst.deviation_mm, state.worst.verdict) == (0.2, "nonconform")
+    assert (state.worst.x_mm, state.worst.y_mm) == pytest.approx((played.profile.length_mm / 2, 0.2))
+    before = played.view.newest_points
+    played.judge(0, [0.0, 0.01, -0.03], "settled")
+    state = played.view.state()
+    assert (state.out_of_tolerance, state.registration.state, state.verdict.word) == (0, "settled", "NOT PROVEN")
+    assert state.worst is not None
+    assert state.worst.deviation_mm == -0.03
+    assert played.view.newest_points.generation == before.generation + 1
+    assert len(played.view.points_since(before)[0].bins) == 3
+
+
+def test_state_that_was_given_never_changes(played: Played) -> None:
+    played.judge(0, [0.0, 0.01])
+    given = played.view.state()
+    words = repr(given)
+    played.judge(2, [0.3])
+    assert repr(given) == words != repr(played.view.state())
+
+
+def test_nobody_waits_while_points_are_put_in_their_bins(played: Played, monkeypatch: pytest.MonkeyPatch) -> None:
+    played.judge(0, [0.0, 0.01])
+    adding, released, add = threading.Event(), threading.Event(), Extremes.add
+
+    def slow(extremes: Extremes, *columns: np.ndarray) -> None:
+        adding.set()
+        assert released.wait(60.0)
+        add(extremes, *columns)
+
+    monkeypatch.setattr(Extremes, "add", slow)
+    with ThreadPoolExecutor(1) as pool:
+        judged = pool.submit(played.judge, 0, [0.3, 0.0, 0.0])
+        assert adding.wait(30.0)
+        state = played.view.state()
+        assert (state.judged, state.out_of_tolerance) == (2, 0)
+        assert len(played.view.points_since(UNSEEN)[0].bins) == 2
+        played.view.end_soon()
+        released.set()
+        judged.result(30.0)
+    assert (played.view.state().judged, played.view.state().out_of_tolerance) == (3, 1)
+    assert played.view.state().phase == "ending"
