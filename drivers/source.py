@@ -123,7 +123,7 @@ class Decoder(Protocol):
     def feed(self, data: bytes) -> list[Arrival]:
         """Decode the next bytes; raise `ProtocolError` only when no point of this device could ever be used."""
 
-    def interrupted(self) -> list[Arrival]:
+    def break_off(self) -> list[Arrival]:
         """Account for a frame that the end of the link cut off."""
 
 

@@ -67,7 +67,7 @@ class AsciiDecoder:
         self._pending = self._drop_excess(self._pending)
         return self._out.hand_over()
 
-    def interrupted(self) -> list[Arrival]:
+    def break_off(self) -> list[Arrival]:
         """Count the begun line, if any, as damaged."""
         if self._pending:
             self._damage(len(self._pending), "line cut off where the link ended")

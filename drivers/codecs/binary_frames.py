@@ -71,7 +71,7 @@ class BinaryDecoder:
         self._pending = data[at:]
         return self._out.hand_over()
 
-    def interrupted(self) -> list[Arrival]:
+    def break_off(self) -> list[Arrival]:
         """Count a begun frame as damaged; the counter may have wrapped when the link comes back."""
         self._damage += len(self._pending)
         self._pending, self._away, self._asked = b"", True, False

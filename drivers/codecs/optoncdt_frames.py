@@ -121,7 +121,7 @@ class OptoncdtDecoder:
         self._text = self._take_replies(data[at:])
         return self._out.hand_over()
 
-    def interrupted(self) -> list[Arrival]:
+    def break_off(self) -> list[Arrival]:
         """Count what was begun as damaged; ask again when the link is back."""
         pending = len(self._text) + 3 * len(self._words)
         if pending:

@@ -46,7 +46,7 @@ class RegisterDecoder:
             self._take(exchange)
         return self._out.hand_over()
 
-    def interrupted(self) -> list[Arrival]:
+    def break_off(self) -> list[Arrival]:
         """Forget a pair that was cut off; begin the next turn with the status."""
         self._pending = b""
         self._pattern.begin_turn()

@@ -77,7 +77,7 @@ class RiftekDecoder:
                 self._out.append(Damaged(1, "burst without end"))
         return self._out.hand_over()
 
-    def interrupted(self) -> list[Arrival]:
+    def break_off(self) -> list[Arrival]:
         """Count the begun burst as damaged."""
         if self._burst:
             self._out.append(Damaged(len(self._burst), "burst cut off where the link ended"))
@@ -137,7 +137,7 @@ class RiftekAsciiDecoder:
             self._pending = self._pending[LONGEST_LINE:]
         return self._out.hand_over()
 
-    def interrupted(self) -> list[Arrival]:
+    def break_off(self) -> list[Arrival]:
         """Count the begun line as damaged."""
         if self._pending:
             self._out.append(Damaged(len(self._pending), "line cut off where the link ended"))

@@ -36,13 +36,13 @@ class Capture:
                 raise DeviceError(self._failure)
         except DeviceError:
             if self._decoder is not None:
-                yield from self._decoder.interrupted()
+                yield from self._decoder.break_off()
             raise
 
 
 def _decode(arrival: Arrival, decoder: Decoder) -> Iterator[Arrival]:
     if isinstance(arrival, LinkDown):
-        yield from decoder.interrupted()  # what the source did when the link was lost
+        yield from decoder.break_off()  # what the source did when the link was lost
     if isinstance(arrival, WireBytes | LinkDown | LinkUp):
         yield arrival
     if isinstance(arrival, WireBytes):

@@ -84,7 +84,7 @@ class ModbusScanner:
 
     def _scan(self, client: ModbusBaseSyncClient) -> Iterator[Arrival]:
         last_news_s = self._clock()
-        self._decoder.interrupted()
+        self._decoder.break_off()
         while not self._stopped.is_set():
             request = self._decoder.request()
             answer = self._ask(client, request)

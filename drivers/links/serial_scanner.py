@@ -75,7 +75,7 @@ class SerialScanner:
                     return
                 self._raise_if_dead(watch.note_read(data, found, self._clock()))
         except DeviceError:  # whatever ends the scan, the begun frame is accounted for
-            yield from self._decoder.interrupted()
+            yield from self._decoder.break_off()
             raise
 
     def _raise_if_dead(self, state: str) -> None:

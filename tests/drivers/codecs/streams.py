@@ -55,7 +55,7 @@ def decoded(decoder: Decoder, data: bytes, cuts: Sequence[int] = ()) -> Account:
     """Feed `data` cut at the given places."""
     edges = [0, *sorted(cuts), len(data)]
     arrivals = [arrival for a, b in pairwise(edges) for arrival in decoder.feed(data[a:b])]
-    return account(arrivals + decoder.interrupted())
+    return account(arrivals + decoder.break_off())
 
 
 def any_cut_is_the_same(make: Callable[[], Decoder], data: bytes, seed: int = 0) -> Account:

@@ -155,7 +155,7 @@ def test_sound_lines_of_another_form_are_damage(text: str) -> None:
 def test_a_line_cut_off_by_the_end_of_the_link_is_counted_and_the_next_is_read() -> None:
     decoder = AsciiDecoder("mm")
     decoder.feed(b"P,0,0,1,2")
-    assert account(decoder.interrupted()).total("Damaged") == 9
+    assert account(decoder.break_off()).total("Damaged") == 9
     assert account(decoder.feed(line("P,1,0,1,2,3,0"))).sequence == [1]
 
 

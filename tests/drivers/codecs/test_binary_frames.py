@@ -140,7 +140,7 @@ def test_a_gap_longer_than_the_counter_is_told_by_the_clock(away: int) -> None:
     data, sent_mm = single(300_000)
     cut = 72 + 5000 * 24
     decoder = BinaryDecoder()
-    first = decoder.feed(data[:cut]) + decoder.interrupted()
+    first = decoder.feed(data[:cut]) + decoder.break_off()
     book = account(first + decoder.feed(data[cut + away * 24 :]))
     assert book.lost == away
     assert book.sequence[5000] == 5000 + away
@@ -150,7 +150,7 @@ def test_a_gap_longer_than_the_counter_is_told_by_the_clock(away: int) -> None:
 def test_a_heartbeat_puts_a_wrong_guess_right() -> None:
     data, _ = single(3000)
     decoder = BinaryDecoder()
-    arrivals = decoder.feed(data[: 72 + 1000 * 24]) + decoder.interrupted()
+    arrivals = decoder.feed(data[: 72 + 1000 * 24]) + decoder.break_off()
     late = BinaryDevice().frame([Sample(1000, 1000 * 1e-4 + 100_000 * 1e-4, (0, 0, 0))])  # paused for as long as 100,000 points take
     beat = BinaryDevice().heartbeat(1001, 0.0)
     assert account(arrivals + decoder.feed(late)).lost == 65536 * 2

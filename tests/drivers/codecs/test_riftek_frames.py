@@ -127,7 +127,7 @@ def test_values_not_renewed_or_out_of_range_are_rejected() -> None:
 def test_after_a_lost_link_the_scan_has_to_begin_anew() -> None:
     decoder = make()
     decoder.feed(bursts([1, 2, 3]))
-    decoder.interrupted()
+    decoder.break_off()
     with pytest.raises(ProtocolError, match="begin the scan anew"):
         decoder.feed(bursts([4]))
 

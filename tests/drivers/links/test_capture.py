@@ -39,7 +39,7 @@ def as_a_source_gives_it(data: bytes, seed: int, broken_after: int | None = None
     found: list[Arrival] = []
     for index, piece in enumerate(cut(data, seed)):
         if index == broken_after:
-            found += [*decoder.interrupted(), LinkDown("unplugged"), LinkUp(0.5)]
+            found += [*decoder.break_off(), LinkDown("unplugged"), LinkUp(0.5)]
         found += [WireBytes(float(index), piece), *decoder.feed(piece)]
     return found
 
