@@ -28,7 +28,7 @@ class Frame:
 
     @property
     def diagonal_points_mm(self) -> Array:
-        """Lowest and highest extents (4,) as the diagonal rule compares them."""
+        """Lowest and highest extents (4,), in the order in which the diagonal rule compares them."""
         return np.concatenate([self.low_mm, self.high_mm])
 
     @property
@@ -60,7 +60,7 @@ def arc_length_weights(points_mm: Array, closed: bool) -> Array:
 
 
 def dominant_points(points_mm: Array, closed: bool) -> NDArray[np.int64]:
-    """Indices where the discrete curvature (Menger: of three neighbours) has a marked local maximum; ends of open sets too."""
+    """Indices of the marked local maxima of the discrete curvature (Menger's, of three neighbours), and of the ends of an open set."""
     before, after = np.roll(points_mm, 1, axis=0), np.roll(points_mm, -1, axis=0)
     a, b, c = points_mm - before, after - points_mm, after - before
     lengths = np.hypot(*a.T) * np.hypot(*b.T) * np.hypot(*c.T)

@@ -1,4 +1,12 @@
-"""The methods of projection by name."""
+"""The methods of projection by name: how the foot of a point is found.
+
+exact      the closest point of the curve itself
+circle     projection on the osculating circle of the nearest sample (third order; Hu & Wallner 2005 is a relative)
+chord      projection on the polygon of the samples
+pcp        pole circle projection, equations 2 and 3 of Hari Ganesh & Samuel (2022), the circle on the point's side
+veaw       Voronoi edge assisted weighting, equations 4 to 6 there, angles at the end of the shared Voronoi edge
+inversion  point inversion started at the nearest sample, the published method's comparison
+"""
 
 from typing import Literal
 

@@ -94,7 +94,7 @@ class InspectionResult:
 
     @property
     def rejected(self) -> int:
-        """Points without one."""
+        """Points without a verdict."""
         return self.received - self.judged
 
     @property
@@ -144,8 +144,8 @@ def rejections_by_reason(rejection: NDArray[np.int8]) -> dict[str, int]:
 def coverage(station_mm: Array, nominal: NominalProfile) -> float:
     """Share of the nominal's length that judged points at these stations (j,) cover.
 
-    The stretch between neighbours is measured as far as it is no longer than three median spacings, 2 % of the length at
-    least and 10 % at most.
+    The stretch between two neighbours counts as measured if it is no longer than three median spacings. That limit is never
+    below 2 % of the length and never above 10 % of it.
     """
     if not len(station_mm):
         return 0.0
@@ -154,7 +154,7 @@ def coverage(station_mm: Array, nominal: NominalProfile) -> float:
 
 
 def _gaps(sorted_mm: Array, nominal: NominalProfile) -> tuple[Array, float]:
-    """Distances between neighbouring stations, the seam or both ends included, and from which on one was not measured."""
+    """Distances between neighbouring stations, across the seam or to both ends as well, and the longest that counts as measured."""
     length = nominal.length_mm
     closed = nominal.curve.closed
     gaps = np.diff(np.append(sorted_mm, sorted_mm[0] + length)) if closed else np.diff(np.concatenate([[0.0], sorted_mm, [length]]))
@@ -164,7 +164,10 @@ def _gaps(sorted_mm: Array, nominal: NominalProfile) -> tuple[Array, float]:
 def stretches(
     station_mm: Array, deviation_mm: Array, verdicts: NDArray[np.int8], zone: ToleranceZone, nominal: NominalProfile
 ) -> tuple[Stretch, ...]:
-    """Contiguous out-of-tolerance stretches in station order: broken by any point inside and any gap, joined across the seam."""
+    """Contiguous stretches out of tolerance, in station order, from the stations, deviations and verdicts (j,) of judged points.
+
+    A point within the tolerance or a gap ends a stretch; a stretch that crosses the seam is not cut there.
+    """
     order = np.argsort(station_mm, kind="stable")
     out = verdicts[order] == Verdict.NONCONFORM
     if not out.any():
@@ -181,5 +184,6 @@ def stretches(
 
 
 def _stretch(run: NDArray[np.int64], station_mm: Array, deviation_mm: Array, zone: ToleranceZone) -> Stretch:
+    """The stretch that a run of points makes, given by their indices in station order."""
     worst = run[np.argmax(np.abs(deviation_mm[run] - zone.middle_mm))]
     return Stretch(float(station_mm[run[0]]), float(station_mm[run[-1]]), float(deviation_mm[worst]))

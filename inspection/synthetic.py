@@ -43,7 +43,10 @@ def stations_even_in_parameter(nominal: NominalProfile, count: int) -> Array:
 def form_error_mm(
     station_mm: Array, length_mm: float, rng: np.random.Generator, amplitude_mm: float, harmonics: tuple[int, ...] = (2, 3, 5)
 ) -> Array:
-    """Smooth form error (m,): waves of the given numbers of periods over the length, random phases, of that root sum square."""
+    """Smooth form error (m,): a wave of random phase for each number of periods over the length.
+
+    The root sum square of the amplitudes of the waves is `amplitude_mm`.
+    """
     share = amplitude_mm / np.sqrt(len(harmonics))
     phases = rng.uniform(0, 2 * np.pi, len(harmonics))
     waves = [np.sin(2 * np.pi * k * station_mm / length_mm + phase) for k, phase in zip(harmonics, phases, strict=True)]
@@ -57,7 +60,7 @@ def scan(
     nominal_from_section: RigidTransform,
     tip_radius_mm: float = 0.0,
 ) -> SyntheticScan:
-    """Points at stations (m,) moved along the outward normal by their deviations (m,), seen from a part in that pose.
+    """A scan of a part in that pose: points at stations (m,), off the nominal by their deviations (m,) along the outward normal.
 
     With a tip radius the points are ball centres.
     """
@@ -71,7 +74,7 @@ def scan(
 
 
 def parameter_at(nominal: NominalProfile, station_mm: Array) -> Array:
-    """Curve parameters (m,) at stations, by Newton's iteration on the arc length from the samples' linear interpolation."""
+    """Curve parameters (m,) at stations (m,), by Newton's iteration on the arc length, started between the nearest samples."""
     curve = nominal.curve
     start, end = curve.domain
     known_s = np.append(nominal.station_mm, curve.length_mm)

@@ -6,17 +6,19 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inspection.kernels import layout
+
 
 class Verdict(IntEnum):
     """Ordered so that the verdict on a profile is the maximum over its points."""
 
-    CONFORM = 0
-    UNCERTAIN = 1
-    NONCONFORM = 2
+    CONFORM = layout.CONFORM
+    UNCERTAIN = layout.UNCERTAIN
+    NONCONFORM = layout.NONCONFORM
 
     @property
     def word(self) -> str:
-        """The verdict as results spell it: conform, uncertain, nonconform."""
+        """The word that results and JSON use, which never changes: conform, uncertain, nonconform."""
         return self.name.lower()
 
 
@@ -48,13 +50,13 @@ class ToleranceZone:
         return (self.lower_mm + self.upper_mm) / 2
 
     def verdicts(self, deviation_mm: ArrayLike) -> NDArray[np.int8]:
-        """Verdict (m,) of each deviation (m,), as the codes of `Verdict`; a limit itself belongs to the zone."""
+        """Verdict (m,) of each deviation (m,), as the codes of `Verdict`. A limit itself belongs to the zone; NaN is UNCERTAIN."""
         deviation = np.asarray(deviation_mm, dtype=np.float64)
         beyond = np.maximum(self.lower_mm - deviation, deviation - self.upper_mm)  # how far outside the zone, negative inside
         proven = np.where(beyond <= -self.uncertainty_mm, Verdict.CONFORM, Verdict.UNCERTAIN)
         return np.where(beyond > self.uncertainty_mm, Verdict.NONCONFORM, proven).astype(np.int8)
 
     def verdict(self, deviation_mm: ArrayLike) -> Verdict:
-        """Verdict on the profile: its worst point. A profile without a judged point is not proven."""
+        """Verdict on the profile: that of its worst point, and UNCERTAIN where there is no point."""
         verdicts = self.verdicts(np.atleast_1d(np.asarray(deviation_mm, dtype=np.float64)))
         return Verdict(int(verdicts.max())) if verdicts.size else Verdict.UNCERTAIN

@@ -3,7 +3,7 @@
 Algorithm 1, steps 4 to 9 of Hari Ganesh & Samuel (2022): the sites are enclosed in a box so that no Voronoi vertex lies
 at infinity; the vertices of a cell farthest from its site on either side of the profile are its poles (Amenta & Bern),
 centres of circles that touch the profile there and approximate the medial axis. Beyond the paper: on straight parts a pole
-that only the box keeps from infinity is one at infinity, whatever the size of the box.
+that lies out in the box counts as one at infinity, whatever the size of the box.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from scipy.spatial import Voronoi, cKDTree
 
 Array = NDArray[np.float64]
 
-BOX_SCALE = 10.0  # circle of box sites in diagonals of the profile: 3 to 100 work alike, 1e4 breaks Qhull (measured)
+BOX_SCALE = 10.0  # radius of the circle of box sites, in diagonals of the profile: 3 to 100 work alike, 1e4 breaks Qhull (measured)
 _BOX_SITES = 8
 _SAME_PLACE = 1e-10  # sites closer than this fraction of the diagonal are one site
 
@@ -54,8 +54,8 @@ def site_poles(
     sites_mm  : (n, 2); coinciding sites (both sides of a corner) share one cell
     normal    : (n, 2) unit normals, to the left
     next_site : (n,) index of the neighbour along the profile, -1 where a piece ends
-    is_end    : (n,) ends and corners: their pole directions are plus and minus the normal, whatever the cell says
-    is_straight : (n,) sites of straight parts: what lies out in the box is at infinity there
+    is_end    : (n,) ends and corners, whose pole directions are plus and minus the normal, whatever their cell says
+    is_straight : (n,) sites of straight parts, where a vertex out in the box counts as one at infinity
     """
     site_of, cells = _distinct_cells(sites_mm)  # (n,), (c, 2)
     diagram = Voronoi(np.vstack([cells, _box_places(cells)]))
@@ -83,6 +83,7 @@ def _distinct_cells(sites_mm: Array) -> tuple[NDArray[np.int64], Array]:
 
 
 def _box_places(sites_mm: Array) -> Array:
+    """Places (8, 2) of the sites that enclose the others."""
     low, high = sites_mm.min(axis=0), sites_mm.max(axis=0)
     turn = 2 * np.pi * np.arange(_BOX_SITES) / _BOX_SITES
     return np.asarray((low + high) / 2 + BOX_SCALE * np.hypot(*(high - low)) * np.column_stack([np.cos(turn), np.sin(turn)]))
@@ -98,7 +99,7 @@ def _poles(
     at_box: NDArray[np.bool_],
     is_straight: NDArray[np.bool_],
 ) -> tuple[Array, Array, Array, Array, Array]:
-    """Pole directions and radii on both sides, and the angle between the pole and the opposite one."""
+    """Directions (n, 2) and radii (n,) of the poles on either side, and the angles (n,) of `SitePoles`."""
     n = len(sites_mm)
     cell, vertex = np.repeat(ridges.ravel(), 2), np.repeat(ends, 2, axis=0).ravel()  # every end of every ridge, for both its cells
     start = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=site_of.max() + 1))])
@@ -133,6 +134,7 @@ def _farthest_per_site(site: NDArray[np.int64], radius: Array, chosen: NDArray[n
 
 
 def _angle_deg(a: Array, b: Array) -> Array:
+    """Angle (n,) between vectors (n, 2), from 0 to 180."""
     return np.asarray(np.degrees(np.abs(np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1)))))
 
 
@@ -164,4 +166,5 @@ def _shared_edges(
 
 
 def _inverse(radius: Array) -> Array:
+    """Curvature (n,) of circles; that of an infinite one is 0."""
     return np.asarray(1.0 / radius)

@@ -75,7 +75,7 @@ _SMALL_TURN = 1e-2  # rad; as samples lie densely most turns are smaller, and th
 
 
 def project_on_samples(points_mm: Array, grid: CurveTables, table: SampleTables, method: str, threads: int | None = None) -> Feet:
-    """Feet of points (m, 2) by a method that looks at samples only: circle, chord, pcp or veaw (see profile_error).
+    """Feet of points (m, 2) by a method that looks at samples only: circle, chord, pcp or veaw (see `methods`).
 
     The grid merely says where to begin the search for the nearest sample. Points that are not finite give NaN.
     """

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from inspection import RigidTransform, discretize
+from inspection import Material, RigidTransform, discretize
 from inspection.synthetic import even_stations, form_error_mm, scan, stations_even_in_parameter
 from tests.inspection import profiles
 from tests.inspection.oracle import closest_point
@@ -13,9 +13,9 @@ POSE = RigidTransform(0.8, np.array([12.0, -5.0]))
 
 @pytest.mark.parametrize("material", ["left", "right"])
 @pytest.mark.parametrize("name", ["P1", "P3", "NACA 2412 sharp"])
-def test_claimed_stations_deviations_and_pose_are_true(name: str, material: str) -> None:
+def test_claimed_stations_deviations_and_pose_are_true(name: str, material: Material) -> None:
     curve = profiles.EVERY[name]()
-    nominal = discretize(curve, samples=1000, step_min=1e-3, material=material)  # type: ignore[arg-type]
+    nominal = discretize(curve, samples=1000, step_min=1e-3, material=material)
     station = even_stations(nominal, 300)[5:-5]
     deviation = form_error_mm(station, nominal.length_mm, np.random.default_rng(1), 0.03)
     made = scan(nominal, station, deviation, POSE)
