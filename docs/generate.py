@@ -4,9 +4,13 @@ import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 from pydantic import BaseModel
 
+import drivers
+import inspection
+import simulators
 from cmmlink.plan.reference import Group, groups_of, table
 from cmmlink.plan.scan import Plan
 from cmmlink.plan.surface import CtPlan
@@ -93,6 +97,13 @@ added, not renamed. Lengths are in mm, deviations are positive out of material, 
 the folder of `--out` holds the same object.
 """
 
+PYTHON = """
+# In Python
+
+What each package offers by its front door. Names behind it are the package's own and may change. Arrays are float64, lengths mm, angles
+radians; what a function takes and gives stands in its docstring, with shapes and units: `help(inspection.register)`.
+"""
+
 OBJECTS: tuple[tuple[str, type[BaseModel], type[BaseModel] | None], ...] = (
     ("Of every inspection", Inspected, None),
     ("`inspect`: further keys", Measured, Inspected),
@@ -113,6 +124,28 @@ TABLES: tuple[tuple[str, Mapping[str, str]], ...] = (
     ("`points.csv` and `points.npy` of `export`: a line for every point", export.POINT_COLUMNS),
     ("`wire.csv` of `export`: a line for every read", export.WIRE_COLUMNS),
 )
+
+
+def front_doors() -> str:
+    """The names of each package's front door, each with the first sentence of its docstring."""
+    parts = []
+    for package in (inspection, drivers, simulators):
+        rows = [f"| `{name}` | {_first_line(getattr(package, name))} |" for name in package.__all__]
+        parts.append(
+            "\n".join([f"## `{package.__name__}`", "", _first_line(package), "", "| name | what it is |", "| --- | --- |", *rows, ""])
+        )
+    return "\n".join([WRITTEN, PYTHON.strip(), "", *parts])
+
+
+def _first_line(thing: object) -> str:
+    """The first sentence of a docstring; of what has none its choices, keys or value."""
+    if get_args(thing):
+        return "One of " + ", ".join(f"`{getattr(choice, '__name__', choice)}`" for choice in get_args(thing)) + "."
+    if isinstance(thing, Mapping):
+        return "By their names: " + ", ".join(f"`{key}`" for key in thing) + "."
+    if not (inspect.ismodule(thing) or callable(thing)):
+        return f"The value `{thing}`."
+    return (inspect.getdoc(thing) or "").split("\n\n")[0].replace("\n", " ").replace("|", "\\|")
 
 
 def page(intro: str, model: type[BaseModel]) -> str:
@@ -175,6 +208,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "ct-plan.md": lambda: page(CT_PLAN, CtPlan),
     "register-map.md": _register_map,
     "results.md": results,
+    "python.md": front_doors,
 }
 
 if __name__ == "__main__":
