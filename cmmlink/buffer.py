@@ -7,7 +7,7 @@ from typing import Generic, TypeVar
 Item = TypeVar("Item")
 
 
-class HandOver(Generic[Item]):
+class Buffer(Generic[Item]):
     """First in, first out, between one giving and one taking thread.
 
     capacity : what may wait, in the units of `size` (points)

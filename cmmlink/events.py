@@ -5,8 +5,8 @@ A sink is any function that takes an event; it is called in the thread of the ru
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import dataclass, field, fields
+from typing import Any, Literal
 
 from drivers import Arrival
 from inspection import InspectionResult, LiveUpdate
@@ -48,6 +48,11 @@ class RunStarted:
     operator: str
     device: str
     simulated: bool
+
+    @classmethod
+    def from_header(cls, header: Mapping[str, Any]) -> "RunStarted":
+        """The same from the header of a recorded run, which holds it among other things."""
+        return cls(*(header[field.name] for field in fields(cls)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cmmlink.buffer import HandOver
+from cmmlink.buffer import Buffer
 from cmmlink.events import Arrived, Counts, Ending, Event, Judged, RunFinished, RunStarted, Sink
 from drivers import Arrival, Damaged, DeviceError, Lost, PointBatch, Rejected, ScanSource
 from inspection import InspectionError, InspectionResult, LiveInspection, Rejection
@@ -51,7 +51,7 @@ class _Tally:
         elif isinstance(arrival, Damaged):
             self.damaged_bytes += arrival.byte_count
 
-    def counts(self, judged: int, rejected_by_reason: dict[str, int], buffer: "HandOver[tuple[float, Arrival]]") -> Counts:
+    def counts(self, judged: int, rejected_by_reason: dict[str, int], buffer: "Buffer[tuple[float, Arrival]]") -> Counts:
         reasons = Counter(self.rejected_by_driver)
         reasons.update(rejected_by_reason)
         rejected = sum(reasons.values())
@@ -80,13 +80,13 @@ def run_inspection(
     stop: threading.Event,
 ) -> RunOutcome:
     """Carry out one run to its end, telling every sink every event. Setting `stop` aborts it."""
-    buffer: HandOver[tuple[float, Arrival]] = HandOver(buffer_points)
+    buffer: Buffer[tuple[float, Arrival]] = Buffer(buffer_points)
     failures: list[DeviceError] = []
     acquired = threading.Event()
     reader = threading.Thread(target=_acquire, args=(source, buffer, failures, acquired, clock), name="acquisition", daemon=True)
     tally = _Tally()
     try:
-        _tell(sinks, started)
+        _publish(sinks, started)
         reader.start()
         _judge_all(source, live, sinks, buffer, tally, acquired, clock, stop)
     finally:
@@ -97,15 +97,15 @@ def run_inspection(
     failure = failures[0] if failures else None
     ending: Ending = "interrupted" if failure else "aborted" if stop.is_set() else "complete"
     result, refusal = _finish(live, ending)
-    judged, reasons = (result.judged, result.rejected_by_reason) if result else (0, _unregistered(live))
+    judged, reasons = (result.judged, result.rejected_by_reason) if result else (0, _reasons_without_pose(live))
     counts = tally.counts(judged, reasons, buffer)
-    _tell(sinks, RunFinished(ending, result, counts, str(failure or refusal or "")))
+    _publish(sinks, RunFinished(ending, result, counts, str(failure or refusal or "")))
     return RunOutcome(ending, result, counts, failure, refusal)
 
 
 def _acquire(
     source: ScanSource,
-    buffer: "HandOver[tuple[float, Arrival]]",
+    buffer: "Buffer[tuple[float, Arrival]]",
     failures: list[DeviceError],
     acquired: threading.Event,
     clock: Callable[[], float],
@@ -126,7 +126,7 @@ def _judge_all(
     source: ScanSource,
     live: LiveInspection,
     sinks: Sequence[Sink],
-    buffer: "HandOver[tuple[float, Arrival]]",
+    buffer: "Buffer[tuple[float, Arrival]]",
     tally: _Tally,
     acquired: threading.Event,
     clock: Callable[[], float],
@@ -143,7 +143,7 @@ def _judge_all(
         batches: list[tuple[float, PointBatch]] = []
         for time_s, arrival in taken:
             tally.add(arrival)
-            _tell(sinks, Arrived(time_s, arrival))
+            _publish(sinks, Arrived(time_s, arrival))
             if isinstance(arrival, PointBatch):
                 batches.append((time_s, arrival))
                 if sum(len(batch) for _, batch in batches) >= _MOST_AT_ONCE:
@@ -156,7 +156,7 @@ def _judge_all(
 def _judge(
     live: LiveInspection,
     sinks: Sequence[Sink],
-    buffer: "HandOver[tuple[float, Arrival]]",
+    buffer: "Buffer[tuple[float, Arrival]]",
     tally: _Tally,
     batches: list[tuple[float, PointBatch]],
     clock: Callable[[], float],
@@ -164,10 +164,10 @@ def _judge(
     update = live.add(np.concatenate([batch.points_mm for _, batch in batches]))
     now = clock()
     counts = tally.counts(live.judged, live.rejected_by_reason, buffer)
-    _tell(sinks, Judged(now, now - batches[-1][0], update, counts))
+    _publish(sinks, Judged(now, now - batches[-1][0], update, counts))
 
 
-def _unregistered(live: LiveInspection) -> dict[str, int]:
+def _reasons_without_pose(live: LiveInspection) -> dict[str, int]:
     """Why points have no verdict where there is no registration; beyond which end a point lies, nobody knows then."""
     reasons = {reason: count for reason, count in live.rejected_by_reason.items() if reason != Rejection.BEYOND_END.words}
     left = live.received - sum(reasons.values())
@@ -181,6 +181,6 @@ def _finish(live: LiveInspection, ending: Ending) -> tuple[InspectionResult | No
         return None, error
 
 
-def _tell(sinks: Sequence[Sink], event: Event) -> None:
+def _publish(sinks: Sequence[Sink], event: Event) -> None:
     for sink in sinks:
         sink(event)

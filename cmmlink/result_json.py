@@ -8,7 +8,7 @@ from cmmlink.events import Counts, RunStarted
 from inspection import InspectionResult, Registration, Verdict
 
 
-def summary(result: InspectionResult | None, counts: Counts) -> dict[str, Any]:
+def result_json(result: InspectionResult | None, counts: Counts) -> dict[str, Any]:
     """Keys as the command line promises; a run without a result has its counts, verdict uncertain and nulls."""
     head = {"received": counts.received, "judged": counts.judged, "rejected": counts.rejected, "lost": counts.lost}
     tail = {"rejected_by_reason": dict(counts.rejected_by_reason), "damaged_bytes": counts.damaged_bytes}
@@ -38,7 +38,7 @@ def summary(result: InspectionResult | None, counts: Counts) -> dict[str, Any]:
     }
 
 
-def identity(started: RunStarted) -> dict[str, Any]:
+def identity_json(started: RunStarted) -> dict[str, Any]:
     """What was measured, by whom and with what: the further keys of a run."""
     return {
         "part": started.part,

@@ -17,9 +17,9 @@ from cmmlink.events import RunStarted, Sink
 from cmmlink.from_plan import inspection_of
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan.scan import Plan
-from cmmlink.record.reader import recording
-from cmmlink.record.recorder import Basis, Evidence, Recorder
-from cmmlink.result_json import identity, summary
+from cmmlink.record.reader import open_to_record
+from cmmlink.record.recorder import Recorder, RecordReference, RunInputs
+from cmmlink.result_json import identity_json, result_json
 from inspection import NominalProfile, rehearse
 
 
@@ -30,7 +30,7 @@ class FinishedRun:
     profile: NominalProfile
     started: RunStarted
     outcome: RunOutcome
-    evidence: Evidence | None
+    evidence: RecordReference | None
 
     @property
     def title(self) -> str:
@@ -41,7 +41,7 @@ class FinishedRun:
     def result_json(self) -> dict[str, Any]:
         """The run as `--json` and result.json hold it."""
         evidence = asdict(self.evidence) if self.evidence else {}
-        return summary(self.outcome.result, self.outcome.counts) | identity(self.started) | evidence
+        return result_json(self.outcome.result, self.outcome.counts) | identity_json(self.started) | evidence
 
 
 def carry_out(
@@ -74,8 +74,8 @@ def carry_out(
     with ExitStack() as stack:
         recorder: Recorder | None = None
         if records is not None:
-            store = stack.enter_context(recording(records, now))
-            recorder = stack.enter_context(Recorder(store, Basis.of(plan), clock=clock, today=now))
+            store = stack.enter_context(open_to_record(records, now))
+            recorder = stack.enter_context(Recorder(store, RunInputs.of(plan), clock=clock, now=now))
         listeners: list[Sink] = [*([recorder] if recorder else []), *sinks]
         outcome = run_inspection(device.source, live, listeners, started, buffer_points=plan.buffer_points, clock=clock, stop=stop)
     return FinishedRun(profile, started, outcome, recorder.evidence if recorder else None)

@@ -10,38 +10,23 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cmmlink.events import Arrived, Counts, Ending, Event, Judged, RunStarted
 from cmmlink.extremes import DEVIATION, FOOT_X, NORMAL_X, STATION, VERDICT, ChangedBins, Extremes, PointsVersion
-from cmmlink.result_json import number, summary
+from cmmlink.result_json import number, result_json
 from cmmlink.run_state import LinkPhase, Phase, RegistrationState, RunState, VerdictState, WorstPoint, ZoneLimits
 from cmmlink.words import VERDICT_NAMES, VERDICT_WORDS
 from drivers import Heartbeat, LinkDown, PointBatch, ScanClosed, ScanOpened
-from inspection import LiveUpdate, NominalProfile, ToleranceZone, Verdict, coverage
+from inspection import JudgedRows, LiveUpdate, NominalProfile, ToleranceZone, Verdict, coverage
 
 _COUNTED = ("received", "judged", "rejected", "lost", "damaged_bytes", "rejected_by_reason")
 _RATE_OVER_S = 1.0
 _RATE_STEP_S = 0.05
 _COVERAGE_EVERY_S = 0.25
-
-
-class Rows(Protocol):
-    """The judged points of a result: what an InspectionResult has, and what the records keep of one."""
-
-    @property
-    def station_mm(self) -> NDArray[np.float64]: ...  # noqa: D102
-    @property
-    def deviation_mm(self) -> NDArray[np.float64]: ...  # noqa: D102
-    @property
-    def foot_mm(self) -> NDArray[np.float64]: ...  # noqa: D102
-    @property
-    def actual_mm(self) -> NDArray[np.float64]: ...  # noqa: D102
-    @property
-    def verdicts(self) -> NDArray[np.int8]: ...  # noqa: D102
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,7 +36,7 @@ class Ended:
     ending: Ending
     message: str
     result: Mapping[str, Any]
-    rows: Rows | None
+    rows: JudgedRows | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,7 +107,7 @@ class RunView:
         elif isinstance(event, Judged):
             self._take_verdicts(event)
         else:
-            self._end(Ended(event.ending, event.message, summary(event.result, event.counts), event.result), event.counts)
+            self._end(Ended(event.ending, event.message, result_json(event.result, event.counts), event.result), event.counts)
 
     def recall(self, started: RunStarted, ended: Ended) -> None:
         """Show a run as the records hold it."""

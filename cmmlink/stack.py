@@ -20,7 +20,7 @@ from cmmlink.nominal_files import load_nominal
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan.scan import Discretisation
 from cmmlink.plan.surface import CtPlan
-from cmmlink.result_json import summary
+from cmmlink.result_json import result_json
 from drivers.surface import (
     Contour,
     ContourSource,
@@ -62,7 +62,7 @@ class SectionOutcome:
         """Uncertain where nothing could be judged."""
         return self.run.result.verdict if self.run.result is not None else Verdict.UNCERTAIN
 
-    def facts(self) -> dict[str, Any]:
+    def result_json(self) -> dict[str, Any]:
         """The section as JSON holds it."""
         cut = self.slice
         return {
@@ -75,7 +75,7 @@ class SectionOutcome:
             "set_aside_longest_mm": float(cut.set_aside_mm[0]) if cut.set_aside else None,
             "cutter": cut.cutter,
             "nominal": str(self.nominal_file),
-            **summary(self.run.result, self.run.counts),
+            **result_json(self.run.result, self.run.counts),
             "warnings": list(self.warnings),
         }
 
@@ -100,16 +100,16 @@ class StackOutcome:
         worst = max(section.verdict for section in self.sections)
         return worst if self.complete else max(worst, Verdict.UNCERTAIN)
 
-    def facts(self) -> dict[str, Any]:
+    def result_json(self) -> dict[str, Any]:
         """The stack as JSON holds it."""
-        slices = [section.facts() for section in self.sections]
+        slices = [section.result_json() for section in self.sections]
         return {
             "verdict": self.verdict.word,
             "complete": self.complete,
             "mesh": self.mesh.source,
             "mesh_kind": self.mesh.kind,
             "triangles": self.mesh.triangles,
-            **{key: sum(facts[key] for facts in slices) for key in ("received", "judged", "rejected", "lost", "out_of_tolerance")},
+            **{key: sum(section[key] for section in slices) for key in ("received", "judged", "rejected", "lost", "out_of_tolerance")},
             "slices": slices,
             "notes": list(self.notes),
         }
@@ -260,8 +260,8 @@ def _inspect(plan: CtPlan, cut: SurfaceSection, profiles: _Profiles, clock: Call
     spacing_mm = profile.length_mm / _LEAST_POINTS
     judged = tuple(add_points_between(contour, spacing_mm) for contour in outline)
     other_part = _other_part(cut, outline, profile)
-    run = _refused(judged, other_part) if other_part else _run(plan, cut, judged, profile, clock, stop)
-    warnings = list(_all_warnings(cut, outline, run))
+    run = _refuse_outline(judged, other_part) if other_part else _run(plan, cut, judged, profile, clock, stop)
+    warnings = list(_warnings(cut, outline, run))
     if _points_in(judged) > _points_in(outline):
         warnings.append(f"a coarse surface: points were set between its corners, no farther apart than {spacing_mm:.3f} mm")
     return SectionOutcome(cut, judged, path, profile, run, tuple(warnings))
@@ -307,7 +307,7 @@ def _other_part(cut: SurfaceSection, outline: tuple[Contour, ...], profile: Nomi
     )
 
 
-def _refused(judged: tuple[Contour, ...], refusal: RegistrationError) -> RunOutcome:
+def _refuse_outline(judged: tuple[Contour, ...], refusal: RegistrationError) -> RunOutcome:
     count = _points_in(judged)
     counts = Counts(received=count, rejected=count, rejected_by_reason={"not registered": count})
     return RunOutcome("complete", None, counts, None, refusal)
@@ -325,7 +325,7 @@ def _outline(cut: SurfaceSection) -> tuple[Contour, ...]:
     return tuple(contour for contour in outer if not contour.closed)
 
 
-def _all_warnings(cut: SurfaceSection, outline: tuple[Contour, ...], run: RunOutcome) -> Iterator[str]:
+def _warnings(cut: SurfaceSection, outline: tuple[Contour, ...], run: RunOutcome) -> Iterator[str]:
     yield from cut.warnings
     beside = [contour for contour in cut.contours if not any(contour is part for part in outline)]
     if beside:

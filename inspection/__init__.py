@@ -15,7 +15,7 @@ from inspection.methods import Method
 from inspection.minimum_zone import MinimumZone, fit_minimum_zone
 from inspection.nominal import Material, NominalProfile, discretize
 from inspection.registration import Registration
-from inspection.result import NOT_JUDGED, InspectionResult, Rejection, Stretch, coverage
+from inspection.result import NOT_JUDGED, InspectionResult, JudgedRows, Rejection, Stretch, coverage
 from inspection.rigid import RigidTransform
 from inspection.section import SectionPlane
 from inspection.terms import FitName
@@ -27,6 +27,7 @@ __all__ = [
     "FitName",
     "InspectionError",
     "InspectionResult",
+    "JudgedRows",
     "LiveInspection",
     "LiveUpdate",
     "Material",

@@ -45,20 +45,15 @@ class Stretch:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class InspectionResult:
-    """The judged profile.
-
-    Arrays have a row for every received point; those of rejected points are NaN, their verdict NOT_JUDGED.
+class JudgedRows:
+    """A row for every received point, in the order of arrival; those of rejected points are NaN, their verdict NOT_JUDGED.
 
     actual_mm    : (m, 2) actual surface points in nominal coordinates (ball centres are already compensated)
     foot_mm      : (m, 2) the nominal points they are compared with
-    station_mm   : (m,)
+    station_mm   : (m,) arc length of the foot points
     deviation_mm : (m,) positive out of material
     verdicts     : (m,) codes of `Verdict`
     rejection    : (m,) codes of `Rejection`
-    verdict      : on the profile; not better than uncertain where the scan was incomplete or outliers were rejected
-    coverage     : share of the nominal's length that has points
-    complete     : the scan came to its end
     """
 
     actual_mm: Array
@@ -67,6 +62,30 @@ class InspectionResult:
     deviation_mm: Array
     verdicts: NDArray[np.int8]
     rejection: NDArray[np.int8]
+
+    def __post_init__(self) -> None:
+        pairs, columns = (self.actual_mm, self.foot_mm), (self.station_mm, self.deviation_mm, self.verdicts, self.rejection)
+        m = len(self.verdicts)
+        if any(array.shape != (m, 2) for array in pairs) or any(array.shape != (m,) for array in columns):
+            raise ValueError(f"expected ({m}, 2) twice and ({m},), got {[array.shape for array in (*pairs, *columns)]}")
+        for array in (*pairs, *columns):
+            array.setflags(write=False)
+
+    @property
+    def received(self) -> int:
+        """Points received; always judged + rejected."""
+        return len(self.verdicts)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class InspectionResult(JudgedRows):
+    """The judged profile: its rows, and what they say as a whole.
+
+    verdict  : on the profile; not better than uncertain where the scan was incomplete or outliers were rejected
+    coverage : share of the nominal's length that has points
+    complete : the scan came to its end
+    """
+
     verdict: Verdict
     coverage: float
     complete: bool
@@ -75,17 +94,6 @@ class InspectionResult:
     fit: str
     method: Method
     stretches: tuple[Stretch, ...]
-
-    def __post_init__(self) -> None:
-        for name in self.__slots__:
-            value = getattr(self, name)
-            if isinstance(value, np.ndarray):
-                value.setflags(write=False)
-
-    @property
-    def received(self) -> int:
-        """Points received; always judged + rejected."""
-        return len(self.verdicts)
 
     @property
     def judged(self) -> int:

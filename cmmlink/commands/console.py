@@ -113,7 +113,7 @@ def _section(plan: CtPlan, outcome: SectionOutcome, plan_name: str) -> Section:
     title = f"Section at height {height_mm:.3f} mm of {plan.mesh.file.name}"
     context = RunContext(title, plan_name, outcome.profile, plan.tolerance.zone, plan.registration.coverage_min, _BUFFER_POINTS, now())
     started = RunStarted(plan.part.name, plan.part.serial_number or "", "", plan.mesh.file.name, simulated=False)
-    ended = Ended(run.ending, str(run.refusal or ""), outcome.facts(), run.result)
+    ended = Ended(run.ending, str(run.refusal or ""), outcome.result_json(), run.result)
     return Section(height_mm, context, started, ended, outcome.warnings)
 
 

@@ -11,7 +11,7 @@ from cmmlink.commands.options import Json, Out, Records, RunName, records_folder
 from cmmlink.commands.output import now, print_json, terminal
 from cmmlink.devices import decoder_of
 from cmmlink.record.export import export_run
-from cmmlink.record.reader import check_chain, describe, find_run, list_runs, reading, recorded_run
+from cmmlink.record.reader import check_chain, describe, find_run, list_runs, open_to_read, recorded_run
 from cmmlink.record.replay import Replay
 from cmmlink.record.replay import replay as replay_run
 from cmmlink.report.folder import write_results
@@ -41,7 +41,7 @@ def runs(records: Records = None, as_json: Json = False) -> int:
 
 def show(name: RunName, records: Records = None, as_json: Json = False) -> int:
     """Show one recorded run."""
-    with reading(records_folder(records), now) as store:
+    with open_to_read(records_folder(records), now) as store:
         found = describe(store, find_run(store, name))
     if as_json:
         print_json(found)
@@ -65,7 +65,7 @@ def export(
     as_json: Json = False,
 ) -> int:
     """Write a recorded run as csv, npy, json and raw bytes."""
-    with reading(records_folder(records), now) as store:
+    with open_to_read(records_folder(records), now) as store:
         run_id = find_run(store, name)
         written = export_run(store, run_id, out)
     if as_json:
@@ -84,15 +84,15 @@ def replay(
     as_json: Json = False,
 ) -> int:
     """Evaluate a recorded run once more; with nothing changed the result is the same to the last bit."""
-    with reading(records_folder(records), now) as store:
+    with open_to_read(records_folder(records), now) as store:
         recorded = recorded_run(store, find_run(store, name))
         again = replay_run(store, recorded, decoder_of, tolerance=tolerance, method=method)
-    facts = again.facts | {"replay_of": recorded.run, "chain_sha256": recorded.chain_sha256, "identical": again.identical}
-    facts |= {"changed": [asdict(change) for change in again.changed], "differs": [asdict(change) for change in again.differs]}
+    document = again.result_json | {"replay_of": recorded.run, "chain_sha256": recorded.chain_sha256, "identical": again.identical}
+    document |= {"changed": [asdict(change) for change in again.changed], "differs": [asdict(change) for change in again.differs]}
     if out is not None:
-        write_results(out, facts, again.outcome.result, again.profile, f"{recorded.header['part']}, run {recorded.run} replayed")
+        write_results(out, document, again.outcome.result, again.profile, f"{recorded.header['part']}, run {recorded.run} replayed")
     if as_json:
-        print_json(facts)
+        print_json(document)
     else:
         _print_replay(again, recorded.run)
     if again.identical is False and not again.changed:
@@ -118,7 +118,7 @@ def verify(
     as_json: Json = False,
 ) -> int:
     """Recompute the hash chain and name the first record that was altered."""
-    with reading(records_folder(records), now, close_interrupted=False) as store:
+    with open_to_read(records_folder(records), now, close_interrupted=False) as store:
         found = check_chain(store, find_run(store, name) if name else None)
     if as_json:
         print_json(found)

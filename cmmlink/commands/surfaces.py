@@ -97,7 +97,7 @@ def ct(
 ) -> int:
     """Inspect sections of a CT surface."""
     if mesh.suffix.lower() in (".yaml", ".yml"):
-        beside = [name for name in _given_options(context) if name not in ("mesh", "out", "as_json", "pictures")]
+        beside = [name for name in _options_given(context) if name not in ("mesh", "out", "as_json", "pictures")]
         if beside:
             raise PlanError(f"{mesh}: --{beside[0].replace('_', '-')} stands beside a plan, which says it all itself: set it in the plan")
         return _inspect_stack(load_ct_plan(mesh), Output(False, as_json, out), pictures)
@@ -143,7 +143,7 @@ def _inspect_stack(plan: CtPlan, output: Output, pictures: bool) -> int:
                 write_stack(folder, stack, plan.tolerance.zone, plan.part.name, pictures=pictures, on_section=done)
     finally:
         if output.as_json:
-            print_json(stack.facts())
+            print_json(stack.result_json())
         else:
             _print_stack(terminal(), stack)
     if folder is not None and not output.as_json:
@@ -162,7 +162,7 @@ def _own_nominals(texts: Sequence[str]) -> list[dict[str, object]]:
     return own
 
 
-def _given_options(context: typer.Context) -> list[str]:
+def _options_given(context: typer.Context) -> list[str]:
     """Names of the parameters that stand on the command line."""
     sources = {name: context.get_parameter_source(name) for name in context.params}
     return [name for name, source in sources.items() if source is not None and source.name == "COMMANDLINE"]
@@ -192,14 +192,14 @@ class _SectionBar:
 
 def _print_stack(console: Console, stack: StackOutcome) -> None:
     """Print the verdict, a line for each section, and what was not as it should be."""
-    facts = stack.facts()
+    counts = stack.result_json()
     cutters = ", ".join(sorted({section.slice.cutter for section in stack.sections}))
     missing = "" if stack.complete else f" of {stack.asked}"
     console.print(
         f"[{STYLES[stack.verdict]}]{VERDICT_WORDS[stack.verdict]}[/]  {len(stack.sections)}{missing} sections of {stack.mesh.source}"
     )
     console.print(f"{stack.mesh.triangles} triangles ({stack.mesh.kind}), cut by {cutters}")
-    console.print(f"received {facts['received']} = judged {facts['judged']} + rejected {facts['rejected']}; lost {facts['lost']}")
+    console.print(f"received {counts['received']} = judged {counts['judged']} + rejected {counts['rejected']}; lost {counts['lost']}")
     console.print(
         f"{'height mm':>11}  {'verdict':11}  {'lowest':>7}  {'highest':>7}  {'rms':>6}  {'out':>5}  {'worst at':>8}  covered  aside"
     )

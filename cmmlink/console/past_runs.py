@@ -15,16 +15,15 @@ from cmmlink.events import Counts, RunStarted, Sink
 from cmmlink.plan.scan import Device, Plan
 from cmmlink.record.bodies import unpack_document, unpack_judged
 from cmmlink.record.export import export_run as export_files
-from cmmlink.record.reader import find_run, list_runs, reading, recorded_run
+from cmmlink.record.reader import find_run, list_runs, open_to_read, recorded_run
 from cmmlink.record.replay import Replay, recorded_plan, recorded_profile, replay
 from cmmlink.record.store import Store
-from cmmlink.result_json import summary
+from cmmlink.result_json import result_json
 from cmmlink.run_view import Ended
 from drivers import Decoder
 from inspection import NominalProfile
 
 _MOST_LISTED = 500
-_STARTED = ("part", "serial_number", "operator", "device", "simulated")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,36 +56,37 @@ class PastRuns:
         entries = list_runs(self.folder, self.today)[::-1][:_MOST_LISTED]
         unknown = [entry for entry in entries if entry["run"] not in self._known]
         if unknown:
-            with reading(self.folder, self.today) as store:
+            with open_to_read(self.folder, self.today) as store:
                 self._known.update((entry["run"], _line(entry, _facts(store, entry["run"]))) for entry in unknown)
         return [self._known[entry["run"]] for entry in entries]
 
     def open_run(self, run: str) -> OpenedRun:
         """Give one run as it was recorded. Raises StoreError, RunError."""
-        with reading(self.folder, self.today) as store:
+        with open_to_read(self.folder, self.today) as store:
             recorded = recorded_run(store, find_run(store, run))
             bodies = [record.body for record in store.records(recorded.run, "deviations")]
         end = recorded.end or {"state": "interrupted", "message": "the run is being recorded", "received": 0}
         received = end["received"] or 0
-        facts = recorded.facts or summary(None, Counts(received=received, rejected=received, rejected_by_reason={"not judged": received}))
+        counts = Counts(received=received, rejected=received, rejected_by_reason={"not judged": received})
+        result = recorded.result or result_json(None, counts)
         return OpenedRun(
             recorded.run,
             plan := recorded_plan(recorded),
             recorded_profile(plan, recorded),
             datetime.fromisoformat(recorded.header["started"]),
-            RunStarted(*(recorded.header[key] for key in _STARTED)),
-            Ended(end["state"], end["message"], facts, unpack_judged(bodies) if bodies else None),
+            RunStarted.from_header(recorded.header),
+            Ended(end["state"], end["message"], result, unpack_judged(bodies) if bodies else None),
         )
 
     def replay_run(self, run: str, sinks: Sequence[Sink], stop: threading.Event) -> str:
         """Measure a run again from its record; say whether the result is identical. Raises StoreError, RunError, PlanError."""
-        with reading(self.folder, self.today) as store:
+        with open_to_read(self.folder, self.today) as store:
             recorded = recorded_run(store, find_run(store, run))
-            return _compared(replay(store, recorded, self.decoder_of, clock=self.clock, sinks=sinks, stop=stop), recorded.run)
+            return _compare(replay(store, recorded, self.decoder_of, clock=self.clock, sinks=sinks, stop=stop), recorded.run)
 
     def export_run(self, run: str, folder: Path) -> Path:
         """Write one run as a zip archive into a folder. Raises StoreError, RunError, PlanError."""
-        with tempfile.TemporaryDirectory(dir=folder) as files, reading(self.folder, self.today) as store:
+        with tempfile.TemporaryDirectory(dir=folder) as files, open_to_read(self.folder, self.today) as store:
             run = find_run(store, run)
             export_files(store, run, Path(files))
             return Path(shutil.make_archive(str(folder / run), "zip", files))
@@ -117,7 +117,7 @@ def _line(entry: dict[str, Any], facts: dict[str, Any]) -> RunRow:
     )
 
 
-def _compared(again: Replay, run: str) -> str:
+def _compare(again: Replay, run: str) -> str:
     changed = f"; changed since: {', '.join(change.key for change in again.changed)}" if again.changed else ""
     if again.identical is None:
         return f"Replay of run {run}, which has no recorded result to compare with{changed}"

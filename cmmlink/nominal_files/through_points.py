@@ -36,14 +36,14 @@ def through_points(points_mm: Array, lines: Lines, closed: bool | None, source_f
     ends = "the last point repeats the first" if repeats else f"a gap of {gap:.6g} mm from last to first point"
     asked = "" if closed is repeats or closed is None else ", as asked"
     if repeats if closed is None else closed:
-        curve, seam = _closed(distinct, repeats)
+        curve, seam = _close(distinct, repeats)
         note = f"closed{asked}: {ends}, {seam}"
     else:
         curve, note = NurbsCurve.interpolate(points_mm, _DEGREE), f"open{asked}: {ends}"
-    return NominalFile(curve, source_format, (*notes, note, *_rounded_corners(distinct, lines)))
+    return NominalFile(curve, source_format, (*notes, note, *_notes_on_corners(distinct, lines)))
 
 
-def _closed(points: Array, repeats: bool) -> tuple[NurbsCurve, str]:
+def _close(points: Array, repeats: bool) -> tuple[NurbsCurve, str]:
     """Close the curve through different points (m, 2), and say what was made of its seam."""
     turn, sharp = _sharp_turns(points)
     if repeats and sharp[0]:
@@ -79,7 +79,7 @@ def _sharp_turns(points: Array) -> tuple[Array, NDArray[np.bool_]]:
     return turn, (turn > _SHARP_DEG) & (turn > _ABOVE_NEIGHBOURS * beside)
 
 
-def _rounded_corners(points: Array, lines: Lines) -> list[str]:
+def _notes_on_corners(points: Array, lines: Lines) -> list[str]:
     """Note the sharp turns between the ends, which the interpolating cubic cannot keep."""
     turn, sharp = _sharp_turns(points)
     return [

@@ -55,7 +55,7 @@ def groups_of(model: type[BaseModel], mode: str = "validation") -> tuple[Group, 
                     inner.setdefault(definition, []).append(place)
         places |= {definition: ", ".join(beside) for definition, beside in inner.items()}
         keys = tuple(_key(name, key, name in mapping.get("required", ()), places) for name, key in mapping["properties"].items())
-        found.append(Group(path, _joined(mapping.get("description", "")), keys))
+        found.append(Group(path, _join_lines(mapping.get("description", "")), keys))
         waiting = [(places[definition], definitions[definition]) for definition in inner] + waiting
     return tuple(found)
 
@@ -85,7 +85,7 @@ def _mappings(path: str, key: Mapping[str, Any], definitions: Mapping[str, Any])
 
 def _key(name: str, key: Mapping[str, Any], required: bool, places: Mapping[str, str]) -> Key:
     takes = " or ".join(dict.fromkeys(_takes(choice, places) for choice in _choices(key))).replace(" or a mapping, see ", " or ")
-    return Key(name, takes, REQUIRED if required else _default(key), _joined(key.get("description", "")))
+    return Key(name, takes, REQUIRED if required else _default(key), _join_lines(key.get("description", "")))
 
 
 def _choices(key: Mapping[str, Any]) -> list[Mapping[str, Any]]:
@@ -155,7 +155,7 @@ def _definition(choice: Mapping[str, Any]) -> str:
     return str(choice["$ref"]).rpartition("/")[2]
 
 
-def _joined(text: str) -> str:
+def _join_lines(text: str) -> str:
     return " ".join(text.split())
 
 

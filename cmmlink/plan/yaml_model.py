@@ -57,7 +57,7 @@ def read_model(text: str, model: type[Model]) -> Model:
     except ValidationError as failure:
         # A misspelt key first: the same slip makes another key missing.
         errors = sorted(failure.errors(), key=lambda error: error["type"] != "extra_forbidden")
-        problems = [_explained(error, document, model) for error in errors]
+        problems = [_explain(error, document, model) for error in errors]
     line, message = problems[0]
     others = f" (and {len(problems) - 1} more after this one)" if len(problems) > 1 else ""
     raise YamlError(f"line {line}: {message}{others}")
@@ -95,7 +95,7 @@ def _read(text: str) -> _Document:
     except yaml.YAMLError as error:
         raise YamlError(f"not valid YAML: {str(error).splitlines()[0]}") from None
     if not isinstance(document.value, dict):
-        found = "nothing" if document.value is None else _shortened(document.value)
+        found = "nothing" if document.value is None else _shorten(document.value)
         raise YamlError(f"line {document.lines.get((), 1)}: found {found}; expected keys with values, like 'part: ...'")
     return document
 
@@ -127,7 +127,7 @@ def _mapping(events: Iterator[yaml.Event], path: Path, document: _Document) -> d
             _refuse(event, "a key must be a single word")
         key = str(event.value)
         if key in mapping:
-            _refuse(event, f"{_dotted((*path, key))} is given twice, first on line {document.lines[(*path, key)]}")
+            _refuse(event, f"{_key_text((*path, key))} is given twice, first on line {document.lines[(*path, key)]}")
         document.lines[(*path, key)] = _line(event)
         mapping[key] = _node(next(events), events, (*path, key), document)
     return mapping
@@ -141,11 +141,11 @@ def _refuse(event: yaml.Event, problem: str) -> NoReturn:
     raise YamlError(f"line {_line(event)}: {problem}")
 
 
-def _explained(error: ErrorDetails, document: _Document, model: type[BaseModel]) -> tuple[int, str]:
+def _explain(error: ErrorDetails, document: _Document, model: type[BaseModel]) -> tuple[int, str]:
     """Line and message for one complaint of pydantic's."""
     path, owner = _place(error["loc"], document, model)
     line = document.lines.get(path) or document.lines.get(path[:-1]) or 1
-    key, found = _dotted(path), _shortened(error["input"])
+    key, found = _key_text(path), _shorten(error["input"])
     kind = error["type"]
     if kind == "extra_forbidden":
         return line, f"{key} is not a known key;{_did_you_mean(str(path[-1]), _keys(owner))}"
@@ -153,12 +153,12 @@ def _explained(error: ErrorDetails, document: _Document, model: type[BaseModel])
         return line, f"{key} is missing: expected {_meaning(owner, str(path[-1]))}"
     if kind in ("union_tag_not_found", "union_tag_invalid"):
         tag = error["input"].get("type") if isinstance(error["input"], dict) else None
-        problem = f"is {_shortened(tag)};" if tag else "is missing;"
+        problem = f"is {_shorten(tag)};" if tag else "is missing;"
         return document.lines.get((*path, "type"), line), f"{key}.type {problem}{_did_you_mean(str(tag), _tags(owner, path))}"
-    return line, f"{key} is {found}; expected {_allowed(error, owner, path)}"
+    return line, f"{key} is {found}; expected {_expectation(error, owner, path)}"
 
 
-def _allowed(error: ErrorDetails, owner: type[BaseModel] | None, path: Path) -> str:
+def _expectation(error: ErrorDetails, owner: type[BaseModel] | None, path: Path) -> str:
     """Say what the model takes at a key, in our words where pydantic speaks of Python."""
     kind = error["type"]
     if kind in ("model_type", "model_attributes_type"):
@@ -225,12 +225,12 @@ def _did_you_mean(word: str, allowed: list[str]) -> str:
     return (f" did you mean {close[0]}?" if close else "") + f" Allowed: {', '.join(allowed)}"
 
 
-def _dotted(path: Path) -> str:
+def _key_text(path: Path) -> str:
     """Spell a path as device.address or knots[3]."""
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".") or "the text"
 
 
-def _shortened(value: Any) -> str:
+def _shorten(value: Any) -> str:
     if value is None:
         return "empty"
     if isinstance(value, dict):

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from cmmlink.errors import StoreError
 from drivers import Arrival, PointBatch, WireBytes
-from inspection import InspectionResult
+from inspection import JudgedRows
 
 POINT_BYTES = 40
 _JUDGED_BYTES = 50
@@ -26,30 +26,13 @@ _ARRIVALS = {kind.__name__: kind for kind in get_args(Arrival)}
 
 
 @dataclass(frozen=True, slots=True)
-class Moment:
+class PlacedArrival:
     """An arrival other than bytes and points, and where it stands: after so many reads and so many points of the run."""
 
     time_s: float
     reads: int
     points: int
     arrival: Arrival
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class JudgedRows:
-    """The rows of a result as recorded; see InspectionResult for their meaning."""
-
-    actual_mm: NDArray[np.float64]
-    foot_mm: NDArray[np.float64]
-    station_mm: NDArray[np.float64]
-    deviation_mm: NDArray[np.float64]
-    verdicts: NDArray[np.int8]
-    rejection: NDArray[np.int8]
-
-    @property
-    def received(self) -> int:
-        """Number of rows."""
-        return len(self.verdicts)
 
 
 def pack_document(document: object) -> bytes:
@@ -103,7 +86,7 @@ def unpack_points(body: bytes) -> PointBatch:
     return PointBatch(sequence, time_s, points.reshape(count, 3))
 
 
-def pack_moments(moments: Iterable[Moment]) -> bytes:
+def pack_arrivals(moments: Iterable[PlacedArrival]) -> bytes:
     """Pack arrivals with their place."""
     return pack_document(
         [
@@ -119,18 +102,18 @@ def pack_moments(moments: Iterable[Moment]) -> bytes:
     )
 
 
-def unpack_moments(body: bytes) -> list[Moment]:
+def unpack_arrivals(body: bytes) -> list[PlacedArrival]:
     """Unpack arrivals. Raises StoreError for an arrival that this version does not know."""
-    return [_moment(entry) for entry in unpack_document(body)]
+    return [_placed_arrival(entry) for entry in unpack_document(body)]
 
 
-def _moment(entry: dict[str, Any]) -> Moment:
+def _placed_arrival(entry: dict[str, Any]) -> PlacedArrival:
     if entry["event"] not in _ARRIVALS:
         raise StoreError(f"the record holds an event {entry['event']!r} that this version of cmmlink does not know")
-    return Moment(entry["time_s"], entry["reads"], entry["points"], _ARRIVALS[entry["event"]](**entry["values"]))
+    return PlacedArrival(entry["time_s"], entry["reads"], entry["points"], _ARRIVALS[entry["event"]](**entry["values"]))
 
 
-def pack_judged(result: InspectionResult | JudgedRows) -> Iterator[tuple[int, bytes]]:
+def pack_judged(result: JudgedRows) -> Iterator[tuple[int, bytes]]:
     """Pack the rows of a result into bodies; gives the number of rows with each."""
     floats = (result.actual_mm, result.foot_mm, result.station_mm, result.deviation_mm)
     for first in range(0, result.received, _JUDGED_ROWS):
@@ -142,13 +125,13 @@ def pack_judged(result: InspectionResult | JudgedRows) -> Iterator[tuple[int, by
 
 def unpack_judged(bodies: Iterable[bytes]) -> JudgedRows:
     """Unpack the rows of a result from all its bodies."""
-    parts = [_judged(body) for body in bodies]
+    parts = [_unpack_rows(body) for body in bodies]
     if not parts:
-        return _judged(b"")
+        return _unpack_rows(b"")
     return JudgedRows(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in dataclasses.fields(JudgedRows)))
 
 
-def _judged(body: bytes) -> JudgedRows:
+def _unpack_rows(body: bytes) -> JudgedRows:
     count, rest = divmod(len(body), _JUDGED_BYTES)
     if rest:
         raise StoreError(f"a record of deviations has {len(body)} bytes, no multiple of {_JUDGED_BYTES}")

@@ -53,7 +53,7 @@ class Alteration:
         return f"record {self.number}{kind}: {self.problem}"
 
 
-def chained(draft: Draft, number: int, time_s: float, previous: bytes) -> Record:
+def chain_record(draft: Draft, number: int, time_s: float, previous: bytes) -> Record:
     """Give a draft its place in the chain."""
     sha256 = _sha256(number, draft.run, draft.kind, time_s, draft.count, draft.body, previous)
     return Record(number, draft.run, draft.kind, time_s, draft.count, draft.body, crc32(draft.body), sha256)

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from cmmlink.deviations_csv import write_deviations
 from cmmlink.errors import PlanError
 from cmmlink.record.bodies import unpack_judged
-from cmmlink.record.reader import describe, event_document, moments_of, points_of, reads_of, recorded_run
+from cmmlink.record.reader import arrivals_of, describe, event_document, points_of, reads_of, recorded_run
 from cmmlink.record.store import Store
-from cmmlink.report.deviations_csv import write_deviations
 
 POINT_COLUMNS = {
     "sequence": "the device's own counter of the point, unwrapped",
@@ -47,7 +47,7 @@ def _documents(store: Store, run: str, folder: Path) -> list[Path]:
     nominal.write_bytes(recorded.nominal)
     plan = folder / "plan.yaml"
     plan.write_bytes(recorded.plan.encode())
-    events = [event_document(moment) for moment in moments_of(store, run)]
+    events = [event_document(moment) for moment in arrivals_of(store, run)]
     return [nominal, plan, _json(folder / "run.json", describe(store, run)), _json(folder / "events.json", events)]
 
 
@@ -75,12 +75,12 @@ def _wire(store: Store, run: str, folder: Path) -> list[Path]:
 
 
 def _result(store: Store, run: str, folder: Path) -> list[Path]:
-    facts = recorded_run(store, run).facts
-    if facts is None:
+    result = recorded_run(store, run).result
+    if result is None:
         return []
     rows = unpack_judged(record.body for record in store.records(run, "deviations"))
     write_deviations(rows, folder / "deviations.csv")
-    return [folder / "deviations.csv", _json(folder / "result.json", facts)]
+    return [folder / "deviations.csv", _json(folder / "result.json", result)]
 
 
 def _json(path: Path, document: Any) -> Path:

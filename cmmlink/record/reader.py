@@ -15,7 +15,7 @@ from typing import Any
 from platformdirs import user_data_path
 
 from cmmlink.errors import RunError, StoreError
-from cmmlink.record.bodies import Moment, unpack_document, unpack_moments, unpack_points, unpack_reads
+from cmmlink.record.bodies import PlacedArrival, unpack_arrivals, unpack_document, unpack_points, unpack_reads
 from cmmlink.record.chain import Record, is_damaged
 from cmmlink.record.recorder import end_draft
 from cmmlink.record.store import FILE_NAME, Store
@@ -26,13 +26,13 @@ _CUT_OFF = "the program ended before the run did: power failure, crash or kill"
 
 @dataclass(frozen=True, slots=True)
 class RecordedRun:
-    """One run as it is kept. `end` is None while it is being recorded, `facts` where no result was reached."""
+    """One run as it is kept. `end` is None while it is being recorded, `result` where no result was reached."""
 
     header: dict[str, Any]
     plan: str
     nominal: bytes
     end: dict[str, Any] | None
-    facts: dict[str, Any] | None
+    result: dict[str, Any] | None
     chain_sha256: str
 
     @property
@@ -47,38 +47,38 @@ def default_folder() -> Path:
 
 
 @contextmanager
-def recording(folder: Path, today: Callable[[], datetime]) -> Iterator[Store]:
+def open_to_record(folder: Path, now: Callable[[], datetime]) -> Iterator[Store]:
     """Open the records to add a run. Raises StoreError when another process does so."""
-    with Store(folder, writing=True, now=lambda: today().timestamp()) as store:
-        _close_interrupted(store, today)
+    with Store(folder, writing=True, epoch_s=lambda: now().timestamp()) as store:
+        _close_interrupted(store, now)
         yield store
 
 
 @contextmanager
-def reading(folder: Path, today: Callable[[], datetime], *, close_interrupted: bool = True) -> Iterator[Store]:
+def open_to_read(folder: Path, now: Callable[[], datetime], *, close_interrupted: bool = True) -> Iterator[Store]:
     """Open the records to read them. Raises RunError where there are none."""
     if not (folder / FILE_NAME).is_file():
         raise RunError(f"{folder}: there are no records here; --records DIR says where they are")
-    with Store(folder, writing=False, now=lambda: today().timestamp()) as store:
+    with Store(folder, writing=False, epoch_s=lambda: now().timestamp()) as store:
         unfinished = any(end is None for _, end in store.begins_and_ends())
     if unfinished and close_interrupted:
         try:
-            with recording(folder, today):
+            with open_to_record(folder, now):
                 pass
         except StoreError:  # it is being recorded just now, or the medium is write-protected: the run stays open
             pass
-    with Store(folder, writing=False, now=lambda: today().timestamp()) as store:
+    with Store(folder, writing=False, epoch_s=lambda: now().timestamp()) as store:
         yield store
 
 
-def list_runs(folder: Path, today: Callable[[], datetime]) -> list[dict[str, Any]]:
+def list_runs(folder: Path, now: Callable[[], datetime]) -> list[dict[str, Any]]:
     """Every run, oldest first: run, started, part, serial_number, state, received, verdict; none where nothing was recorded yet.
 
     The state of a run that another process records just now is "running".
     """
     if not (folder / FILE_NAME).is_file():
         return []
-    with reading(folder, today) as store:
+    with open_to_read(folder, now) as store:
         return [_entry(begin, end) for begin, end in store.begins_and_ends()]
 
 
@@ -118,10 +118,10 @@ def points_of(store: Store, run: str) -> Iterator[PointBatch]:
         yield unpack_points(record.body)
 
 
-def moments_of(store: Store, run: str) -> Iterator[Moment]:
+def arrivals_of(store: Store, run: str) -> Iterator[PlacedArrival]:
     """Every other arrival, in order."""
     for record in store.records(run, "events"):
-        yield from unpack_moments(record.body)
+        yield from unpack_arrivals(record.body)
 
 
 def registrations_of(store: Store, run: str) -> list[dict[str, Any]]:
@@ -133,12 +133,12 @@ def describe(store: Store, run: str) -> dict[str, Any]:
     """Give all there is to know of a run but its points, as plain values."""
     recorded = recorded_run(store, run)
     end = recorded.end or {"state": "running", "message": "", "received": None, "verdict": None}
-    moments = list(moments_of(store, run))
+    moments = list(arrivals_of(store, run))
     totals = store.totals(run)
     return {
         **recorded.header,
         **{key: end.get(key) for key in ("state", "ended", "message", "received", "verdict")},
-        "result": recorded.facts,
+        "result": recorded.result,
         "chain_sha256": recorded.chain_sha256,
         "recorded": {
             "wire_bytes": sum(len(read.data) for read in reads_of(store, run)),
@@ -153,7 +153,7 @@ def describe(store: Store, run: str) -> dict[str, Any]:
     }
 
 
-def event_document(moment: Moment) -> dict[str, Any]:
+def event_document(moment: PlacedArrival) -> dict[str, Any]:
     """Spell an arrival with its place as plain values."""
     place = {"event": type(moment.arrival).__name__, "time_s": moment.time_s, "after_points": moment.points}
     return place | dataclasses.asdict(moment.arrival)
@@ -179,16 +179,16 @@ def _entry(begin: Record, end: Record | None) -> dict[str, Any]:
     return entry | {key: closing.get(key) for key in ("state", "received", "verdict")}
 
 
-def _close_interrupted(store: Store, today: Callable[[], datetime]) -> None:
+def _close_interrupted(store: Store, now: Callable[[], datetime]) -> None:
     for begin, end in store.begins_and_ends():
         if end is None:
-            store.append([end_draft(begin.run, "interrupted", _CUT_OFF, today(), {"received": _received(store, begin.run)})])
+            store.append([end_draft(begin.run, "interrupted", _CUT_OFF, now(), {"received": _count_received(store, begin.run)})])
 
 
-def _received(store: Store, run: str) -> int | None:
+def _count_received(store: Store, run: str) -> int | None:
     """Points of a run that was cut off, None where a damaged record hides their number."""
     try:
-        rejected = sum(moment.arrival.count for moment in moments_of(store, run) if isinstance(moment.arrival, Rejected))
+        rejected = sum(moment.arrival.count for moment in arrivals_of(store, run) if isinstance(moment.arrival, Rejected))
         return rejected + sum(len(batch) for batch in points_of(store, run))
     except StoreError:
         return None

@@ -15,16 +15,16 @@ from importlib import metadata
 from typing import Any
 
 from cmmlink import __version__
-from cmmlink.buffer import HandOver
+from cmmlink.buffer import Buffer
 from cmmlink.errors import PlanError, StoreError
 from cmmlink.events import Arrived, Event, Judged, RunFinished, RunStarted
 from cmmlink.plan.scan import Plan, with_own_maps
-from cmmlink.record.bodies import Moment, pack_document, pack_judged, pack_moments, pack_points, pack_reads
+from cmmlink.record.bodies import PlacedArrival, pack_arrivals, pack_document, pack_judged, pack_points, pack_reads
 from cmmlink.record.chain import Draft, Kind
 from cmmlink.record.store import Store
-from cmmlink.result_json import number, summary
+from cmmlink.result_json import number, result_json
 from drivers import PointBatch, Rejected, WireBytes, load_map
-from inspection import InspectionResult
+from inspection import JudgedRows
 
 COMMIT_S = 0.1
 CHUNK_POINTS = 1000
@@ -34,7 +34,7 @@ _POSE_S = 0.1  # the pose of a registration that still moves is noted this often
 
 
 @dataclass(frozen=True, slots=True)
-class Basis:
+class RunInputs:
     """What a run rests on, kept with it whole: the effective plan as YAML, the nominal's file, and the software."""
 
     plan: str
@@ -43,7 +43,7 @@ class Basis:
     software: Mapping[str, str]
 
     @classmethod
-    def of(cls, plan: Plan) -> "Basis":
+    def of(cls, plan: Plan) -> "RunInputs":
         """What a plan rests on at this moment. Register maps of the user's own become part of the plan. Raises PlanError.
 
         A map is kept as it was understood, every default filled in: how its file spells it may read otherwise another day.
@@ -57,7 +57,7 @@ class Basis:
 
 
 @dataclass(frozen=True, slots=True)
-class Evidence:
+class RecordReference:
     """What ties a result file to its record."""
 
     run: str
@@ -88,10 +88,10 @@ def software() -> dict[str, str]:
     return system | {package: metadata.version(package) for package in ("numpy", "scipy", "numba")}
 
 
-def result_sha256(facts: Mapping[str, Any], result: InspectionResult | None) -> str:
+def result_sha256(result: Mapping[str, Any], rows: JudgedRows | None) -> str:
     """Hash of everything a result says, every deviation to the last bit."""
-    digest = hashlib.sha256(pack_document(facts))
-    for _, body in pack_judged(result) if result is not None else ():
+    digest = hashlib.sha256(pack_document(result))
+    for _, body in pack_judged(rows) if rows is not None else ():
         digest.update(body)
     return digest.hexdigest()
 
@@ -102,20 +102,20 @@ class Recorder:
     def __init__(
         self,
         store: Store,
-        basis: Basis,
+        inputs: RunInputs,
         *,
         clock: Callable[[], float],
-        today: Callable[[], datetime],
+        now: Callable[[], datetime],
         commit_s: float = COMMIT_S,
         queue_bytes: int = QUEUE_BYTES,
         acknowledge: Callable[[Acknowledged], None] = lambda _: None,
     ) -> None:
-        """`clock` is the run's; `today` gives date and time of day; the writer's thread calls `acknowledge` after every commit."""
+        """`clock` is the run's; `now` gives date and time of day; the writer's thread calls `acknowledge` after every commit."""
         self.run = ""
-        self.evidence: Evidence | None = None
-        self._store, self._basis, self._clock, self._today = store, basis, clock, today
+        self.evidence: RecordReference | None = None
+        self._store, self._inputs, self._clock, self._now = store, inputs, clock, now
         self._commit_s, self._acknowledge = commit_s, acknowledge
-        self._queue: HandOver[Arrived | _Pose] = HandOver(queue_bytes)
+        self._queue: Buffer[Arrived | _Pose] = Buffer(queue_bytes)
         self._pack = _Packing()
         self._last_pose: tuple[str, float] = ("", float("-inf"))
         self._closing = threading.Event()
@@ -145,26 +145,26 @@ class Recorder:
             self._store.append([self._end_draft("interrupted", f"the program failed: {error!r}", self._pack.counts())])
 
     def _begin(self, started: RunStarted) -> None:
-        today, basis = self._today(), self._basis
-        self.run = f"{today:%Y%m%d-%H%M%S}-{len(self._store.begins_and_ends()) + 1:04d}"
-        plan = basis.plan.encode()
+        began, inputs = self._now(), self._inputs
+        self.run = f"{began:%Y%m%d-%H%M%S}-{len(self._store.begins_and_ends()) + 1:04d}"
+        plan = inputs.plan.encode()
         header = {
             "run": self.run,
-            "started": today.isoformat(timespec="milliseconds"),
+            "started": began.isoformat(timespec="milliseconds"),
             "clock_s": self._clock(),
             **asdict(started),
-            "software": dict(basis.software),
+            "software": dict(inputs.software),
             "plan_sha256": hashlib.sha256(plan).hexdigest(),
-            "nominal": basis.nominal_name,
-            "nominal_sha256": hashlib.sha256(basis.nominal).hexdigest(),
+            "nominal": inputs.nominal_name,
+            "nominal_sha256": hashlib.sha256(inputs.nominal).hexdigest(),
         }
-        self._store.append([self._draft("run", pack_document(header)), self._draft("plan", plan), self._draft("nominal", basis.nominal)])
+        self._store.append([self._draft("run", pack_document(header)), self._draft("plan", plan), self._draft("nominal", inputs.nominal)])
         self._writer = threading.Thread(target=self._write, name="record", daemon=True)
         self._writer.start()
 
     def _hand(self, item: "Arrived | _Pose", size: int) -> None:
         if not self._queue.give(item, size):
-            raise self._stopped()
+            raise self._no_record()
 
     def _note_pose(self, event: Judged) -> None:
         """Note where the registration stands when its state changes, and now and then while it moves."""
@@ -189,23 +189,23 @@ class Recorder:
     def _end(self, finished: RunFinished) -> None:
         self._stop_writing()
         if self._failure is not None:
-            raise self._stopped()
-        facts = summary(finished.result, finished.counts)
-        sha256 = result_sha256(facts, finished.result)
+            raise self._no_record()
+        result = result_json(finished.result, finished.counts)
+        sha256 = result_sha256(result, finished.result)
         drafts = [self._draft("deviations", body, count) for count, body in (pack_judged(finished.result) if finished.result else ())]
-        drafts.append(self._draft("result", pack_document(facts)))
-        drafts.append(self._end_draft(finished.ending, finished.message, facts, sha256))
+        drafts.append(self._draft("result", pack_document(result)))
+        drafts.append(self._end_draft(finished.ending, finished.message, result, sha256))
         try:
             end = self._store.append(drafts)[-1]
         except StoreError as error:
             self._failure = error
-            raise self._stopped() from error
-        plan_sha256 = hashlib.sha256(self._basis.plan.encode()).hexdigest()
-        nominal_sha256 = hashlib.sha256(self._basis.nominal).hexdigest()
-        self.evidence = Evidence(self.run, end.sha256.hex(), plan_sha256, nominal_sha256, self._basis.software)
+            raise self._no_record() from error
+        plan_sha256 = hashlib.sha256(self._inputs.plan.encode()).hexdigest()
+        nominal_sha256 = hashlib.sha256(self._inputs.nominal).hexdigest()
+        self.evidence = RecordReference(self.run, end.sha256.hex(), plan_sha256, nominal_sha256, self._inputs.software)
 
-    def _end_draft(self, state: str, message: str, facts: Mapping[str, Any], sha256: str = "") -> Draft:
-        return end_draft(self.run, state, message, self._today(), facts, sha256)
+    def _end_draft(self, state: str, message: str, result: Mapping[str, Any], sha256: str = "") -> Draft:
+        return end_draft(self.run, state, message, self._now(), result, sha256)
 
     def _stop_writing(self) -> None:
         """Let the writer commit all that waits, and end."""
@@ -214,7 +214,7 @@ class Recorder:
             self._writer.join()
             self._writer = None
 
-    def _stopped(self) -> StoreError:
+    def _no_record(self) -> StoreError:
         safe = f"{self._pack.acknowledged.points} points are safe in run {self.run}"
         return StoreError(f"the record of this run cannot be kept, so it has no result; {safe}. {self._failure}")
 
@@ -252,7 +252,7 @@ class _Packing:
     def bodies(self, items: "Sequence[Arrived | _Pose]") -> list[tuple[Kind, bytes, int]]:
         reads: list[WireBytes] = []
         batches: list[PointBatch] = []
-        moments: list[Moment] = []
+        moments: list[PlacedArrival] = []
         poses: list[Mapping[str, Any]] = []
         for item in items:
             if isinstance(item, _Pose):
@@ -265,11 +265,11 @@ class _Packing:
                 batches.append(item.arrival)
                 self.points += len(item.arrival)
             else:
-                moments.append(Moment(item.time_s, self.reads, self.points, item.arrival))
+                moments.append(PlacedArrival(item.time_s, self.reads, self.points, item.arrival))
                 self.rejected += item.arrival.count if isinstance(item.arrival, Rejected) else 0
         found: list[tuple[Kind, bytes, int]] = [("wire", pack_reads(reads), len(reads))] if reads else []
         found += [("points", body, count) for count, body in (pack_points(batches, CHUNK_POINTS) if batches else ())]
-        found += [("events", pack_moments(moments), len(moments))] if moments else []
+        found += [("events", pack_arrivals(moments), len(moments))] if moments else []
         found += [("registration", pack_document(poses), len(poses))] if poses else []
         return found
 
@@ -277,14 +277,14 @@ class _Packing:
         return {"received": self.points + self.rejected}
 
 
-def end_draft(run: str, state: str, message: str, today: datetime, facts: Mapping[str, Any], sha256: str = "") -> Draft:
+def end_draft(run: str, state: str, message: str, now: datetime, result: Mapping[str, Any], sha256: str = "") -> Draft:
     """Give the record that closes a run: its state, what was received, and the verdict if there is one."""
     document = {
         "state": state,
         "message": message,
-        "ended": today.isoformat(timespec="milliseconds"),
-        "received": facts.get("received", 0),
-        "verdict": facts.get("verdict"),
+        "ended": now.isoformat(timespec="milliseconds"),
+        "received": result.get("received", 0),
+        "verdict": result.get("verdict"),
         "result_sha256": sha256,
     }
     return Draft(run, "end", pack_document(document))

@@ -20,11 +20,11 @@ from cmmlink.from_plan import inspection_of, profile_of
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan.scan import Device, Plan
 from cmmlink.plan.yaml_model import read_model
-from cmmlink.record.bodies import Moment
-from cmmlink.record.reader import RecordedRun, moments_of, points_of, reads_of
+from cmmlink.record.bodies import PlacedArrival
+from cmmlink.record.reader import RecordedRun, arrivals_of, points_of, reads_of
 from cmmlink.record.recorder import result_sha256, software
 from cmmlink.record.store import Store
-from cmmlink.result_json import summary
+from cmmlink.result_json import result_json
 from drivers import Arrival, Capture, Decoder, LinkDown, LinkUp, PointBatch
 from inspection import NominalProfile
 
@@ -49,7 +49,7 @@ class Replay:
 
     outcome: RunOutcome
     profile: NominalProfile
-    facts: dict[str, Any]
+    result_json: dict[str, Any]
     changed: tuple[Change, ...]
     differs: tuple[Change, ...]
     identical: bool | None
@@ -79,17 +79,17 @@ def replay(
     changed = _with_changes(plan, tolerance, method)
     profile = recorded_profile(changed, recorded)
     stop = stop or threading.Event()
-    decoder = _recorded_decoder(plan.device, recorded, decoder_of)
+    decoder = _decoder_of(plan.device, recorded, decoder_of)
     source = Capture(_arrivals(store, recorded, decoder, stop), decoder, _failure(recorded))
-    started = RunStarted(*(recorded.header[key] for key in ("part", "serial_number", "operator", "device", "simulated")))
+    started = RunStarted.from_header(recorded.header)
     live = inspection_of(changed, profile)
     outcome = run_inspection(source, live, sinks, started, buffer_points=plan.buffer_points, clock=clock, stop=stop)
-    facts = summary(outcome.result, outcome.counts)
+    replayed = result_json(outcome.result, outcome.counts)
     identical = None
     if recorded.end is not None and recorded.end["result_sha256"]:
-        identical = result_sha256(facts, outcome.result) == recorded.end["result_sha256"]
+        identical = result_sha256(replayed, outcome.result) == recorded.end["result_sha256"]
     changes = (*_settings_changed(plan, changed), *_software_changed(recorded.header["software"]))
-    return Replay(outcome, profile, facts, changes, _differences(recorded.facts, facts) if not identical else (), identical)
+    return Replay(outcome, profile, replayed, changes, _differences(recorded.result, replayed) if not identical else (), identical)
 
 
 def recorded_plan(recorded: RecordedRun) -> Plan:
@@ -100,7 +100,7 @@ def recorded_plan(recorded: RecordedRun) -> Plan:
         raise StoreError(f"the plan of run {recorded.run} cannot be read by this version of cmmlink: {error}") from None
 
 
-def _recorded_decoder(device: Device, recorded: RecordedRun, decoder_of: Callable[[Device], Decoder | None]) -> Decoder | None:
+def _decoder_of(device: Device, recorded: RecordedRun, decoder_of: Callable[[Device], Decoder | None]) -> Decoder | None:
     try:
         return decoder_of(device)
     except ValueError as error:  # a format, an option or a register map that was valid on that day, or is gone
@@ -136,18 +136,18 @@ def _failure(recorded: RecordedRun) -> str:
 
 def _arrivals(store: Store, recorded: RecordedRun, decoder: Decoder | None, stop: threading.Event) -> Iterator[Arrival]:
     """Recorded arrivals in their order: reads and what befell the link, or points and everything else."""
-    moments = moments_of(store, recorded.run)
+    moments = arrivals_of(store, recorded.run)
     if decoder is not None:
         links = (moment for moment in moments if isinstance(moment.arrival, LinkDown | LinkUp))
-        yield from _merged(reads_of(store, recorded.run), lambda _: 1, links, lambda moment: moment.reads)
+        yield from _merge(reads_of(store, recorded.run), lambda _: 1, links, lambda moment: moment.reads)
     else:
-        yield from _merged_points(points_of(store, recorded.run), moments)
+        yield from _merge_points(points_of(store, recorded.run), moments)
     if recorded.end is not None and recorded.end["state"] == "aborted":
         stop.set()  # where the operator did
 
 
-def _merged(
-    items: Iterator[Arrival], size: Callable[[Arrival], int], moments: Iterator[Moment], place: Callable[[Moment], int]
+def _merge(
+    items: Iterator[Arrival], size: Callable[[Arrival], int], moments: Iterator[PlacedArrival], place: Callable[[PlacedArrival], int]
 ) -> Iterator[Arrival]:
     """Merge counted arrivals with others that stand after so many of them."""
     done, moment = 0, next(moments, None)
@@ -162,7 +162,7 @@ def _merged(
         moment = next(moments, None)
 
 
-def _merged_points(batches: Iterator[PointBatch], moments: Iterator[Moment]) -> Iterator[Arrival]:
+def _merge_points(batches: Iterator[PointBatch], moments: Iterator[PlacedArrival]) -> Iterator[Arrival]:
     """Merge points with the rest; what stands between two points of one record cuts it there."""
     done, moment = 0, next(moments, None)
     for batch in batches:

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from cmmlink.errors import StoreError
-from cmmlink.record.chain import GENESIS, Alteration, Draft, Record, chained, first_alteration, is_damaged
+from cmmlink.record.chain import GENESIS, Alteration, Draft, Record, chain_record, first_alteration, is_damaged
 from cmmlink.record.station_lock import StationLock
 
 FILE_NAME = "station.sqlite"
@@ -43,10 +43,10 @@ _PATIENCE_S = 5.0  # for another connection's transaction
 class Store:
     """An open station file. `writing` takes the station's lock for as long as the store is open."""
 
-    def __init__(self, folder: Path, *, writing: bool, now: Callable[[], float], migrations: Sequence[str] = MIGRATIONS) -> None:
-        """`now` gives seconds since 1970. Raises StoreError: locked, newer, unusable folder, not a file of records."""
+    def __init__(self, folder: Path, *, writing: bool, epoch_s: Callable[[], float], migrations: Sequence[str] = MIGRATIONS) -> None:
+        """`epoch_s` gives seconds since 1970. Raises StoreError: locked, newer, unusable folder, not a file of records."""
         self.path = folder / FILE_NAME
-        self._now = now
+        self._epoch_s = epoch_s
         self._lock: StationLock | None = None
         self._head: tuple[int, bytes] = (0, GENESIS)  # number and hash of the last record
         self._found_empty = self.path.is_file() and not self.path.stat().st_size
@@ -54,12 +54,12 @@ class Store:
             if writing:
                 folder.mkdir(parents=True, exist_ok=True)
                 self._lock = StationLock(folder / "station.lock")
-            self._connection = _connected(self.path)
+            self._connection = _connect(self.path)
         except (OSError, sqlite3.Error) as error:
             self._unlock()
             raise StoreError(f"{self.path}: cannot be opened: {error}; choose another folder with --records DIR") from None
         try:
-            with _translated(self.path):
+            with _translate_errors(self.path):
                 self._prepare(writing, migrations)
         except BaseException:
             self.close()
@@ -80,12 +80,12 @@ class Store:
         """Add records in one transaction; they are on the disk when this returns. Raises StoreError: then none of them is."""
         number, previous = self._head
         records: list[Record] = []
-        time_s = self._now()
+        time_s = self._epoch_s()
         for draft in drafts:
-            records.append(chained(draft, number + 1, time_s, previous))
+            records.append(chain_record(draft, number + 1, time_s, previous))
             number, previous = number + 1, records[-1].sha256
         rows = [(r.number, r.run, r.kind, r.time_s, r.count, r.body, r.crc32, r.sha256) for r in records]
-        with _translated(self.path), _transaction(self._connection):
+        with _translate_errors(self.path), _transaction(self._connection):
             self._connection.executemany(f"INSERT INTO record ({_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?, ?)", rows)
         self._head = number, previous
         return records
@@ -93,7 +93,7 @@ class Store:
     def records(self, run: str, kind: str | None = None) -> Iterator[Record]:
         """Records of a run in their order, all or of one kind. Raises StoreError where one cannot be read."""
         query = f"SELECT {_COLUMNS} FROM record WHERE run = ?" + (" AND kind = ?" if kind else "") + " ORDER BY number"
-        with _translated(self.path):
+        with _translate_errors(self.path):
             for row in self._connection.execute(query, (run, kind) if kind else (run,)):
                 record = Record(*row)
                 if is_damaged(record):
@@ -104,14 +104,14 @@ class Store:
     def totals(self, run: str) -> dict[str, tuple[int, int]]:
         """Records and what they hold together (reads, points, ...), by kind."""
         query = "SELECT kind, count(*), sum(count) FROM record WHERE run = ? GROUP BY kind"
-        with _translated(self.path):
+        with _translate_errors(self.path):
             return {kind: (records, count) for kind, records, count in self._connection.execute(query, (run,))}
 
     def begins_and_ends(self) -> list[tuple[Record, Record | None]]:
         """The first and, unless it is open, the last record of every run, oldest run first."""
         query = f"SELECT {_COLUMNS} FROM record WHERE kind IN ('run', 'end') ORDER BY number"
         found: dict[str, tuple[Record, Record | None]] = {}
-        with _translated(self.path):
+        with _translate_errors(self.path):
             for record in (Record(*row) for row in self._connection.execute(query)):
                 if record.kind == "run":
                     found[record.run] = record, None
@@ -200,7 +200,7 @@ class Store:
             self._lock.release()
 
 
-def _connected(path: Path) -> sqlite3.Connection:
+def _connect(path: Path) -> sqlite3.Connection:
     # Records on a write-protected medium can be read all the same, as long as nobody writes them.
     protected = path.is_file() and not (os.access(path, os.W_OK) and os.access(path.parent, os.W_OK))
     left = path.with_name(path.name + "-wal")
@@ -225,7 +225,7 @@ def _transaction(connection: sqlite3.Connection) -> Iterator[None]:
 
 
 @contextmanager
-def _translated(path: Path) -> Iterator[None]:
+def _translate_errors(path: Path) -> Iterator[None]:
     """Turn what SQLite says into a message that says what to do."""
     try:
         yield

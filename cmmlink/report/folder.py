@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from cmmlink.deviations_csv import write_deviations
 from cmmlink.errors import PlanError
-from cmmlink.report.deviations_csv import write_deviations
 from cmmlink.run import FinishedRun
 from inspection import InspectionResult, NominalProfile
 
@@ -23,11 +23,13 @@ def prepare(folder: Path | None) -> None:
             pass
 
 
-def write_results(folder: Path, facts: dict[str, Any], result: InspectionResult | None, profile: NominalProfile, title: str) -> list[str]:
+def write_results(
+    folder: Path, document: dict[str, Any], result: InspectionResult | None, profile: NominalProfile, title: str
+) -> list[str]:
     """Write result.json, and where something was judged deviations.csv and profile.png; their names. Raises PlanError."""
     with _or_refuse(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / "result.json").write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
+        (folder / "result.json").write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
         for name in ("deviations.csv", "profile.png"):
             (folder / name).unlink(missing_ok=True)  # an earlier run's must not stand beside this one's result
         if result is None or not result.judged:

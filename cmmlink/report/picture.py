@@ -47,7 +47,7 @@ def _draw_profile(axes: Axes, result: InspectionResult, nominal: NominalProfile)
     edges = [_loop(nominal.points_mm + factor * limit * outward, nominal) for limit in (zone.lower_mm, zone.upper_mm)]
     axes.fill(*np.vstack([edges[0], edges[1][::-1]]).T, color=_BAND, lw=0)
     axes.plot(*points.T, color=_NOMINAL, lw=1.0)
-    shown = _shown(result)
+    shown = _rows_to_draw(result)
     tips = result.foot_mm[shown] + factor * (result.actual_mm - result.foot_mm)[shown]
     axes.add_collection(
         LineCollection(list(np.stack([result.foot_mm[shown], tips], axis=1)), colors=_colours(result, shown), linewidths=0.7)
@@ -76,8 +76,8 @@ def _draw_strip(axes: Axes, result: InspectionResult, nominal: NominalProfile) -
         axes.annotate(text, place, (0, outside), textcoords="offset points", ha="center")  # not on the points beside it
     axes.margins(y=0.2)
     axes.set(xlim=(0, nominal.length_mm), xlabel="station (mm)", ylabel="deviation (mm)")
-    facts = f"coverage {result.coverage:.1%}   fit {result.fit}   method {result.method}   out of tolerance {result.out_of_tolerance}"
-    axes.set_title(facts, fontsize=10)
+    basis = f"coverage {result.coverage:.1%}   fit {result.fit}   method {result.method}   out of tolerance {result.out_of_tolerance}"
+    axes.set_title(basis, fontsize=10)
 
 
 def _mark_worst(axes: Axes, result: InspectionResult, factor: float) -> None:
@@ -87,7 +87,7 @@ def _mark_worst(axes: Axes, result: InspectionResult, factor: float) -> None:
         axes.plot(*tip, "o", ms=9, mfc="none", mec=_ABOVE, mew=1.5)
 
 
-def _shown(result: InspectionResult) -> NDArray[np.int64]:
+def _rows_to_draw(result: InspectionResult) -> NDArray[np.int64]:
     """Judged points thinned to what can be told apart, those out of tolerance and the worst always among them."""
     judged = np.flatnonzero(np.isfinite(result.deviation_mm))
     kept = judged[:: max(1, len(judged) // _MOST_WHISKERS)]

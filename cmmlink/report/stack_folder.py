@@ -5,8 +5,8 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
+from cmmlink.deviations_csv import write_deviations
 from cmmlink.errors import PlanError
-from cmmlink.report.deviations_csv import write_deviations
 from cmmlink.result_keys import SectionInspected
 from cmmlink.stack import SectionOutcome, StackOutcome
 from drivers.surface import SurfaceSection
@@ -51,7 +51,7 @@ def write_stack(
     try:
         folder.mkdir(parents=True, exist_ok=True)
         _clear(folder)
-        (folder / "result.json").write_text(json.dumps(stack.facts(), indent=2) + "\n", encoding="utf-8")
+        (folder / "result.json").write_text(json.dumps(stack.result_json(), indent=2) + "\n", encoding="utf-8")
         _write_sections(stack, folder / "sections.csv")
         for number, section in enumerate(stack.sections, start=1):
             own = folder / section_folder(number, section)
@@ -101,7 +101,7 @@ def _write_sections(stack: StackOutcome, path: Path) -> None:
         writer = csv.writer(file)
         writer.writerow(SECTION_COLUMNS)
         for section in stack.sections:
-            facts = section.facts()
-            worst = facts["worst"] or {}
-            values = ["" if facts[key] is None else facts[key] for key in _SECTION_KEYS]
+            result = section.result_json()
+            worst = result["worst"] or {}
+            values = ["" if result[key] is None else result[key] for key in _SECTION_KEYS]
             writer.writerow((*values, worst.get("station_mm", ""), worst.get("deviation_mm", ""), "; ".join(section.warnings)))

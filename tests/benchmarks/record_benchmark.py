@@ -18,8 +18,8 @@ import numpy as np
 
 from cmmlink.events import Arrived, Counts, Event, RunFinished, RunStarted
 from cmmlink.record.chain import Draft, Record
-from cmmlink.record.reader import recording
-from cmmlink.record.recorder import Basis, Recorder
+from cmmlink.record.reader import open_to_record
+from cmmlink.record.recorder import Recorder, RunInputs
 from cmmlink.record.store import Store
 from drivers.source import PointBatch, WireBytes
 from tests.cmmlink.recorded import today
@@ -64,10 +64,10 @@ def paced(sink: Callable[[Event], None], rate_hz: float, seconds: float) -> floa
 
 def measure(rate_hz: float, seconds: float, folder: Path) -> None:
     """Print what recording at this rate costs."""
-    with recording(folder, today) as store:
+    with open_to_record(folder, today) as store:
         timed = TimedStore(store)
-        basis = Basis("plan", "nominal", b"", {})
-        recorder = Recorder(timed, basis, clock=time.perf_counter, today=today)  # type: ignore[arg-type]
+        basis = RunInputs("plan", "nominal", b"", {})
+        recorder = Recorder(timed, basis, clock=time.perf_counter, now=today)  # type: ignore[arg-type]
         recorder(RunStarted("part", "", "", "benchmark", True))
         timed.commits_s.clear()
         begin_cpu_s = time.process_time()

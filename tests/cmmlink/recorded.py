@@ -15,8 +15,8 @@ from cmmlink.events import RunStarted, Sink
 from cmmlink.from_plan import inspection_of, profile_of
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan.scan import Datum, Plan, Registration, load_plan
-from cmmlink.record.reader import recording
-from cmmlink.record.recorder import Acknowledged, Basis, Recorder
+from cmmlink.record.reader import open_to_record
+from cmmlink.record.recorder import Acknowledged, Recorder, RunInputs
 from drivers.codecs.ascii_frames import AsciiDecoder
 from drivers.source import Arrival, Damaged, Lost, PointBatch, Rejected, ScanClosed, ScanOpened, ScanSource
 from inspection import NominalProfile
@@ -107,8 +107,8 @@ def record(
     started = RunStarted(plan.part.name, "T-1", "operator", "scripted", True)
     live = inspection_of(plan, small_profile())
     with (
-        recording(folder, today) as store,
-        Recorder(store, Basis.of(plan), clock=time.monotonic, today=today, acknowledge=acknowledge, commit_s=commit_s) as recorder,
+        open_to_record(folder, today) as store,
+        Recorder(store, RunInputs.of(plan), clock=time.monotonic, now=today, acknowledge=acknowledge, commit_s=commit_s) as recorder,
     ):
         outcome = run_inspection(
             source,

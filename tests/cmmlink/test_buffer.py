@@ -4,19 +4,19 @@ import threading
 
 import pytest
 
-from cmmlink.buffer import HandOver
+from cmmlink.buffer import Buffer
 
 PATIENCE_S = 30.0
 
 
-def given_later(buffer: HandOver[int], results: list[bool], *gifts: tuple[int, int]) -> threading.Thread:
+def given_later(buffer: Buffer[int], results: list[bool], *gifts: tuple[int, int]) -> threading.Thread:
     """Give from another thread; the results are what `give` returned."""
     giver = threading.Thread(target=lambda: results.extend(buffer.give(item, size) for item, size in gifts), daemon=True)
     giver.start()
     return giver
 
 
-def until_stalled(buffer: HandOver[int], giver: threading.Thread) -> None:
+def until_stalled(buffer: Buffer[int], giver: threading.Thread) -> None:
     """Return once the giver waits; a giver that never does fails by the test's time limit."""
     while not buffer.stalls:
         giver.join(0.001)
@@ -29,14 +29,14 @@ def ended(thread: threading.Thread) -> None:
 
 
 def test_everything_comes_out_once_and_in_order() -> None:
-    buffer: HandOver[int] = HandOver(100)
+    buffer: Buffer[int] = Buffer(100)
     assert all(buffer.give(item, 10) for item in range(5))
     assert buffer.take(0.0) == [0, 1, 2, 3, 4]
     assert buffer.take(0.0) == []
 
 
 def test_waiting_and_peak_count_points_and_not_items() -> None:
-    buffer: HandOver[int] = HandOver(100)
+    buffer: Buffer[int] = Buffer(100)
     for size in (30, 40, 0):
         buffer.give(0, size)
     assert (buffer.waiting, buffer.peak, buffer.stalls) == (70, 70, 0)
@@ -46,14 +46,14 @@ def test_waiting_and_peak_count_points_and_not_items() -> None:
 
 
 def test_exactly_full_is_not_a_stall() -> None:
-    buffer: HandOver[int] = HandOver(100)
+    buffer: Buffer[int] = Buffer(100)
     buffer.give(0, 60)
     buffer.give(0, 40)
     assert (buffer.waiting, buffer.peak, buffer.stalls) == (100, 100, 0)
 
 
 def test_a_full_buffer_holds_the_giver_until_something_is_taken() -> None:
-    buffer: HandOver[int] = HandOver(10)
+    buffer: Buffer[int] = Buffer(10)
     given: list[bool] = []
     giver = given_later(buffer, given, (1, 10), (2, 1))
     until_stalled(buffer, giver)
@@ -66,21 +66,21 @@ def test_a_full_buffer_holds_the_giver_until_something_is_taken() -> None:
 
 
 def test_an_item_larger_than_the_buffer_passes_alone() -> None:
-    buffer: HandOver[int] = HandOver(10)
+    buffer: Buffer[int] = Buffer(10)
     assert buffer.give(1, 25)
     assert (buffer.waiting, buffer.peak) == (25, 25)
     assert buffer.take(0.0) == [1]
 
 
 def test_what_has_no_size_passes_a_full_buffer_in_order() -> None:
-    buffer: HandOver[int] = HandOver(10)
+    buffer: Buffer[int] = Buffer(10)
     buffer.give(1, 10)
     assert buffer.give(2, 0)
     assert buffer.take(0.0) == [1, 2]
 
 
 def test_close_lets_a_waiting_giver_go_and_refuses_from_then_on() -> None:
-    buffer: HandOver[int] = HandOver(10)
+    buffer: Buffer[int] = Buffer(10)
     given: list[bool] = []
     giver = given_later(buffer, given, (1, 10), (2, 10))
     until_stalled(buffer, giver)
@@ -92,7 +92,7 @@ def test_close_lets_a_waiting_giver_go_and_refuses_from_then_on() -> None:
 
 
 def test_take_wakes_as_soon_as_something_comes() -> None:
-    buffer: HandOver[int] = HandOver(10)
+    buffer: Buffer[int] = Buffer(10)
     given: list[bool] = []
     giver = given_later(buffer, given, (7, 1))
     assert buffer.take(PATIENCE_S) == [7]
@@ -100,7 +100,7 @@ def test_take_wakes_as_soon_as_something_comes() -> None:
 
 
 def test_two_threads_hand_over_every_item_within_the_bound() -> None:
-    buffer: HandOver[int] = HandOver(7)
+    buffer: Buffer[int] = Buffer(7)
     given: list[bool] = []
     giver = given_later(buffer, given, *((item, 1 + item % 3) for item in range(3000)))
     received: list[int] = []
@@ -116,4 +116,4 @@ def test_two_threads_hand_over_every_item_within_the_bound() -> None:
 @pytest.mark.parametrize("capacity", [0, -1])
 def test_a_buffer_that_holds_nothing_is_refused(capacity: int) -> None:
     with pytest.raises(ValueError, match=f"at least one point, not {capacity}"):
-        HandOver(capacity)
+        Buffer(capacity)

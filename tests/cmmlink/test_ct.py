@@ -94,7 +94,7 @@ def test_the_form_error_of_the_phantom_is_found_within_its_noise(scanned: Scanne
 
 def test_every_point_is_accounted_for(scanned: Scanned) -> None:
     for section in scanned.stack.sections:
-        facts = section.facts()
+        facts = section.result_json()
         assert facts["received"] == facts["judged"] + facts["rejected"] == sum(len(c.points_mm) for c in section.judged) > 2500
         assert facts["lost"] == 0
         assert facts["coverage"] > 0.99
@@ -202,7 +202,7 @@ def test_a_hole_beside_the_outline_is_told_and_not_judged(tmp_path: Path, spline
     assert section.verdict is Verdict.CONFORM
     assert [len(section.slice.contours), len(section.judged)] == [2, 1]
     assert any("1 of them holes, are not judged; the longest is 12.00 mm" in text for text in section.warnings)
-    assert section.facts()["holes"] == 1
+    assert section.result_json()["holes"] == 1
 
 
 def test_a_part_of_the_surface_that_is_missing_makes_the_section_uncertain(tmp_path: Path, spline: BSpline) -> None:
@@ -232,14 +232,14 @@ def test_one_section_that_fits_nothing_does_not_spoil_the_others(tmp_path: Path,
     stack = inspect(plan_of(mesh, write_spline(spline, tmp_path / "n.yaml"), {"heights_mm": (-5.0, 5.0)}))
     assert [section.verdict for section in stack.sections] == [Verdict.UNCERTAIN, Verdict.CONFORM]
     assert stack.verdict is Verdict.UNCERTAIN
-    assert stack.sections[0].facts()["judged"] == 0
+    assert stack.sections[0].result_json()["judged"] == 0
     assert stack.sections[0].warnings
 
 
 def test_the_cutter_is_the_one_asked_for_and_gives_the_same_verdicts(blade: tuple[Path, Path]) -> None:
     where: dict[str, object] = {"normal": (0.01, 0.02, 1), "heights_mm": (5.0,)}
-    by_numpy = inspect(plan_of(*blade, where)).facts()
-    by_default = inspect(plan_of(*blade, where, cut={})).facts()
+    by_numpy = inspect(plan_of(*blade, where)).result_json()
+    by_default = inspect(plan_of(*blade, where, cut={})).result_json()
     assert by_numpy["slices"][0]["cutter"] == "numpy"
     if by_default["slices"][0].pop("cutter") == "numpy":
         assert any("Open3D cannot be loaded" in note for note in by_default["notes"])
@@ -379,9 +379,9 @@ def test_a_stack_cut_short_proves_nothing(blade: tuple[Path, Path]) -> None:
     stack = inspect_stack(plan, clock=time.monotonic, stop=stop, on_section=lambda _: stop.set())
     assert [section.verdict for section in stack.sections] == [Verdict.CONFORM]
     assert stack.verdict is Verdict.UNCERTAIN
-    assert (stack.facts()["verdict"], stack.facts()["complete"]) == ("uncertain", False)
+    assert (stack.result_json()["verdict"], stack.result_json()["complete"]) == ("uncertain", False)
     assert stack.notes[-1] == "aborted by the operator after 1 of 3 sections"
-    assert inspect(plan).facts()["complete"] is True
+    assert inspect(plan).result_json()["complete"] is True
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from cmmlink.errors import PlanError
 from cmmlink.plan.scan import FileDevice, ModbusDevice, Plan, SerialDevice, load_plan
 from cmmlink.plan.yaml_model import read_model
-from cmmlink.record.recorder import Basis
+from cmmlink.record.recorder import RunInputs
 from drivers.codecs.register_map import load_map
 from inspection import ToleranceZone
 
@@ -286,7 +286,7 @@ def test_a_map_of_ones_own_is_kept_as_it_was_understood(tmp_path: Path, device: 
     (tmp_path / "blade.dat").write_text("0 0", encoding="utf-8")
     (tmp_path / "mymap").write_text(OWN_MAP, encoding="utf-8")
     plan = with_device(tmp_path, device)
-    kept = read_model(Basis.of(plan).plan, Plan).device
+    kept = read_model(RunInputs.of(plan).plan, Plan).device
     if isinstance(kept, SerialDevice):
         assert kept.axis is not None
         kept = kept.axis.follow  # type: ignore[assignment]
@@ -300,7 +300,7 @@ def test_a_map_of_ones_own_is_kept_as_it_was_understood(tmp_path: Path, device: 
 def test_every_shipped_map_taken_over_as_ones_own_is_kept_exactly(tmp_path: Path, name: str) -> None:
     (tmp_path / "blade.dat").write_text("0 0", encoding="utf-8")
     (tmp_path / "mymap").write_text(yaml.safe_dump(load_map(name).model_dump(mode="json")), encoding="utf-8")
-    kept = read_model(Basis.of(with_device(tmp_path, "{type: modbus, address: 'h:502', map: mymap}")).plan, Plan).device
+    kept = read_model(RunInputs.of(with_device(tmp_path, "{type: modbus, address: 'h:502', map: mymap}")).plan, Plan).device
     assert isinstance(kept, ModbusDevice)
     assert load_map(kept.map) == load_map(name)
 
@@ -309,4 +309,4 @@ def test_a_map_that_cannot_be_kept_is_a_mistake_in_the_plan(tmp_path: Path) -> N
     (tmp_path / "blade.dat").write_text("0 0", encoding="utf-8")
     (tmp_path / "mymap").write_text(OWN_MAP.replace("finished: 0", "finished: true"), encoding="utf-8")
     with pytest.raises(PlanError, match=r"device: .*mymap, line 3: status\.fields\.state\.finished: .*true or false"):
-        Basis.of(with_device(tmp_path, "{type: modbus, address: 'h:502', map: mymap}"))
+        RunInputs.of(with_device(tmp_path, "{type: modbus, address: 'h:502', map: mymap}"))

@@ -12,8 +12,8 @@ import pytest
 from cmmlink.errors import StoreError
 from cmmlink.events import Arrived, Event, Judged, RunFinished, RunStarted
 from cmmlink.record.bodies import POINT_BYTES, unpack_judged
-from cmmlink.record.reader import describe, list_runs, moments_of, points_of, reading, reads_of, registrations_of
-from cmmlink.record.recorder import Acknowledged, Basis, Recorder
+from cmmlink.record.reader import arrivals_of, describe, list_runs, open_to_read, points_of, reads_of, registrations_of
+from cmmlink.record.recorder import Acknowledged, Recorder, RunInputs
 from cmmlink.record.store import FILE_NAME, Store
 from drivers.source import Arrival, Heartbeat, PointBatch, WireBytes
 from tests.cmmlink.recorded import Script, record, scan_arrivals, today
@@ -29,10 +29,10 @@ def with_wire(arrivals: list[Arrival]) -> list[Arrival]:
 def test_everything_that_arrived_is_kept_as_it_was(tmp_path: Path) -> None:
     arrivals = with_wire(scan_arrivals())
     outcome, recorder = record(tmp_path, Script(*arrivals))
-    with reading(tmp_path, today) as store:
+    with open_to_read(tmp_path, today) as store:
         reads = list(reads_of(store, recorder.run))
         batches = list(points_of(store, recorder.run))
-        moments = list(moments_of(store, recorder.run))
+        moments = list(arrivals_of(store, recorder.run))
         rows = unpack_judged(record.body for record in store.records(recorder.run, "deviations"))
         told = describe(store, recorder.run)
     assert reads == [arrival for arrival in arrivals if isinstance(arrival, WireBytes)]
@@ -55,7 +55,7 @@ def test_everything_that_arrived_is_kept_as_it_was(tmp_path: Path) -> None:
 
 def test_the_registrations_history_ends_at_the_settled_pose(tmp_path: Path) -> None:
     outcome, recorder = record(tmp_path, Script(*scan_arrivals(batch=600)))
-    with reading(tmp_path, today) as store:
+    with open_to_read(tmp_path, today) as store:
         history = registrations_of(store, recorder.run)
     assert outcome.result is not None
     assert history
@@ -81,16 +81,16 @@ def test_what_is_acknowledged_another_process_can_read(tmp_path: Path) -> None:
 
 
 def test_a_slow_disk_makes_the_run_wait_and_nothing_is_dropped(tmp_path: Path) -> None:
-    basis = Basis("plan", "nominal", b"", {})
+    basis = RunInputs("plan", "nominal", b"", {})
     with (
-        Store(tmp_path, writing=True, now=lambda: 0.0) as store,
-        Recorder(store, basis, clock=lambda: 0.0, today=today, commit_s=0.01, queue_bytes=2000) as recorder,
+        Store(tmp_path, writing=True, epoch_s=lambda: 0.0) as store,
+        Recorder(store, basis, clock=lambda: 0.0, now=today, commit_s=0.01, queue_bytes=2000) as recorder,
     ):
         recorder(started := _started())
         for index in range(200):
             recorder(Arrived(0.0, WireBytes(float(index), bytes(500))))
     assert started.part == "part"
-    with reading(tmp_path, today) as store:
+    with open_to_read(tmp_path, today) as store:
         assert [read.time_s for read in reads_of(store, recorder.run)] == list(range(200))
 
 
@@ -140,7 +140,7 @@ def test_a_program_that_fails_leaves_a_run_that_says_so(tmp_path: Path) -> None:
         record(tmp_path, Script(*scan_arrivals()[:-1]), before=[failing])
     (entry,) = list_runs(tmp_path, today)
     assert entry["state"] == "interrupted"
-    with reading(tmp_path, today) as store:
+    with open_to_read(tmp_path, today) as store:
         told = describe(store, entry["run"])
         assert "a defect elsewhere" in told["message"]
         assert sum(len(batch) for batch in points_of(store, entry["run"])) == 600

@@ -10,12 +10,12 @@ import pytest
 from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 
+from cmmlink.deviations_csv import COLUMNS, write_deviations
 from cmmlink.errors import PlanError
 from cmmlink.events import Counts, RunStarted
-from cmmlink.report.deviations_csv import COLUMNS, write_deviations
 from cmmlink.report.folder import prepare, write_results
 from cmmlink.report.picture import magnification, write_picture
-from cmmlink.result_json import identity, summary
+from cmmlink.result_json import identity_json, result_json
 from inspection import InspectionResult, LiveInspection, NominalProfile, RigidTransform, ToleranceZone
 from tests.cmmlink.oval_part import LENGTH_MM, oval_feet, oval_points, oval_profile, station_mm
 
@@ -60,7 +60,7 @@ def bumped() -> np.ndarray[tuple[int], np.dtype[np.float64]]:
 
 def test_the_summary_has_the_promised_keys_and_says_what_was_put_in(profile: NominalProfile) -> None:
     result = inspected(profile, bumped())
-    facts = summary(result, Counts(received=360, judged=360, lost=2))
+    facts = result_json(result, Counts(received=360, judged=360, lost=2))
     assert set(facts) == set(PROMISED) | FURTHER
     assert {key: type(facts[key]) for key in PROMISED} == PROMISED
     assert facts["verdict"] == "nonconform"
@@ -74,7 +74,7 @@ def test_the_summary_has_the_promised_keys_and_says_what_was_put_in(profile: Nom
 
 
 def test_the_worst_point_and_the_stretches_are_where_they_were_made(profile: NominalProfile) -> None:
-    facts = summary(inspected(profile, bumped()), Counts())
+    facts = result_json(inspected(profile, bumped()), Counts())
     worst, (x, y) = facts["worst"], oval_points(bumped())[42]
     assert set(worst) == {"station_mm", "x_mm", "y_mm", "deviation_mm"}
     at = (station_mm(42), x, y, 0.2)
@@ -89,7 +89,7 @@ def test_the_registration_is_told_in_degrees_and_mm(profile: NominalProfile) -> 
     pose = RigidTransform(np.radians(90.0), np.array([1.0, -2.0]))
     live = LiveInspection(profile, ToleranceZone(-0.05, 0.05), datum=pose)
     live.add(RigidTransform(np.radians(-90.0), np.zeros(2)).apply(oval_points(0.0) - [1.0, -2.0]))
-    registration = summary(live.finish(), Counts())["registration"]
+    registration = result_json(live.finish(), Counts())["registration"]
     assert {"rotation_deg", "translation_mm", "iterations", "converged"} <= set(registration)
     assert registration["rotation_deg"] == pytest.approx(90.0)
     assert registration["translation_mm"] == [1.0, -2.0]
@@ -97,8 +97,8 @@ def test_the_registration_is_told_in_degrees_and_mm(profile: NominalProfile) -> 
 
 
 def test_a_summary_without_a_result_has_the_same_keys_and_proves_nothing(profile: NominalProfile) -> None:
-    nothing = summary(None, Counts(received=3, rejected=3, rejected_by_reason={"not registered": 3}))
-    assert set(nothing) == set(summary(inspected(profile, 0.0), Counts()))
+    nothing = result_json(None, Counts(received=3, rejected=3, rejected_by_reason={"not registered": 3}))
+    assert set(nothing) == set(result_json(inspected(profile, 0.0), Counts()))
     assert (nothing["verdict"], nothing["received"], nothing["judged"], nothing["rejected"]) == ("uncertain", 3, 0, 3)
     assert nothing["worst"] is None
 
@@ -106,12 +106,12 @@ def test_a_summary_without_a_result_has_the_same_keys_and_proves_nothing(profile
 def test_a_summary_is_strict_json_also_when_nothing_was_judged(profile: NominalProfile) -> None:
     live = LiveInspection(profile, ToleranceZone(-0.05, 0.05), datum=RigidTransform.identity())
     live.add(np.full((9, 2), np.nan))
-    for facts in (summary(live.finish(), Counts()), summary(inspected(profile, bumped()), Counts()), summary(None, Counts())):
+    for facts in (result_json(live.finish(), Counts()), result_json(inspected(profile, bumped()), Counts()), result_json(None, Counts())):
         assert json.loads(json.dumps(facts, allow_nan=False)) == facts
 
 
 def test_the_identity_of_a_run_stands_beside_its_numbers() -> None:
-    facts = identity(RunStarted("blade", "0012", "", "serial COM3", True))
+    facts = identity_json(RunStarted("blade", "0012", "", "serial COM3", True))
     assert facts == {"part": "blade", "serial_number": "0012", "operator": None, "device": "serial COM3", "simulated": True}
     assert not set(facts) & (set(PROMISED) | FURTHER)
 
@@ -172,7 +172,7 @@ def test_the_magnification_is_a_round_number_that_shows_the_band(profile: Nomina
 
 def test_the_folder_holds_what_it_says(profile: NominalProfile, tmp_path: Path) -> None:
     folder = tmp_path / "a" / "b"
-    facts = summary(inspected(profile, bumped()), Counts())
+    facts = result_json(inspected(profile, bumped()), Counts())
     written = write_results(folder, facts, inspected(profile, bumped()), profile, "oval")
     assert sorted(written) == sorted(path.name for path in folder.iterdir()) == ["deviations.csv", "profile.png", "result.json"]
     assert json.loads((folder / "result.json").read_text(encoding="utf-8")) == facts

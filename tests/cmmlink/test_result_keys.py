@@ -10,9 +10,9 @@ import pytest
 from pydantic import BaseModel
 
 from cmmlink import result_keys
+from cmmlink.deviations_csv import COLUMNS
 from cmmlink.plan.reference import groups_of
 from cmmlink.record.export import POINT_COLUMNS, WIRE_COLUMNS
-from cmmlink.report.deviations_csv import COLUMNS
 from cmmlink.report.stack_folder import CONTOUR_COLUMNS, SECTION_COLUMNS
 from cmmlink.result_keys import (
     Exported,

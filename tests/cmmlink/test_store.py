@@ -15,7 +15,7 @@ import pytest
 
 from cmmlink.errors import StoreError
 from cmmlink.record.chain import GENESIS, Alteration, Draft
-from cmmlink.record.reader import check_chain, list_runs, reading
+from cmmlink.record.reader import check_chain, list_runs, open_to_read
 from cmmlink.record.store import FILE_NAME, MIGRATIONS, Store
 from tests.cmmlink.recorded import TODAY, Script, record, scan_arrivals, today
 
@@ -24,7 +24,7 @@ BODIES = (b"first", b"", b"\x00\xff" * 1000)
 
 
 def opened(folder: Path, *, writing: bool = True) -> Store:
-    return Store(folder, writing=writing, now=lambda: 12.5)
+    return Store(folder, writing=writing, epoch_s=lambda: 12.5)
 
 
 def filled(folder: Path) -> None:
@@ -59,7 +59,7 @@ def rows(folder: Path, query: str) -> list[tuple[Any, ...]]:
 
 
 def alteration(folder: Path, run: str | None = None) -> Alteration:
-    with reading(folder, today, close_interrupted=False) as store:
+    with open_to_read(folder, today, close_interrupted=False) as store:
         found = store.first_alteration(run)[0]
     assert found is not None
     return found
@@ -84,7 +84,7 @@ def test_the_hash_is_that_of_the_documented_bytes(tmp_path: Path) -> None:
 
 
 def test_nothing_altered_is_said_of_untouched_records(recorded_folder: Path) -> None:
-    with reading(recorded_folder, today) as store:
+    with open_to_read(recorded_folder, today) as store:
         whole = check_chain(store, None)
         ends = [end for _, end in store.begins_and_ends()]
         parts = [check_chain(store, end.run) for end in ends if end is not None]
@@ -165,7 +165,7 @@ def test_deleted_moved_and_added_records_are_found(records_copy: Path, statement
     (last,) = rows(records_copy, "SELECT max(number), '', '' FROM record")
     (begin,) = rows(records_copy, "SELECT min(number), '', '' FROM record WHERE run LIKE '%-0002'")
     change(records_copy, *statements)
-    with Store(records_copy, writing=False, now=TODAY.timestamp) as store:
+    with Store(records_copy, writing=False, epoch_s=TODAY.timestamp) as store:
         found = store.first_alteration()[0]
     assert found is not None
     assert found.number in ([number] if number else [begin[0], last[0], last[0] + 1])
@@ -173,7 +173,7 @@ def test_deleted_moved_and_added_records_are_found(records_copy: Path, statement
 
 def test_one_altered_run_leaves_the_others_provable(records_copy: Path) -> None:
     change(records_copy, "UPDATE record SET body = x'00' WHERE kind = 'points' AND run LIKE '%-0001'")
-    with reading(records_copy, today) as store:
+    with open_to_read(records_copy, today) as store:
         first, second = (begin.run for begin, _ in store.begins_and_ends())
         assert check_chain(store, first)["first"]["kind"] == "points"
         assert not check_chain(store, second)["altered"]
@@ -182,7 +182,7 @@ def test_one_altered_run_leaves_the_others_provable(records_copy: Path) -> None:
 def test_a_run_without_its_last_records_is_found(records_copy: Path) -> None:
     (end,) = rows(records_copy, "SELECT number, run, kind FROM record WHERE kind = 'end' AND run LIKE '%-0001'")
     change(records_copy, f"DELETE FROM record WHERE number = {end[0]}")
-    with Store(records_copy, writing=False, now=TODAY.timestamp) as store:
+    with Store(records_copy, writing=False, epoch_s=TODAY.timestamp) as store:
         found = store.first_alteration(end[1])[0]
     assert found is not None
     assert found.number == end[0]
@@ -190,7 +190,7 @@ def test_a_run_without_its_last_records_is_found(records_copy: Path) -> None:
 
 def test_a_damaged_record_is_not_read_as_if_it_were_sound(records_copy: Path) -> None:
     change(records_copy, "UPDATE record SET body = x'00' WHERE kind = 'plan'")
-    with reading(records_copy, today) as store:
+    with open_to_read(records_copy, today) as store:
         run = store.begins_and_ends()[0][0].run
         with pytest.raises(StoreError, match=r"record 2 \(plan of run .*\) is damaged"):
             list(store.records(run))
@@ -199,7 +199,7 @@ def test_a_damaged_record_is_not_read_as_if_it_were_sound(records_copy: Path) ->
 def test_a_second_writer_is_told_who_writes(tmp_path: Path) -> None:
     program = (
         "import sys; from pathlib import Path; from cmmlink.record.store import Store\n"
-        f"store = Store(Path({str(tmp_path)!r}), writing=True, now=lambda: 0.0)\n"
+        f"store = Store(Path({str(tmp_path)!r}), writing=True, epoch_s=lambda: 0.0)\n"
         "print('open', flush=True); sys.stdin.readline()"
     )
     root = Path(__file__).resolve().parents[2]
@@ -224,7 +224,7 @@ def test_a_newer_file_is_refused(tmp_path: Path) -> None:
 def test_an_older_file_is_migrated_and_its_chain_stays_whole(tmp_path: Path, writing: bool) -> None:
     filled(tmp_path)
     newer = (*MIGRATIONS, "ALTER TABLE record ADD COLUMN note TEXT", "CREATE TABLE station (name TEXT)")
-    with Store(tmp_path, writing=writing, now=lambda: 0.0, migrations=newer) as store:
+    with Store(tmp_path, writing=writing, epoch_s=lambda: 0.0, migrations=newer) as store:
         assert store.first_alteration() == (None, 5, store.first_alteration()[2])
     assert rows(tmp_path, "PRAGMA user_version") == [(len(newer),)]
     assert rows(tmp_path, "SELECT note, 0, 0 FROM record LIMIT 1") == [(None, 0, 0)]
@@ -235,7 +235,7 @@ def test_an_older_file_is_migrated_and_its_chain_stays_whole(tmp_path: Path, wri
 def test_a_migration_that_fails_leaves_the_file_as_it_was(tmp_path: Path) -> None:
     filled(tmp_path)
     with pytest.raises(StoreError):
-        Store(tmp_path, writing=True, now=lambda: 0.0, migrations=(*MIGRATIONS, "CREATE TABLE half (x); SELECT no_such_function()"))
+        Store(tmp_path, writing=True, epoch_s=lambda: 0.0, migrations=(*MIGRATIONS, "CREATE TABLE half (x); SELECT no_such_function()"))
     with opened(tmp_path) as store:
         assert store.first_alteration()[0] is None
     assert rows(tmp_path, "SELECT count(*), '', '' FROM sqlite_master WHERE name = 'half'") == [(0, "", "")]
@@ -260,7 +260,7 @@ def test_a_folder_that_cannot_be_made_is_one_message(tmp_path: Path) -> None:
 def test_results_carry_the_hashes_of_what_is_recorded(tmp_path: Path) -> None:
     _, recorder = record(tmp_path, Script(*scan_arrivals(count=120)))
     assert recorder.evidence is not None
-    with reading(tmp_path, today) as store:
+    with open_to_read(tmp_path, today) as store:
         found = {record.kind: record for record in store.records(recorder.run)}
     header = json.loads(found["run"].body)
     assert recorder.evidence.chain_sha256 == found["end"].sha256.hex()

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cmmlink.record.reader import check_chain, list_runs, points_of, reading, reads_of
+from cmmlink.record.reader import check_chain, list_runs, open_to_read, points_of, reads_of
 from cmmlink.record.recorder import Acknowledged
 from drivers.codecs.ascii_frames import AsciiDecoder
 from drivers.links.serial_scanner import SerialScanner
@@ -60,7 +60,7 @@ def _checked(folder: Path, known: int, device: Simulated, wire_bytes: int, point
         return "", 0
     assert runs[-1]["state"] == "interrupted"
     run = runs[-1]["run"]
-    with reading(folder, today) as store:
+    with open_to_read(folder, today) as store:
         assert not check_chain(store, None)["altered"]
         data = b"".join(read.data for read in reads_of(store, run))
         batches = list(points_of(store, run))

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from cmmlink.demo import plan_file
-from cmmlink.record.reader import list_runs, points_of, reading
+from cmmlink.record.reader import list_runs, open_to_read, points_of
 from tests.cmmlink.recorded import Script, record, scan_arrivals, today
 from tests.integration.killed import ROOT, kill_one
 from tests.integration.simulated import simulated
@@ -56,7 +56,7 @@ def test_a_full_disk_ends_with_exit_code_5_and_all_that_was_acknowledged(tmp_pat
     acknowledged = int(message.split(" points are safe")[0].rpartition(" ")[2])
     (entry,) = list_runs(records, today)
     assert (entry["state"], entry["serial_number"]) == ("interrupted", "7")
-    with reading(records, today) as store:
+    with open_to_read(records, today) as store:
         sequence = np.concatenate([batch.sequence for batch in points_of(store, entry["run"])])
         assert store.first_alteration()[0] is None
     assert acknowledged == len(sequence) == entry["received"] > 1000

@@ -13,7 +13,7 @@ import pytest
 
 from cmmlink.demo import part_path
 from cmmlink.events import Arrived, Event, RunFinished
-from cmmlink.record.reader import list_runs, reading, recorded_run
+from cmmlink.record.reader import list_runs, open_to_read, recorded_run
 from cmmlink.record.replay import Replay, replay
 from drivers.codecs.ascii_frames import AsciiDecoder
 from drivers.links.serial_scanner import SerialScanner
@@ -81,7 +81,7 @@ def recorded_scan(folder: Path, *faults: str, stop: threading.Event | None = Non
 
 
 def replayed(folder: Path, run: str, **changes: object) -> Replay:
-    with reading(folder, today) as store:
+    with open_to_read(folder, today) as store:
         return replay(store, recorded_run(store, run), decoder_of, **changes)  # type: ignore[arg-type]
 
 
@@ -91,9 +91,9 @@ def test_nothing_changed_is_identical(faults: list[str], tmp_path: Path) -> None
     again = replayed(tmp_path, run)
     assert again.identical is True
     assert (again.changed, again.differs) == ((), ())
-    with reading(tmp_path, today) as store:
+    with open_to_read(tmp_path, today) as store:
         recorded = recorded_run(store, run)
-    assert recorded.facts == again.facts
+    assert recorded.result == again.result_json
     assert recorded.end is not None
     assert again.outcome.ending == recorded.end["state"]
 
@@ -113,17 +113,17 @@ def test_a_run_cut_off_before_its_result_is_evaluated_from_what_was_kept(tmp_pat
 
     with pytest.raises(RuntimeError):
         record(tmp_path, Script(*scan_arrivals()), before=[failing])
-    with reading(tmp_path, today) as store:
+    with open_to_read(tmp_path, today) as store:
         (begin, _), *_ = store.begins_and_ends()
         again = replay(store, recorded_run(store, begin.run), no_decoder)
     assert again.identical is None
     assert again.outcome.ending == "interrupted"
-    assert (again.facts["received"], again.facts["complete"], again.facts["verdict"]) == (612, False, "uncertain")
+    assert (again.result_json["received"], again.result_json["complete"], again.result_json["verdict"]) == (612, False, "uncertain")
 
 
 def test_points_are_replayed_where_there_are_no_wire_bytes(tmp_path: Path) -> None:
     _, recorder = record(tmp_path, Script(*scan_arrivals()))
-    with reading(tmp_path, today) as store:
+    with open_to_read(tmp_path, today) as store:
         again = replay(store, recorded_run(store, recorder.run), no_decoder)
     assert again.identical is True
     assert (again.outcome.counts.rejected, again.outcome.counts.lost) == (12, 3)
@@ -150,11 +150,11 @@ def test_another_method_is_a_new_evaluation_that_says_so(tmp_path: Path) -> None
 
 def test_the_recorded_nominal_counts_not_the_file_of_that_name_today(tmp_path: Path) -> None:
     run = recorded_scan(tmp_path)
-    with reading(tmp_path, today) as store:
+    with open_to_read(tmp_path, today) as store:
         recorded = recorded_run(store, run)
         moved = recorded.plan.replace("nominal.csv", "gone.csv")
         assert moved != recorded.plan
-        again = replay(store, type(recorded)(recorded.header, moved, recorded.nominal, recorded.end, recorded.facts, ""), decoder_of)
+        again = replay(store, type(recorded)(recorded.header, moved, recorded.nominal, recorded.end, recorded.result, ""), decoder_of)
     assert again.identical is True
 
 

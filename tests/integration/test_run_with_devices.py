@@ -14,7 +14,7 @@ import yaml
 
 from cmmlink.devices import decoder_of
 from cmmlink.errors import StoreError
-from cmmlink.record.reader import reading, recorded_run
+from cmmlink.record.reader import open_to_read, recorded_run
 from cmmlink.record.replay import replay
 from tests.cmmlink.recorded import Script, record, scan_arrivals, today
 from tests.integration.simulated import Simulated, simulated
@@ -90,7 +90,7 @@ def test_a_device_that_dies_half_way_ends_with_code_4_and_what_was_received(tmp_
 
 
 def test_a_replay_reads_registers_as_the_map_of_that_day_told(tmp_path: Path) -> None:
-    shipped = (ROOT / "drivers" / "maps" / "generic-ring.yaml").read_text(encoding="utf-8")
+    shipped = (ROOT / "drivers" / "codecs" / "maps" / "generic-ring.yaml").read_text(encoding="utf-8")
     own = tmp_path / "mine.yaml"
     own.write_text(shipped, encoding="utf-8")
     with scanned_oval(tmp_path, "--unpaced") as device:
@@ -105,7 +105,7 @@ def test_a_replay_reads_registers_as_the_map_of_that_day_told(tmp_path: Path) ->
 
 def test_a_map_without_a_suffix_lies_beside_the_plan_and_is_replayed_without_it(tmp_path: Path) -> None:
     own = tmp_path / "mymap"
-    own.write_text((ROOT / "drivers" / "maps" / "generic-ring.yaml").read_text(encoding="utf-8"), encoding="utf-8")
+    own.write_text((ROOT / "drivers" / "codecs" / "maps" / "generic-ring.yaml").read_text(encoding="utf-8"), encoding="utf-8")
     with scanned_oval(tmp_path, "--unpaced") as device:
         code, facts, errors = run(tmp_path, f"{{type: modbus, map: mymap, address: '{device.address}'}}", "--records", str(tmp_path))
     assert (code, facts["received"]) == (0, COUNT), errors
@@ -118,7 +118,7 @@ def test_a_map_without_a_suffix_lies_beside_the_plan_and_is_replayed_without_it(
 def test_a_map_in_a_record_that_cannot_be_read_is_named_with_its_run(tmp_path: Path) -> None:
     """Records of earlier versions hold the map as its file spelt it, and a plan may name a file that is gone."""
     _, recorder = record(tmp_path, Script(*scan_arrivals()))
-    with reading(tmp_path, today) as store:
+    with open_to_read(tmp_path, today) as store:
         recorded = recorded_run(store, recorder.run)
         tree = yaml.safe_load(recorded.plan)
         points = {"at": 0, "fields": {"x": {"at": 0, "type": "int16", "scale": "true"}}}

@@ -13,7 +13,7 @@ from cmmlink.console.ct_import import CtImport, Section
 from cmmlink.console.refused import Refused
 from cmmlink.console.station import Station
 from cmmlink.events import Counts, RunStarted
-from cmmlink.result_json import summary
+from cmmlink.result_json import result_json
 from cmmlink.run_view import Ended, RunContext
 from inspection import NominalProfile, NurbsCurve, ToleranceZone, discretize
 
@@ -28,7 +28,7 @@ def profile() -> NominalProfile:
 def section_at(height_mm: float, profile: NominalProfile) -> Section:
     context = RunContext(f"section {height_mm:g}", "ct.yaml", profile, ToleranceZone(-0.1, 0.2), 0.9, 1000, datetime(2026, 11, 22, 12))
     return Section(
-        height_mm, context, RunStarted("blade", "", "", "", False), Ended("complete", "", summary(None, Counts()), None), ("thin",)
+        height_mm, context, RunStarted("blade", "", "", "", False), Ended("complete", "", result_json(None, Counts()), None), ("thin",)
     )
 
 

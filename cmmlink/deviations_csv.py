@@ -4,8 +4,7 @@ import csv
 import math
 from pathlib import Path
 
-from cmmlink.record.bodies import JudgedRows
-from inspection import NOT_JUDGED, InspectionResult, Rejection, Verdict
+from inspection import NOT_JUDGED, JudgedRows, Rejection, Verdict
 
 COLUMNS = {
     "index": "the number of the point in the order of arrival, from 0",
@@ -19,18 +18,18 @@ COLUMNS = {
 }
 
 
-def write_deviations(result: InspectionResult | JudgedRows, path: Path) -> None:
+def write_deviations(rows: JudgedRows, path: Path) -> None:
     """Write the actual points in nominal coordinates, their feet, deviations and verdicts; rejected points say why."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(COLUMNS)
-        writer.writerows(_row(result, index) for index in range(result.received))
+        writer.writerows(_row(rows, index) for index in range(rows.received))
 
 
-def _row(result: InspectionResult | JudgedRows, index: int) -> tuple[str | int, ...]:
-    x, y = result.actual_mm[index]
-    foot_x, foot_y = result.foot_mm[index]
-    values = (x, y, result.station_mm[index], foot_x, foot_y, result.deviation_mm[index])
-    code = result.verdicts[index]
-    word = f"rejected: {Rejection(int(result.rejection[index])).words}" if code == NOT_JUDGED else Verdict(int(code)).word
+def _row(rows: JudgedRows, index: int) -> tuple[str | int, ...]:
+    x, y = rows.actual_mm[index]
+    foot_x, foot_y = rows.foot_mm[index]
+    values = (x, y, rows.station_mm[index], foot_x, foot_y, rows.deviation_mm[index])
+    code = rows.verdicts[index]
+    word = f"rejected: {Rejection(int(rows.rejection[index])).words}" if code == NOT_JUDGED else Verdict(int(code)).word
     return (index, *("" if math.isnan(value) else f"{value:.6f}" for value in values), word)
