@@ -15,7 +15,7 @@ from inspection.kernels.layout import SAMPLE_METHODS
 from inspection.kernels.on_samples import SampleTables, project_on_samples
 from inspection.kernels.pose import OutlierLimit, PoseEstimate, PoseFit
 from inspection.kernels.scan_rows import judge, placed, take_in
-from inspection.kernels.strides import strides
+from inspection.kernels.thinning import strides
 
 __all__ = [
     "SAMPLE_METHODS",
