@@ -12,7 +12,8 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,14 +116,14 @@ class _Service:
             if self._device.done and finished_s is None:
                 finished_s = time.monotonic()
                 self._announce(json.dumps({"points": self._device.count, **self._injector.tally}))
-        await server.shutdown()  # type: ignore[no-untyped-call]
+        await _shut_down(server)
         if self._relay is not None:
             self._relay.close()
 
     async def _go_away(self, server: ModbusBaseServer, seconds: float) -> ModbusBaseServer:
         """Take the server away and bring it back under the same address."""
         self._away_s = None
-        await server.shutdown()  # type: ignore[no-untyped-call]
+        await _shut_down(server)
         if self._relay is not None:
             self._relay.plugged = False
         await asyncio.sleep(seconds)
@@ -210,13 +211,20 @@ class _Service:
             self._began_s = None
 
 
-def _fifo_request(read: Callable[[int], object]) -> type[ModbusPDU]:
+class _Server(Protocol):
+    async def shutdown(self) -> object: ...
+
+
+async def _shut_down(server: _Server) -> None:
+    await server.shutdown()
+
+
+def _fifo_request(read: Callable[[int], Awaitable[list[int]]]) -> type[ModbusPDU]:
     """Make a request of function 24 whose answer comes from `read`; the library's own answers a constant."""
 
     class Request(ReadFifoQueueRequest):
         async def datastore_update(self, context: ModbusServerContext, device_id: int) -> ModbusPDU:
-            values = await read(self.address)  # type: ignore[misc]
-            return ReadFifoQueueResponse(values=values, dev_id=device_id, transaction_id=self.transaction_id)
+            return ReadFifoQueueResponse(values=await read(self.address), dev_id=device_id, transaction_id=self.transaction_id)
 
     return Request
 

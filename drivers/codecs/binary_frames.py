@@ -106,7 +106,7 @@ class BinaryDecoder:
         return count * SIZE
 
     def _take_one(self, data: bytes, at: int) -> int:
-        """Take one frame or step over what is none; return the number of bytes used, 0 if more are needed."""
+        """Take one frame, or step over bytes that are none; return the number of bytes used, 0 if more are needed."""
         left = len(data) - at
         if left and data[at] != SYNC[0]:
             found = data.find(SYNC, at)
@@ -210,7 +210,7 @@ class BinaryDecoder:
         self._out.append(PointBatch(sequence, time_s, xyz / UNITS_PER_MM))
 
     def _learn_pace(self, sequence: int, raw_us: int) -> None:
-        """Follow the time from point to point; a pause counts little."""
+        """Follow the time from point to point in a running mean that a pause hardly changes."""
         points = sequence - self._last_sequence
         if self._last_us is not None and points > 0:
             us = ((raw_us - self._last_us) % (1 << 32)) / points

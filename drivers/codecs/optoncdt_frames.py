@@ -171,7 +171,7 @@ class OptoncdtDecoder:
         return np.asarray(blocks.follows(before[0], before[1], self._rate_hz) & (counter == expected))
 
     def _block_of(self, values: Sequence[int] | NDArray[np.int64]) -> _Block:
-        """Pick what is needed from the values of a block, or from the columns (words, m) of many."""
+        """Pick distance, counter and clock out of the values of a block, or out of the columns (words, m) of many blocks."""
         counter, low, high = self._places
         return _Block(values[0], values[counter], (values[high] & 0xFFFF) << 16 | (values[low] & 0xFFFF))
 
@@ -263,7 +263,7 @@ class OptoncdtDecoder:
         self._distances.take(place.sequence - self._first, ticks, distance_mm, lost=place.lost, refusal=refusal)
 
     def _refusal(self, block: _Block) -> str:
-        """Return why a value is no distance; nothing if it is one."""
+        """Return why a value is no distance, or nothing if it is one."""
         if block.distance in ERRORS:
             return ERRORS[int(block.distance)]
         return "" if block.is_in_range() else "outside the measuring range"

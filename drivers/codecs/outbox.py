@@ -30,7 +30,7 @@ class Outbox:
             self.append(Lost(count, gap if count > 0 else "arrived late after all"))
 
     def append_overflow(self) -> None:
-        """Append that the device itself lost points; how many, its counter will show."""
+        """Append that the device itself lost points; its counter will show how many."""
         self.append(Lost(0, "the device says that its buffer overflowed; its counter shows how many"))
 
     def flush(self) -> None:

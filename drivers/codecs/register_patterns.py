@@ -62,7 +62,7 @@ class Pattern:
         raise NotImplementedError
 
     def end_turn(self) -> None:
-        """Wait, for nothing new was there."""
+        """End a turn in which nothing new was there; the next one may wait a little."""
         self.idle = True
         self._account.end_if_finished()
         self.begin_turn()
@@ -169,7 +169,11 @@ class Ring(Pattern):
             self._next_place = int(places[-1]) + 1
 
     def _end_if_finished(self) -> None:
-        """A device that does not tell how many points it sent has sent those it wrote; the sequence shows only gaps between two."""
+        """Close the scan if the device has told its end.
+
+        A device that does not tell how many points it sent has sent those it wrote; what is lost before the first point and after
+        the last one does not show in their counters.
+        """
         if self._account.ends_without_count:
             before, last = (self._written, self._written) if self._first_place is None else (self._first_place, self._next_place)
             self._out.append_loss(before + self._written - last, "written by the device, never received soundly")

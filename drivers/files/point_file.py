@@ -96,7 +96,7 @@ def read_points(path: Path, scale: float = 1.0) -> PointFile:
 
 
 def points_of(columns: Columns, scale: float) -> tuple[Array, tuple[str, ...]]:
-    """Points (m, 3) in mm of the columns x, y and z (by their names, else the first ones), and notes.
+    """Return points (m, 3) in mm from the columns x, y and z, found by their names or else the first ones, and notes.
 
     Raises PointFileError when it is not clear which columns those are, or when a coordinate is no usable number.
     """
@@ -107,7 +107,7 @@ def points_of(columns: Columns, scale: float) -> tuple[Array, tuple[str, ...]]:
 
 
 def convert_to_mm(values: Array, line_numbers: NDArray[np.int64], scale: float, place: str = "line") -> Array:
-    """Values (m, c) times scale, all finite and below a kilometre; PointFileError names the first line that is not."""
+    """Return values (m, c) times scale. Raises PointFileError at the first number that is not finite or is beyond a kilometre."""
     if not (np.isfinite(scale) and scale > 0):
         raise PointFileError(f"the scale must be a positive number, not {scale:g}")
     with np.errstate(over="ignore", invalid="ignore"):
@@ -122,7 +122,7 @@ def convert_to_mm(values: Array, line_numbers: NDArray[np.int64], scale: float, 
 
 
 def _choose_columns(columns: Columns, scale: float) -> tuple[list[int], list[str]]:
-    """Which columns are x, y and, if there is one, z; and notes."""
+    """Choose the columns that are x, y and, if there is one, z; return their places, and notes."""
     count = columns.values.shape[1]
     letters = axis_letters(columns.names)
     for letter in "xyz":
@@ -160,7 +160,7 @@ def _refuse_fewer_than_two(points: Sequence[object] | Array) -> None:
 
 
 def _read_npy(path: Path, scale: float) -> PointFile:
-    """Array (m, 2) or (m, 3) of numbers from an npy file, mapped first so that a header that lies costs no memory."""
+    """Read an array (m, 2) or (m, 3) from an npy file. It is mapped first, so that a header that promises too much costs no memory."""
     if not read_bytes(path):
         raise PointFileError(f"{path}: the file is empty")
     try:

@@ -48,7 +48,7 @@ class Columns:
 
 
 def read_text(path: Path) -> str:
-    """Text of a file in UTF-8, UTF-16 with a byte order mark, or Latin-1. Raises PointFileError, also when it is no text."""
+    """Read the text of a file in UTF-8, UTF-16 with a byte order mark, or Latin-1. Raises PointFileError, also when it is no text."""
     data = read_bytes(path)
     try:
         text = data.decode("utf-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
@@ -81,7 +81,7 @@ def read_bytes(path: Path) -> bytes:
 
 
 def parse_columns(text: str) -> Columns:
-    """Columns of numbers, at least two, from text. Raises PointFileError, naming the line."""
+    """Read columns of numbers, at least two, from a text. Raises PointFileError, naming the line."""
     header, data, comment = _split_lines(text)
     if not data:
         raise PointFileError("no line of numbers in the file; expected two or three columns of numbers")
@@ -123,7 +123,7 @@ class _Reading:
     decimal: str
 
     def fields(self, line: str) -> list[str]:
-        """Columns of a line; a delimiter at the very end ends the last one."""
+        """Split a line into its columns; a delimiter at the very end begins no further column."""
         fields = [field.strip() for field in line.split(self.delimiter)]
         return fields[:-1] if len(fields) > 1 and not fields[-1] else fields
 
@@ -137,7 +137,7 @@ class _Reading:
         return len(fields) > 1 and all(map(self.is_number, fields))
 
     def row(self, number: int, line: str) -> list[float]:
-        """Numbers of a line, or a PointFileError that names what is none."""
+        """Return the numbers of a line. Raises PointFileError, naming what is none."""
         fields = self.fields(line)
         for column, field in enumerate(fields, 1):
             if not self.is_number(field):
@@ -155,7 +155,7 @@ _READINGS = tuple(_Reading(*marks) for marks in ((";", "."), (";", ","), ("\t", 
 
 
 def _split_lines(text: str) -> tuple[Numbered, Numbered, Numbered]:
-    """Header lines, lines of data, and the last comment before the data (it may name the columns)."""
+    """Split a text into header lines, lines of data, and the last comment before the data, which may name the columns."""
     header: Numbered = []
     data: Numbered = []
     comment: Numbered = []
@@ -172,7 +172,7 @@ def _split_lines(text: str) -> tuple[Numbered, Numbered, Numbered]:
 
 
 def _values(data: Numbered, reading: _Reading) -> Array:
-    """Numbers (m, c) of the lines; numpy reads plain files, and whatever it stumbles over is looked at line by line."""
+    """Return the numbers (m, c) of the lines. numpy reads plain files; what it cannot read is looked at line by line."""
     if reading.decimal == ".":
         try:
             return np.loadtxt([line for _, line in data], delimiter=reading.delimiter, comments=None, ndmin=2)
@@ -189,7 +189,7 @@ def _values(data: Numbered, reading: _Reading) -> Array:
 
 
 def _is_header(line: str) -> bool:
-    """Words, not numbers: the first is no number, nor are more than half of them (a damaged row has more)."""
+    """Tell whether a line is a header: its first word is no number, and at most half of its words are (a damaged row has more)."""
     words = [word for word in re.split(r"[;,\t ]+", line) if word]
     numbers = [_NUMBER.fullmatch(word) is not None for word in words]
     return line[0] != "#" and re.search(r"[^\W\d_]", line) is not None and not numbers[0] and 2 * sum(numbers) <= len(numbers)
@@ -209,7 +209,7 @@ def _find_reading(data: Numbered) -> _Reading:
 
 
 def _drop_count(data: Numbered, reading: _Reading, notes: list[str]) -> Numbered:
-    """Drop a first line that is the count of the points (pts and xyz files), and hold the file to it."""
+    """Drop a first line that counts the points (pts and xyz files), and refuse a file that holds another number of them."""
     number, line = data[0]
     if len(data) < 2 or not line.isdecimal() or not reading.explains(data[1][1]):
         return data
@@ -220,7 +220,7 @@ def _drop_count(data: Numbered, reading: _Reading, notes: list[str]) -> Numbered
 
 
 def _refuse_unclear_commas(data: Numbered, reading: _Reading, columns: int) -> None:
-    """1,5,2,5 may be four whole numbers or two with decimal commas: nobody can know."""
+    """Refuse lines like 1,5,2,5, which may be four whole numbers or two with decimal commas."""
     if reading.delimiter != "," or any("." in line or "e" in line.lower() for _, line in data):
         return
     for number, line in data:
@@ -232,7 +232,7 @@ def _refuse_unclear_commas(data: Numbered, reading: _Reading, columns: int) -> N
 
 
 def _names(header: Numbered, comment: Numbered, reading: _Reading, columns: int) -> tuple[str, ...]:
-    """Names of the columns: the last header line or the last comment before the data, when one fits.
+    """Return the names of the columns: the last header line or the last comment before the data, when one fits.
 
     Words apart by blanks are names only if x and y are among them; else they are a title of as many words.
     """

@@ -14,9 +14,10 @@ class Capture:
     """Plays recorded arrivals, in their order."""
 
     def __init__(self, recorded: Iterable[Arrival], decoder: Decoder | None, failure: str = "") -> None:
-        """`decoder`: decode the wire bytes and pass over what was decoded then; None: give everything as recorded.
+        """Take the recorded arrivals, and the `failure` that ended the scan; it is raised as a DeviceError where they end.
 
-        `failure`: what ended the scan; raised as a DeviceError where the recorded arrivals end.
+        With a `decoder` the wire bytes are decoded anew and what was decoded then is passed over; without one every arrival is given
+        as it was recorded.
         """
         self._recorded, self._decoder, self._failure = recorded, decoder, failure
         self._stopped = Event()

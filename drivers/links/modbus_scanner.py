@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import closing
+from typing import Protocol
 
 from pymodbus import ModbusException
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
@@ -124,7 +125,7 @@ class ModbusScanner:
         raise LinkError(f"{self._address}: no answer within {self._timeout_s:g} s, {TRIES} times in a row: {failure or 'always busy'}")
 
     def _let_late_answers_pass(self, client: ModbusBaseSyncClient) -> None:
-        client.close()  # type: ignore[no-untyped-call]
+        _close(client)
         if isinstance(client, ModbusSerialClient):  # over TCP a late answer dies with its connection
             self._stopped.wait(2 * self._timeout_s)
         if not self._stopped.is_set() and not client.connect():
@@ -143,6 +144,14 @@ class ModbusScanner:
         if not client.connect():
             raise LinkError(f"{self._address}: no Modbus device opens there; is it switched on, plugged in, free, and named right?")
         return client
+
+
+class _Closable(Protocol):
+    def close(self) -> object: ...
+
+
+def _close(client: _Closable) -> None:
+    client.close()
 
 
 def _execute(client: ModbusBaseSyncClient, request: bytes, device_id: int) -> ModbusPDU:

@@ -62,7 +62,7 @@ class _Graph:
 def chain_sections(
     segments_mm: NDArray[np.float64], plane: NDArray[np.intp], planes: int, weld_mm: float, shortest_mm: float | None
 ) -> list[ChainedSection]:
-    """Chain (s, 2, 2) segments, `plane` (s,) telling the section of each, to one result per section.
+    """Chain segments (s, 2, 2) into one result for each section; `plane` (s,) tells to which section a segment belongs.
 
     `shortest_mm` is the length below which a piece is set aside; None takes 5 % of the section's longest piece.
     """
@@ -97,7 +97,7 @@ def chain_sections(
 def _weld(
     segments_mm: NDArray[np.float64], plane: NDArray[np.intp], weld_mm: float
 ) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.intp]]:
-    """Nodes (v, 2), their sections (v,), and the segments as node pairs (s, 2): ends in one cell of a `weld_mm` grid are one node."""
+    """Make one node of all ends in one cell of a `weld_mm` grid; return nodes (v, 2), their sections (v,), segments as pairs (s, 2)."""
     points = segments_mm.reshape(-1, 2)
     cells = np.rint(points / weld_mm).astype(np.int64)
     sections = np.repeat(plane, 2)
@@ -197,7 +197,7 @@ def _adjacency(edges: NDArray[np.intp], nodes: int) -> coo_array:
 
 
 def _walk(graph: _Graph, label: NDArray[np.int32], keep: NDArray[np.bool_]) -> list[NDArray[np.intp]]:
-    """Nodes of each kept piece in order: one depth-first walk from a root tied to one node of each, an end where there is one."""
+    """Return the nodes of each kept piece in order, by one depth-first walk from a root that is tied to an end of each, or to any node."""
     v, edges = len(graph.nodes_mm), graph.edges
     start = np.full(len(keep), -1, dtype=np.int32)
     start[label] = np.arange(v)
@@ -240,7 +240,7 @@ def _line(nodes: NDArray[np.float64]) -> Chain:
 
 
 def _encloses(ring: NDArray[np.float64], point: NDArray[np.float64]) -> bool:
-    """Whether the ring runs round the point: a ray towards +x crosses it an odd number of times."""
+    """Tell whether the ring runs round the point: a ray towards +x then crosses it an odd number of times."""
     x, y = (ring - point).T
     next_x, next_y = np.roll(x, -1), np.roll(y, -1)
     crosses = (y >= 0) != (next_y >= 0)

@@ -1,4 +1,4 @@
-"""A surface cut by parallel planes to slices, whose contours are one more source of points (contour_source.py).
+"""Parallel planes cut a surface into sections, whose contours are one more source of points (contour_source.py).
 
 Triangles that straddle a plane are selected first, in one pass over the file; only those are cut, by Open3D in a process of
 its own (so that acquisition in this one never waits for it) or by plain numpy. Both work in the plane's own axes on the same
@@ -50,7 +50,7 @@ def cut_surface(
     shortest_mm: float | None = None,
     workers: int = 2,
 ) -> Iterator[SurfaceSection]:
-    """Cut by the planes of these heights along the unit normal; slices come in the order of the heights.
+    """Cut by the planes of these heights along the unit normal; sections come in the order of the heights.
 
     `cutter` is a `NumpyCutter` or an `Open3DProcess`. Loose ends within `weld_mm` are one point;
     pieces shorter than `shortest_mm` (None: 5 % of the section's longest) are set aside and counted.
@@ -79,7 +79,7 @@ def cut_surface(
 def _work_ahead(
     work: Callable[[tuple[int, int]], list[SurfaceSection]], batches: list[tuple[int, int]], workers: int
 ) -> Iterator[SurfaceSection]:
-    """Results in order, by `workers` threads (numpy lets go of the interpreter), never more than twice as many waiting."""
+    """Yield the results in order. `workers` threads compute them, as numpy releases the interpreter; at most twice as many wait."""
     with ThreadPoolExecutor(workers, thread_name_prefix="cut") as pool:
         waiting = deque(pool.submit(work, batch) for batch in batches[: 2 * workers])
         for batch in [*batches[2 * workers :], None]:
@@ -122,13 +122,13 @@ def _check_heights(heights_mm: Sequence[float]) -> NDArray[np.float64]:
 
 
 def _flatness_mm(mesh: SurfaceMesh) -> float:
-    """How far rounding to float32 can lift a corner out of the plane of its facet: two spacings of the largest coordinate."""
+    """Return how far rounding to float32 can lift a corner out of the plane of its facet: two spacings of the largest coordinate."""
     largest = np.float32(max(np.abs(mesh.lower_mm).max(), np.abs(mesh.upper_mm).max()))
     return 2.0 * float(np.spacing(largest))
 
 
 def height_range_mm(mesh: SurfaceMesh, normal: Sequence[float]) -> tuple[float, float]:
-    """Lowest and highest point of the surface along the unit normal, in one pass."""
+    """Return the heights of the lowest and the highest point of the surface along the unit normal, found in one pass."""
     axes = axes_of(normal)
     low, high = np.inf, -np.inf
     for corners in mesh.pieces():
@@ -149,7 +149,7 @@ class _Pass:
 
 
 def _gather(mesh: SurfaceMesh, axes: SectionAxes, heights: NDArray[np.float64]) -> _Pass:
-    """One pass: triangles with a corner below and one at or above a plane, for every plane."""
+    """Gather in one pass, for every plane, the triangles with a corner below it and one at or above it."""
     order = np.argsort(heights, kind="stable")
     sorted_heights = heights[order]
     tolerance = _flatness_mm(mesh)
@@ -168,7 +168,7 @@ def _gather(mesh: SurfaceMesh, axes: SectionAxes, heights: NDArray[np.float64]) 
 
 
 def _span(corners: NDArray[np.floating], axes: SectionAxes) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Lowest and highest corner of each triangle, (k,) and (k,)."""
+    """Return the heights of the lowest and the highest corner of each triangle, (k,) and (k,)."""
     a, b, c = (axes.height_mm(corners[:, at, 0], corners[:, at, 1], corners[:, at, 2]) for at in range(3))
     return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
 
@@ -176,7 +176,7 @@ def _span(corners: NDArray[np.floating], axes: SectionAxes) -> tuple[NDArray[np.
 def _find_straddling(
     low: NDArray[np.float64], high: NDArray[np.float64], sorted_heights: NDArray[np.float64]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Pairs (triangle, rank of plane) with low < height <= high."""
+    """Return the triangles and the ranks of the planes, (p,) and (p,), of all pairs with low < height <= high."""
     if len(sorted_heights) <= _FEW_PLANES:
         hits = [np.flatnonzero((low < height) & (high >= height)) for height in sorted_heights]
         return np.concatenate(hits), np.repeat(np.arange(len(hits)), [len(hit) for hit in hits])
@@ -191,7 +191,7 @@ def _find_straddling(
 def _select(
     mesh: SurfaceMesh, axes: SectionAxes, heights: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.floating], NDArray[np.intp]]:
-    """Heights actually cut, the straddling triangles (t, 3, 3), and the plane of each (t,), ascending."""
+    """Return the heights that are really cut, the straddling triangles (t, 3, 3), and the plane of each (t,), ascending."""
     found = _gather(mesh, axes, heights)
     _refuse_misses(mesh, heights, found)
     moved = heights.copy()
@@ -247,7 +247,7 @@ def _batches(starts: NDArray[np.intp]) -> Iterator[tuple[int, int]]:
 
 
 def _to_plane(corners: NDArray[np.floating], axes: SectionAxes, heights: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Corners as in-plane x, y and height above their plane, (t, 3, 3); the same arithmetic as in the selection."""
+    """Return corners as in-plane x, y and height above their plane, (t, 3, 3), by the same arithmetic as in the selection."""
     x, y, z = corners[:, :, 0], corners[:, :, 1], corners[:, :, 2]
     local = np.empty(corners.shape)
     local[:, :, :2] = axes.section_mm(corners)
@@ -258,7 +258,7 @@ def _to_plane(corners: NDArray[np.floating], axes: SectionAxes, heights: NDArray
 def _cut_each(
     cutter: Cutter, triangles: NDArray[np.float64], plane: NDArray[np.intp], planes: int
 ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Segments (s, 2, 2) and the plane of each. numpy keeps one segment per triangle, so all planes are cut in one go."""
+    """Return segments (s, 2, 2) and the plane of each. numpy keeps one segment a triangle, so it cuts all planes in one go."""
     if isinstance(cutter, NumpyCutter):
         return cutter.cut(triangles), plane
     starts = np.searchsorted(plane, np.arange(planes + 1))

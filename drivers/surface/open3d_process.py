@@ -67,7 +67,7 @@ class Open3DStatus:
 
 
 class Open3DProcess:
-    """A running child with Open3D in it: a `Cutter` for ct_slice.py, and the reader of PLY and OBJ.
+    """A running child with Open3D in it: a `Cutter` for cut.py, and the reader of PLY and OBJ.
 
     Use as a context manager. Starting returns at once; the first call waits until Open3D is there.
     """
@@ -171,7 +171,7 @@ def open3d_status(python: Sequence[str] = (sys.executable,)) -> Open3DStatus:
 
 
 def mend_open3d(status: Open3DStatus, run: Callable[[Sequence[str]], int], is_root: bool) -> bool:
-    """Install the missing shared libraries where that is possible: apt, and root. `run` gives the command's exit status.
+    """Install the missing shared libraries where apt and the rights of root allow it. `run` returns the exit status of a command.
 
     Returns whether a command ran and succeeded; `status.mend` is what the operator has to run otherwise.
     """
@@ -211,7 +211,7 @@ def _corners(vertices: NDArray[np.floating], triangles: NDArray[np.integer], pat
 
 
 def _send(pipe: IO[bytes], message: dict[str, Any], arrays: list[NDArray[Any]]) -> None:
-    """One message: its JSON line, which announces the arrays, then their bytes."""
+    """Send one message: a line of JSON, which announces the arrays, then their bytes."""
     pipe.write(json.dumps({**message, "arrays": [[array.dtype.str, list(array.shape)] for array in arrays]}).encode() + b"\n")
     for array in arrays:
         pipe.write(np.ascontiguousarray(array).reshape(-1).view(np.uint8).data)
@@ -277,7 +277,7 @@ def _missing_libraries() -> list[str]:
 
 
 def _cut(open3d: Any, triangles: NDArray[np.float64]) -> tuple[dict[str, Any], list[NDArray[Any]]]:
-    """SurfaceSection at height zero, in float64; the unit normal is z because heights are."""
+    """Cut at height zero, in float64; the normal is z, because the third coordinate is the height above the plane."""
     core = open3d.core
     corners = core.Tensor.from_numpy(triangles.reshape(-1, 3).copy())
     indices = core.Tensor.from_numpy(np.arange(3 * len(triangles), dtype=np.int64).reshape(-1, 3))

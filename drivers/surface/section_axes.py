@@ -28,21 +28,21 @@ class SectionAxes:
             array.setflags(write=False)
 
     def height_mm(self, x_mm: NDArray[np.floating], y_mm: NDArray[np.floating], z_mm: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Heights of machine points. Element by element and always in one order: equal points have bit-equal heights."""
+        """Return the heights of machine points, added up in one order everywhere, so that equal points have bit-equal heights."""
         return _dot(self.normal, x_mm, y_mm, z_mm)
 
     def section_mm(self, points_mm: NDArray[np.floating]) -> NDArray[np.float64]:
-        """(..., 3) machine points to (..., 2) in the plane's axes; bit-equal points stay bit-equal."""
+        """Return machine points (..., 3) in the plane's axes, (..., 2); bit-equal points stay bit-equal."""
         x, y, z = points_mm[..., 0], points_mm[..., 1], points_mm[..., 2]
         return np.stack([_dot(self.x, x, y, z), _dot(self.y, x, y, z)], axis=-1)
 
     def machine_mm(self, section_mm: NDArray[np.float64], height_mm: float) -> NDArray[np.float64]:
-        """(m, 2) points in the plane at `height_mm` back to (m, 3) machine points."""
+        """Return points (m, 2) of the plane at `height_mm` as machine points, (m, 3)."""
         return section_mm[:, :1] * self.x + section_mm[:, 1:] * self.y + height_mm * self.normal
 
 
 def axes_of(normal: Sequence[float]) -> SectionAxes:
-    """Axes of the planes with this normal, of any length but zero."""
+    """Return the axes of the planes with this normal, which may have any length but zero."""
     direction = np.array(normal, dtype=np.float64)
     if direction.shape != (3,) or not np.isfinite(direction).all() or not direction.any():
         raise ValueError(f"the normal {tuple(normal)} must be three finite numbers, not all zero")
@@ -55,7 +55,7 @@ def axes_of(normal: Sequence[float]) -> SectionAxes:
 
 
 def _dot(direction: NDArray[np.float64], x: NDArray[np.floating], y: NDArray[np.floating], z: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Dot products without BLAS, whose rounding depends on the position in the array; zero components cost nothing."""
+    """Return dot products without BLAS, whose rounding depends on the position in the array; zero components cost nothing."""
     total: NDArray[np.float64] | None = None
     for part, coordinate in zip(direction, (x, y, z), strict=True):
         if part != 0.0:

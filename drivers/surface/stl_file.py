@@ -96,7 +96,7 @@ def surface_of(corners_mm: NDArray[np.floating], source: str, kind: str, warning
 
 
 def _check(pieces: Callable[[], Iterator[NDArray[np.floating]]], source: str, kind: str, warnings: tuple[str, ...] = ()) -> SurfaceMesh:
-    """One pass over the surface: its box, its number of triangles, and the error for the first that cannot be used."""
+    """Go over the surface once for its box and its number of triangles. Raises MeshError for the first triangle that cannot be used."""
     count = 0
     lower, upper = np.full(3, np.inf), np.full(3, -np.inf)
     for piece in pieces():
@@ -111,7 +111,7 @@ def _check(pieces: Callable[[], Iterator[NDArray[np.floating]]], source: str, ki
 
 
 def _box(corners: NDArray[np.floating]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Lowest and highest coordinates, (3,) each; NaN comes through. Long rows, because numpy reduces those ten times faster."""
+    """Return the lowest and the highest coordinates, (3,) each; NaN stays NaN. Rows are long: numpy reduces those ten times faster."""
     rows = len(corners) // 100
     tall = corners[: 100 * rows].reshape(rows, -1) if rows else corners.reshape(len(corners), -1)
     rest = corners[100 * rows :].reshape(-1, 3) if rows else corners[:0].reshape(-1, 3)
@@ -152,7 +152,7 @@ def _why_no_stl(path: Path, size: int, promised: int | None) -> str:
 
 
 def _binary_pieces(path: Path, count: int, scale: float) -> Iterator[NDArray[np.floating]]:
-    """One pass over a binary file, in pieces of one reused buffer."""
+    """Yield a binary file once, in pieces that share one buffer."""
     records = np.empty(min(_CHUNK_TRIANGLES, count), RECORD)
     corners = np.empty((len(records), 3, 3), np.float32)
     with path.open("rb", buffering=0) as file:
@@ -174,7 +174,7 @@ def _read_all(file: FileIO, buffer: memoryview, path: Path) -> None:
 
 
 def _text_corners(path: Path) -> tuple[NDArray[np.float64], tuple[str, ...]]:
-    """(n, 3, 3) corners of an ASCII file, read in pieces that end at an `endfacet`, and what was odd."""
+    """Read an ASCII file in pieces that end at an `endfacet`; return corners (n, 3, 3), and warnings of what was odd."""
     pieces: list[NDArray[np.float64]] = [np.empty((0, 3, 3))]
     count, offset, rest, commas = 0, 0, b"", False
     with path.open("rb") as file:
@@ -198,13 +198,13 @@ def _text_corners(path: Path) -> tuple[NDArray[np.float64], tuple[str, ...]]:
 
 
 def _blank_solid_lines(text: bytes) -> bytes:
-    """Blank `solid NAME` and `endsolid NAME`, every byte keeping its place."""
+    """Overwrite `solid NAME` and `endsolid NAME` with blanks, so that every other byte keeps its place."""
     text = text.replace(b"\xef\xbb\xbf", b"   ")
     return _SOLID_LINES.sub(lambda line: b" " * len(line.group()), text) if b"solid" in text else text
 
 
 def _facets(text: bytes, first: int, offset: int, source: str) -> NDArray[np.float64]:
-    """(n, 3, 3) corners of a piece of text that holds whole facets only, or the error with its place."""
+    """Return the corners (n, 3, 3) of a text that holds whole facets only. Raises MeshError, naming the first word at fault."""
     body = _blank_solid_lines(text).replace(b",", b".")
     words = body.split()
     count = len(words) // _FACET_WORDS

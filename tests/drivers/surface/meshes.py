@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Triangles = NDArray[np.float64]
+A, B = 12.0, 5.0  # half axes of an ellipse; below 16 mm a float32 is good to 0.5e-6 mm
 
 
 def box(lower: tuple[float, float, float], upper: tuple[float, float, float]) -> Triangles:
@@ -20,6 +21,12 @@ def box(lower: tuple[float, float, float], upper: tuple[float, float, float]) ->
     ]  # fmt: skip
     triangles: Triangles = corners[np.array(faces)]
     return triangles
+
+
+def ellipse(points: int) -> Triangles:
+    """Points (m, 2) of the ellipse with the half axes A and B, even in its angle."""
+    angle = 2 * np.pi * np.arange(points) / points
+    return np.column_stack([A * np.cos(angle), B * np.sin(angle)])
 
 
 def tube(profile: NDArray[np.float64], heights: NDArray[np.float64]) -> Triangles:

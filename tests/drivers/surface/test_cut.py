@@ -10,16 +10,14 @@ import pytest
 from numpy.typing import NDArray
 
 from drivers.errors import MeshError
-from drivers.source import PointBatch, ScanClosed, ScanOpened
-from drivers.surface.contour_source import ContourSource, SurfaceSection, add_points_between
+from drivers.surface.contour_source import SurfaceSection
 from drivers.surface.cut import Cutter, NumpyCutter, cut_surface, height_range_mm
 from drivers.surface.open3d_process import Open3DProcess
 from drivers.surface.stl_file import SurfaceMesh, read_stl, surface_of
 from tests.drivers.surface.ct_phantom import make_phantom
-from tests.drivers.surface.meshes import Triangles, ascii_stl, binary_stl, box, rotation, tube, write
+from tests.drivers.surface.meshes import A, B, Triangles, ascii_stl, binary_stl, box, ellipse, rotation, tube, write
 
 CUBE = box((0, 0, 0), (10, 10, 10))
-A, B = 12.0, 5.0  # half axes of an ellipse; below 16 mm a float32 is good to 0.5e-6 mm
 
 
 @pytest.fixture(scope="module")
@@ -37,11 +35,6 @@ def mesh_of(triangles: NDArray[np.floating]) -> SurfaceMesh:
 def cut(triangles: NDArray[np.floating], height_mm: float, normal: tuple[float, float, float] = (0, 0, 1)) -> SurfaceSection:
     (found,) = cut_surface(mesh_of(triangles), normal, [height_mm], cutter=NumpyCutter())
     return found
-
-
-def ellipse(points: int) -> Triangles:
-    angle = 2 * np.pi * np.arange(points) / points
-    return np.column_stack([A * np.cos(angle), B * np.sin(angle)])
 
 
 def off_ellipse_mm(points: Triangles) -> float:
@@ -121,39 +114,6 @@ def test_a_stack_is_the_same_as_its_sections_one_by_one(workers: int) -> None:
         assert len(found.contours) == len(single.contours) >= 1
         for a, b in zip(found.contours, single.contours, strict=True):
             assert np.array_equal(a.points_mm, b.points_mm)
-
-
-def test_a_contour_is_a_source_of_points_like_any_scan() -> None:
-    (contour,) = cut(tube(ellipse(1500), np.array([0.0, 10.0])), 5.0).contours
-    opened, *batches, closed = ContourSource([contour], "blade.stl", batch_points=1000).arrivals()
-    assert opened == ScanOpened("surface blade.stl", "", 3000)
-    assert closed == ScanClosed(3000)
-    points = [batch.points_mm for batch in batches if isinstance(batch, PointBatch)]
-    assert np.array_equal(np.concatenate(points), contour.points_mm)
-    assert [int(b.sequence[0]) for b in batches if isinstance(b, PointBatch)] == [0, 1000, 2000]
-
-    stopped = ContourSource([contour], "blade.stl", batch_points=1000)
-    arrivals = stopped.arrivals()
-    next(arrivals), next(arrivals)
-    stopped.stop()
-    assert list(arrivals) == []
-
-
-def test_points_between_corners_are_even_lie_on_the_pieces_and_keep_the_corners() -> None:
-    (contour,) = cut(CUBE, 4.0).contours
-    dense = add_points_between(contour, 0.3)
-    closing = np.concatenate([dense.section_mm, dense.section_mm[:1]])
-    steps = np.linalg.norm(np.diff(closing, axis=0), axis=1)
-    assert steps.max() < 0.3 + 1e-12
-    assert steps.min() > 0.15
-    assert steps.sum() == pytest.approx(40.0)
-    assert {tuple(p) for p in contour.points_mm} <= {tuple(p) for p in dense.points_mm}
-    assert np.all(np.min(np.abs(np.concatenate([dense.section_mm, 10 - dense.section_mm], axis=1)), axis=1) == 0)
-    assert np.array_equal(dense.points_mm[:, :2], dense.section_mm)
-    assert add_points_between(contour, 10.0) is contour
-    (line,) = cut(np.delete(CUBE, [10, 11], axis=0), 5.0, (1, 0, 0)).contours
-    ends = add_points_between(line, 0.3).section_mm[[0, -1]]
-    assert np.array_equal(ends, line.section_mm[[0, -1]])
 
 
 # The two cutters against each other -----------------------------------------------------------------------------------
