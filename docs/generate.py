@@ -11,11 +11,12 @@ from pydantic import BaseModel
 import drivers
 import inspection
 import simulators
+from cmmlink import deviations_csv
 from cmmlink.plan.reference import Group, groups_of, table
 from cmmlink.plan.scan import Plan
 from cmmlink.plan.surface import CtPlan
 from cmmlink.record import export
-from cmmlink.report import deviations_csv, stack_folder
+from cmmlink.report import stack_folder
 from cmmlink.result_keys import (
     Exported,
     Inspected,
