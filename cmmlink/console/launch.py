@@ -38,9 +38,9 @@ def serve(setup: StationSetup, version: str, host: str = "127.0.0.1", port: int 
     try:
         yield server
     finally:
-        if station.running:
-            station.abort()
-            station.wait(_GONE_S)
+        if station.job is not None:
+            station.job.abort()
+            station.job.wait(_GONE_S)
         server.stop()
 
 
@@ -74,7 +74,7 @@ def graphical_browser() -> webbrowser.BaseBrowser | None:
 
 
 def stay_while_seen(server: "ConsoleServer", ended: threading.Event) -> None:
-    """Return when the last page has been closed and nothing is measured any more, or when told."""
+    """Return once the last page has been closed and nothing is measured any more, or once `ended` is set."""
     unseen_s = 0.0
     while unseen_s < _GONE_S and not ended.wait(_LOOK_S):
         unseen_s = 0.0 if server.pages or server.station.running else unseen_s + _LOOK_S

@@ -43,26 +43,27 @@ class PastRuns:
     """The records in a folder.
 
     decoder_of : the decoder of a plan's device, None for one without wire bytes
+    clock      : monotonic, s; now : date and time of day
     """
 
     folder: Path
     decoder_of: Callable[[Device], Decoder | None]
     clock: Callable[[], float]
-    today: Callable[[], datetime]
+    now: Callable[[], datetime]
     _known: dict[str, RunRow] = field(default_factory=dict)
 
     def runs(self) -> Sequence[RunRow]:
         """All runs, newest first. Raises StoreError."""
-        entries = list_runs(self.folder, self.today)[::-1][:_MOST_LISTED]
+        entries = list_runs(self.folder, self.now)[::-1][:_MOST_LISTED]
         unknown = [entry for entry in entries if entry["run"] not in self._known]
         if unknown:
-            with open_to_read(self.folder, self.today) as store:
-                self._known.update((entry["run"], _line(entry, _facts(store, entry["run"]))) for entry in unknown)
+            with open_to_read(self.folder, self.now) as store:
+                self._known.update((entry["run"], _row_of(entry, _result_of(store, entry["run"]))) for entry in unknown)
         return [self._known[entry["run"]] for entry in entries]
 
     def open_run(self, run: str) -> OpenedRun:
         """Give one run as it was recorded. Raises StoreError, RunError."""
-        with open_to_read(self.folder, self.today) as store:
+        with open_to_read(self.folder, self.now) as store:
             recorded = recorded_run(store, find_run(store, run))
             bodies = [record.body for record in store.records(recorded.run, "deviations")]
         end = recorded.end or {"state": "interrupted", "message": "the run is being recorded", "received": 0}
@@ -79,20 +80,20 @@ class PastRuns:
         )
 
     def replay_run(self, run: str, sinks: Sequence[Sink], stop: threading.Event) -> str:
-        """Measure a run again from its record; say whether the result is identical. Raises StoreError, RunError, PlanError."""
-        with open_to_read(self.folder, self.today) as store:
+        """Measure a run again from its record; returns a sentence on the result. Raises StoreError, RunError, PlanError."""
+        with open_to_read(self.folder, self.now) as store:
             recorded = recorded_run(store, find_run(store, run))
-            return _compare(replay(store, recorded, self.decoder_of, clock=self.clock, sinks=sinks, stop=stop), recorded.run)
+            return _comparison_of(replay(store, recorded, self.decoder_of, clock=self.clock, sinks=sinks, stop=stop), recorded.run)
 
     def export_run(self, run: str, folder: Path) -> Path:
         """Write one run as a zip archive into a folder. Raises StoreError, RunError, PlanError."""
-        with tempfile.TemporaryDirectory(dir=folder) as files, open_to_read(self.folder, self.today) as store:
+        with tempfile.TemporaryDirectory(dir=folder) as files, open_to_read(self.folder, self.now) as store:
             run = find_run(store, run)
             export_files(store, run, Path(files))
             return Path(shutil.make_archive(str(folder / run), "zip", files))
 
 
-def _facts(store: Store, run: str) -> dict[str, Any]:
+def _result_of(store: Store, run: str) -> dict[str, Any]:
     """Give what the result of a run says, nothing where there is none or it cannot be read."""
     try:
         return next((unpack_document(record.body) for record in store.records(run, "result")), {})
@@ -100,8 +101,8 @@ def _facts(store: Store, run: str) -> dict[str, Any]:
         return {}
 
 
-def _line(entry: dict[str, Any], facts: dict[str, Any]) -> RunRow:
-    worst, zone = facts.get("worst") or {}, facts.get("tolerance") or {}
+def _row_of(entry: dict[str, Any], result: dict[str, Any]) -> RunRow:
+    worst, zone = result.get("worst") or {}, result.get("tolerance") or {}
     return RunRow(
         entry["run"],
         entry["started"] or "",
@@ -117,7 +118,7 @@ def _line(entry: dict[str, Any], facts: dict[str, Any]) -> RunRow:
     )
 
 
-def _compare(again: Replay, run: str) -> str:
+def _comparison_of(again: Replay, run: str) -> str:
     changed = f"; changed since: {', '.join(change.key for change in again.changed)}" if again.changed else ""
     if again.identical is None:
         return f"Replay of run {run}, which has no recorded result to compare with{changed}"

@@ -172,13 +172,20 @@ class ConsoleServer:
     async def _export(self, request: Request) -> Response:
         if not knows_token(request.headers.get("authorization", "").removeprefix("Bearer "), self.token):
             return PlainTextResponse("the token is wrong or missing", 401)
-        folder = tempfile.TemporaryDirectory()
         try:
-            archive = await anyio.to_thread.run_sync(self.station.export_run, request.path_params["run"], Path(folder.name))
+            archive, folder = await anyio.to_thread.run_sync(self._pack_run, request.path_params["run"])
         except Refused as refusal:
-            folder.cleanup()
             return PlainTextResponse(str(refusal), 404)
         return FileResponse(archive, media_type="application/zip", background=BackgroundTask(folder.cleanup))
+
+    def _pack_run(self, run: str) -> tuple[Path, tempfile.TemporaryDirectory[str]]:
+        """Write a run as an archive into a folder that is to be cleaned up. Raises Refused."""
+        folder = tempfile.TemporaryDirectory()
+        try:
+            return self.station.export_run(run, Path(folder.name)), folder
+        except Refused:
+            folder.cleanup()
+            raise
 
     async def _live(self, websocket: WebSocket) -> None:
         """One page, from its token to its end."""

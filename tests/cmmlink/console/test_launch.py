@@ -12,6 +12,8 @@ from urllib.parse import urlsplit
 
 import pytest
 
+from cmmlink.console.launch import kept_token
+
 from .played import write_plan
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="ends the process as Ctrl-C does, which needs POSIX signals")
@@ -73,6 +75,17 @@ def test_folder_that_is_missing_is_told(tmp_path: Path) -> None:
         assert process.wait(20) == 2
         assert process.stderr is not None
         assert process.stderr.read().startswith(f"cmmlink: {tmp_path / 'nowhere'}: there is no such folder")
+
+
+def test_token_is_kept_and_readable_by_its_owner_alone(tmp_path: Path) -> None:
+    folder = tmp_path / "data"
+    token = kept_token(folder)
+    assert len(token) >= 32
+    assert kept_token(folder) == token
+    assert (folder / "console-token").stat().st_mode & 0o077 == 0
+    (folder / "console-token").write_text("short", encoding="ascii")
+    assert len(kept_token(folder)) >= 32
+    assert kept_token(tmp_path / "other") != token
 
 
 def test_console_open_to_the_network_warns(tmp_path: Path) -> None:

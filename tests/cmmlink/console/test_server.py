@@ -17,7 +17,6 @@ from websockets import Origin
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
-from cmmlink.console.launch import kept_token
 from cmmlink.console.protocol import NOMINAL, POINTS
 from cmmlink.console.server import ConsoleServer
 from cmmlink.console.station import Station
@@ -204,17 +203,6 @@ def test_open_server_takes_addresses_but_no_foreign_names(tmp_path: Path) -> Non
     assert got(server, "/", Host=f"evil.example:{server.port}").status == 400
     assert got(server, "/", Host="192.0.2.7:1").status == 400
     server.stop()
-
-
-def test_token_is_kept_and_readable_by_its_owner_alone(tmp_path: Path) -> None:
-    folder = tmp_path / "data"
-    token = kept_token(folder)
-    assert len(token) >= 32
-    assert kept_token(folder) == token
-    assert (folder / "console-token").stat().st_mode & 0o077 == 0
-    (folder / "console-token").write_text("short", encoding="ascii")
-    assert len(kept_token(folder)) >= 32
-    assert kept_token(tmp_path / "other") != token
 
 
 def heard(socket: ClientConnection, kind: str, times: int = 1) -> dict[str, Any]:
