@@ -92,6 +92,7 @@ def _promising_poses(few: Array, points: Array, nominal: NominalProfile) -> list
 
 
 def _scout_pose(few: Array, nominal: NominalProfile, pose: RigidTransform, tip_radius_mm: float) -> tuple[float, RigidTransform]:
+    """A pose refined on few points (m, 2), and the rms of the nearer 80 % of them."""
     refined = _pose_of(_pose_fit(few, nominal, "exact", tip_radius_mm).settle(_pose_numbers(pose), _SCOUT_STEPS))
     off = np.sort(np.abs(nominal.outward * project(refined.apply(few), nominal.grid).distance_mm - tip_radius_mm))
     return float(np.sqrt((off[: max(1, int(0.8 * len(off)))] ** 2).mean())), refined
@@ -130,6 +131,7 @@ def register_fine(
 
 
 def _icp(points: Array, nominal: NominalProfile, pose: RigidTransform, method: Method, tip_radius_mm: float) -> Registration:
+    """The published scheme: best motion onto the feet of the points, again and again, until the mean square settles."""
     previous, converged = np.inf, False
     for iteration in range(1, _ICP_MOST_STEPS + 1):  # noqa: B007 - the count is part of the result
         moved = pose.apply(points)
@@ -152,10 +154,12 @@ def _pose_fit(points: Array, nominal: NominalProfile, method: Method, tip_radius
 
 
 def _pose_numbers(pose: RigidTransform) -> tuple[float, float, float]:
+    """Rotation in rad and shift in mm, as the kernels take a pose."""
     return (pose.rotation_rad, float(pose.translation_mm[0]), float(pose.translation_mm[1]))
 
 
 def _pose_of(fit: PoseEstimate) -> RigidTransform:
+    """The pose of an estimate as a motion."""
     return RigidTransform(fit.pose[0], np.array(fit.pose[1:]))
 
 
