@@ -6,6 +6,8 @@ from typing import Generic, TypeVar
 
 Item = TypeVar("Item")
 
+CAPACITY_POINTS = 500_000  # what a run may hold back when its plan does not say otherwise
+
 
 class Buffer(Generic[Item]):
     """First in, first out, between one giving and one taking thread.
@@ -48,7 +50,7 @@ class Buffer(Generic[Item]):
             return taken
 
     def close(self) -> None:
-        """Let the giver go: what it hands over from now on is refused."""
+        """Wake a waiting producer; every later `give` returns False."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()

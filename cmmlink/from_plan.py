@@ -4,13 +4,16 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TypedDict
 
 import numpy as np
 
 from cmmlink.errors import PlanError
+from cmmlink.events import RunStarted
 from cmmlink.nominal_files import NominalFile, load_nominal, material_side
-from cmmlink.plan.scan import Datum, Discretisation, Nominal, Plan, place_of
-from inspection import LiveInspection, NominalProfile, RigidTransform, SectionPlane, discretize
+from cmmlink.plan.scan import Datum, Discretisation, Nominal, Plan, Registration, place_of
+from cmmlink.plan.surface import CtPlan
+from inspection import FitName, LiveInspection, Method, NominalProfile, RigidTransform, SectionPlane, discretize
 
 
 def check_plan(plan: Plan, plan_file: Path) -> NominalProfile:
@@ -56,16 +59,43 @@ def pose_of(datum: Datum | None) -> RigidTransform | None:
 
 def inspection_of(plan: Plan, profile: NominalProfile) -> LiveInspection:
     """A fresh inspection as a plan describes it."""
-    registration, section = plan.registration, plan.section
+    section = plan.section
     return LiveInspection(
         profile,
         plan.tolerance.zone,
-        datum=pose_of(registration.datum),
-        fit=registration.fit,
-        method=registration.method,
+        **_fitting(plan.registration),
         tip_radius_mm=plan.probe.tip_radius_mm,
         section=SectionPlane(np.array(section.origin_mm), np.array(section.x_axis), np.array(section.normal)),
         off_section_max_mm=section.off_plane_max_mm,
-        coverage_min=registration.coverage_min,
-        reject_outliers=registration.reject_outliers,
     )
+
+
+def section_inspection_of(plan: CtPlan, profile: NominalProfile, plane: SectionPlane) -> LiveInspection:
+    """A fresh inspection of one section of a surface, whose points are all there from the start."""
+    return LiveInspection(profile, plan.tolerance.zone, **_fitting(plan.registration), section=plane, provisional=False)
+
+
+class _Fitting(TypedDict):
+    """What a plan says of the registration, as LiveInspection takes it."""
+
+    datum: RigidTransform | None
+    fit: FitName
+    method: Method
+    coverage_min: float
+    reject_outliers: bool
+
+
+def _fitting(registration: Registration) -> _Fitting:
+    return {
+        "datum": pose_of(registration.datum),
+        "fit": registration.fit,
+        "method": registration.method,
+        "coverage_min": registration.coverage_min,
+        "reject_outliers": registration.reject_outliers,
+    }
+
+
+def run_started(plan: Plan | CtPlan, device: str, simulated: bool) -> RunStarted:
+    """The event that begins a run of a plan."""
+    operator = plan.operator if isinstance(plan, Plan) else None
+    return RunStarted(plan.part.name, plan.part.serial_number or "", operator or "", device, simulated)

@@ -14,7 +14,7 @@ from typing import Any
 
 from cmmlink.devices import Connected
 from cmmlink.events import RunStarted, Sink
-from cmmlink.from_plan import inspection_of
+from cmmlink.from_plan import inspection_of, run_started
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan.scan import Plan
 from cmmlink.record.reader import open_to_record
@@ -69,7 +69,7 @@ def carry_out(
     """
     rehearse(profile, plan.registration.method, plan.registration.reject_outliers)
     live = inspection_of(plan, profile)
-    started = RunStarted(plan.part.name, plan.part.serial_number or "", plan.operator or "", device.device, device.simulated)
+    started = run_started(plan, device.device, device.simulated)
     on_ready()
     with ExitStack() as stack:
         recorder: Recorder | None = None

@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from cmmlink.buffer import CAPACITY_POINTS
 from cmmlink.errors import PlanError
-from cmmlink.events import Counts, RunStarted
-from cmmlink.from_plan import discretize_file, pose_of
-from cmmlink.nominal_files import load_nominal
+from cmmlink.events import Counts
+from cmmlink.from_plan import discretize_file, run_started, section_inspection_of
+from cmmlink.nominal_files import goes_round, load_nominal
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan.scan import Discretisation
 from cmmlink.plan.surface import CtPlan
@@ -35,13 +36,11 @@ from drivers.surface import (
     height_range_mm,
     read_stl,
 )
-from inspection import LiveInspection, NominalProfile, RegistrationError, SectionPlane, Verdict
+from inspection import NominalProfile, RegistrationError, SectionPlane, Verdict
 
 _FEW_SECTIONS = 50  # up to here Open3D costs less than half a second; numpy gives the same points, a stack of 200 twice as fast
 _MOST_SECTIONS = 100_000
-_BUFFER_POINTS = 500_000
 _SAME_HEIGHT_MM = 1e-9
-_ALMOST_CLOSED = 0.05  # of the length: a blunt trailing edge
 _LENGTHS_APART = 1.5  # the roughness of a noisy surface adds a tenth at most
 _LEAST_POINTS = 400  # on a profile's length; where a surface is coarser, points on its facets are judged, not its corners alone
 
@@ -113,6 +112,11 @@ class StackOutcome:
             "slices": slices,
             "notes": list(self.notes),
         }
+
+
+def surface_words(plan: CtPlan) -> str:
+    """How results and pages call the surface that the points of a section come from."""
+    return f"surface {plan.mesh.file.name}"
 
 
 def inspect_stack(
@@ -275,28 +279,16 @@ def _run(
     clock: Callable[[], float],
     stop: threading.Event,
 ) -> RunOutcome:
-    registration = plan.registration
-    live = LiveInspection(
-        profile,
-        plan.tolerance.zone,
-        datum=pose_of(registration.datum),
-        fit=registration.fit,
-        method=registration.method,
-        section=SectionPlane(cut.height_mm * cut.axes.normal, cut.axes.x, cut.axes.normal),
-        coverage_min=registration.coverage_min,
-        reject_outliers=registration.reject_outliers,
-        provisional=False,
-    )
+    plane = SectionPlane(cut.height_mm * cut.axes.normal, cut.axes.x, cut.axes.normal)
+    live = section_inspection_of(plan, profile, plane)
     source = ContourSource(judged, plan.mesh.file.name)
-    started = RunStarted(plan.part.name, plan.part.serial_number or "", "", f"surface {plan.mesh.file.name}", simulated=False)
-    return run_inspection(source, live, [], started, buffer_points=_BUFFER_POINTS, clock=clock, stop=stop)
+    started = run_started(plan, surface_words(plan), simulated=False)
+    return run_inspection(source, live, [], started, buffer_points=CAPACITY_POINTS, clock=clock, stop=stop)
 
 
 def _other_part(cut: SurfaceSection, outline: tuple[Contour, ...], profile: NominalProfile) -> RegistrationError | None:
     """Why a closed outline cannot be the section of a nominal that goes round: the lengths are too far apart."""
-    gap_mm = float(np.hypot(*(profile.points_mm[-1] - profile.points_mm[0])))
-    goes_round = profile.curve.closed or gap_mm < _ALMOST_CLOSED * profile.length_mm
-    if not (outline and outline[0].closed and goes_round):
+    if not (outline and outline[0].closed and goes_round(profile.curve)):
         return None
     share = outline[0].length_mm / profile.length_mm
     if 1 / _LENGTHS_APART < share < _LENGTHS_APART:

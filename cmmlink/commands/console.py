@@ -13,6 +13,7 @@ import typer
 from platformdirs import user_data_path
 
 from cmmlink import __version__
+from cmmlink.buffer import CAPACITY_POINTS
 from cmmlink.commands.options import NoBrowser, Records, records_folder
 from cmmlink.commands.output import Output, now, report_outcome, stop_on_ctrl_c
 from cmmlink.console.ct_import import Section
@@ -22,14 +23,14 @@ from cmmlink.console.refused import Refused
 from cmmlink.console.station_setup import StationSetup
 from cmmlink.devices import Connect, connect, decoder_of, serial_ports
 from cmmlink.errors import PlanError
-from cmmlink.events import RunStarted
+from cmmlink.from_plan import run_started
 from cmmlink.plan.scan import Plan
 from cmmlink.plan.surface import CtPlan, load_ct_plan
 from cmmlink.report.folder import prepare, write_run
 from cmmlink.report.stack_folder import write_stack
 from cmmlink.run import FinishedRun
 from cmmlink.run_view import Ended, RunContext
-from cmmlink.stack import SectionOutcome, inspect_stack
+from cmmlink.stack import SectionOutcome, inspect_stack, surface_words
 from cmmlink.words import VERDICT_WORDS
 
 if TYPE_CHECKING:
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
 _PAGE_OPENS_S = 20.0  # a run waits so long for the page that is to show it
 _LOOK_S = 0.2
 _LONGEST_PLAN = 200_000
-_BUFFER_POINTS = 500_000
 
 
 def serve_console(
@@ -111,8 +111,8 @@ def inspect_surface(file: Path, stop: threading.Event, on_start: Callable[[int],
 def _section(plan: CtPlan, outcome: SectionOutcome, plan_name: str) -> Section:
     height_mm, run = outcome.slice.height_mm, outcome.run
     title = f"Section at height {height_mm:.3f} mm of {plan.mesh.file.name}"
-    context = RunContext(title, plan_name, outcome.profile, plan.tolerance.zone, plan.registration.coverage_min, _BUFFER_POINTS, now())
-    started = RunStarted(plan.part.name, plan.part.serial_number or "", "", plan.mesh.file.name, simulated=False)
+    context = RunContext(title, plan_name, outcome.profile, plan.tolerance.zone, plan.registration.coverage_min, CAPACITY_POINTS, now())
+    started = run_started(plan, surface_words(plan), simulated=False)
     ended = Ended(run.ending, str(run.refusal or ""), outcome.result_json(), run.result)
     return Section(height_mm, context, started, ended, outcome.warnings)
 

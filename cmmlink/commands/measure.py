@@ -35,6 +35,7 @@ from cmmlink.plan.scan import Plan, load_plan
 from cmmlink.report.folder import prepare
 from cmmlink.report.terminal import LiveTable
 from cmmlink.run import carry_out
+from cmmlink.run_view import RunContext, RunView
 from cmmlink.simulated import connect_demo_device
 from inspection import FitName, Material, Method, NominalProfile
 
@@ -103,8 +104,10 @@ def run(
 def _run(plan: Plan, profile: NominalProfile, connect: Connect, output: Output) -> int:
     """Carry out a plan with a record and, where somebody looks at the terminal, with a live table; report what came of it."""
     quiet = output.headless or output.as_json or not sys.stderr.isatty()
-    table = None if quiet else LiveTable(Console(stderr=True), plan.tolerance.zone)
-    with connect(plan) as device, stop_on_ctrl_c() as stop, table or nullcontext():
+    zone, coverage_min = plan.tolerance.zone, plan.registration.coverage_min
+    view = RunView(RunContext("", "", profile, zone, coverage_min, plan.buffer_points, now()), time.monotonic, now)
+    table = nullcontext() if quiet else LiveTable(Console(stderr=True), view)
+    with connect(plan) as device, stop_on_ctrl_c() as stop, table:
         finished = carry_out(
             plan,
             profile,
@@ -113,7 +116,8 @@ def _run(plan: Plan, profile: NominalProfile, connect: Connect, output: Output) 
             clock=time.monotonic,
             now=now,
             stop=stop,
-            sinks=[table] if table else [],
+            sinks=[] if quiet else [view],
+            on_ready=view.await_device,
         )
     return report_outcome(finished, output)
 

@@ -75,12 +75,17 @@ def known_suffixes() -> list[str]:
     return sorted(suffix for reader in _formats() for suffix in reader.SUFFIXES)
 
 
+def goes_round(curve: NurbsCurve) -> bool:
+    """True where the ends meet, or leave only a gap as of a blunt trailing edge: inside and outside can be told apart."""
+    start, end = curve.point(np.array(curve.domain))
+    return curve.closed or float(np.hypot(*(end - start))) <= _ALMOST_CLOSED * curve.length_mm
+
+
 def material_side(curve: NurbsCurve) -> Literal["left", "right"] | None:
     """Side of the direction of travel on which the inside of the profile lies; None for a curve too open to have one."""
     start, end = curve.domain
     points = curve.point(np.linspace(start, end, 2001))
-    gap = float(np.hypot(*(points[-1] - points[0])))
-    if not curve.closed and gap > _ALMOST_CLOSED * curve.length_mm:
+    if not goes_round(curve):
         return None
     x, y = (points - points[0]).T
     return "left" if float((x[:-1] * y[1:] - x[1:] * y[:-1]).sum()) > 0 else "right"

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 import yaml
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from cmmlink.buffer import CAPACITY_POINTS
 from cmmlink.errors import PlanError, YamlError
 from cmmlink.plan.yaml_model import Positive, Settings, line_of, read_model
 from drivers import PointFileError, read_text, shipped_maps
@@ -251,7 +252,7 @@ class Plan(Settings):
     section: Section = Field(default=Section(), description="the plane of the section in machine coordinates")
     registration: Registration = Field(default=Registration(), description="how the points come onto the nominal")
     discretisation: Discretisation = Field(default=Discretisation(), description="how finely the nominal is sampled")
-    buffer_points: int = Field(default=500_000, ge=1, description="how many points may wait between the device and the inspection")
+    buffer_points: int = Field(default=CAPACITY_POINTS, ge=1, description="how many points may wait between the device and the inspection")
     out: Path | None = Field(default=None, description="the folder for the results; null: no results are written")
     records: Path | None = Field(
         default=None, description="the folder of the run records; null: the user's own. A console keeps all its runs in one folder"

@@ -1,9 +1,12 @@
 """The picture of a judged profile: magnified deviation whiskers on the nominal, and deviation against station.
 
-State is told by place and mark as well as by colour: a triangle up is above the zone, one down below it.
+Verdicts are those of the result, and they show by mark as well as by colour: a triangle up is out of tolerance above the zone,
+one down is out below it, a diamond is not proven either way.
 """
 
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,9 +19,28 @@ from inspection import InspectionResult, NominalProfile, Verdict
 
 Array = NDArray[np.float64]
 
-_NOMINAL, _BAND, _GOOD, _ABOVE, _BELOW = "#3a3f45", "#dfe7ee", "#2a7fa5", "#c2410c", "#6d28d9"
+_NOMINAL, _BAND, _GOOD, _UNPROVEN, _ABOVE, _BELOW = "#3a3f45", "#dfe7ee", "#2a7fa5", "#a16207", "#c2410c", "#6d28d9"
 _BAND_SHARE = 0.06  # of the part's size: how wide the magnified tolerance band is drawn
 _MOST_WHISKERS = 1500
+
+
+@dataclass(frozen=True, slots=True)
+class _Look:
+    """How points of a verdict are drawn; `side` is where they lie, seen from the middle of the zone."""
+
+    verdict: Verdict
+    side: Literal["both", "above", "below"]
+    colour: str
+    mark: str
+    size: float
+
+
+_LOOKS = (
+    _Look(Verdict.CONFORM, "both", _GOOD, ".", 4.0),
+    _Look(Verdict.UNCERTAIN, "both", _UNPROVEN, "D", 10.0),
+    _Look(Verdict.NONCONFORM, "above", _ABOVE, "^", 16.0),
+    _Look(Verdict.NONCONFORM, "below", _BELOW, "v", 16.0),
+)
 
 
 def write_picture(result: InspectionResult, nominal: NominalProfile, title: str, path: Path) -> None:
@@ -65,10 +87,9 @@ def _draw_strip(axes: Axes, result: InspectionResult, nominal: NominalProfile) -
         for limit in (zone.lower_mm + zone.uncertainty_mm, zone.upper_mm - zone.uncertainty_mm):
             axes.axhline(limit, color=_NOMINAL, lw=0.8, ls=":")
     axes.axhline(0, color=_NOMINAL, lw=0.8)
-    above, below = result.deviation_mm > zone.upper_mm, result.deviation_mm < zone.lower_mm
-    inside = ~above & ~below & np.isfinite(result.deviation_mm)
-    for chosen, colour, mark, size in ((inside, _GOOD, ".", 4.0), (above, _ABOVE, "^", 16.0), (below, _BELOW, "v", 16.0)):
-        axes.scatter(result.station_mm[chosen], result.deviation_mm[chosen], s=size, c=colour, marker=mark, lw=0)
+    for look in _LOOKS:
+        chosen = _has_look(result, look)
+        axes.scatter(result.station_mm[chosen], result.deviation_mm[chosen], s=look.size, c=look.colour, marker=look.mark, lw=0)
     index = result.worst
     if index is not None:
         text = f"worst {result.deviation_mm[index]:+.4f} mm at station {result.station_mm[index]:.2f} mm"
@@ -96,9 +117,20 @@ def _rows_to_draw(result: InspectionResult) -> NDArray[np.int64]:
     return np.unique(np.concatenate([kept, out, worst]).astype(np.int64))
 
 
+def _has_look(result: InspectionResult, look: _Look) -> NDArray[np.bool_]:
+    """Which points (m,) are drawn so: those of a verdict, above or below the middle of the zone."""
+    of_verdict = np.equal(result.verdicts, look.verdict)
+    above = np.greater(result.deviation_mm, result.zone.middle_mm)
+    if look.side == "both":
+        return of_verdict
+    return of_verdict & above if look.side == "above" else of_verdict & ~above
+
+
 def _colours(result: InspectionResult, rows: NDArray[np.int64]) -> list[str]:
-    deviation, zone = result.deviation_mm[rows], result.zone
-    return [_ABOVE if d > zone.upper_mm else _BELOW if d < zone.lower_mm else _GOOD for d in deviation]
+    colours = np.full(result.received, _GOOD)
+    for look in _LOOKS:
+        colours[_has_look(result, look)] = look.colour
+    return [str(colour) for colour in colours[rows]]
 
 
 def _loop(points: Array, nominal: NominalProfile) -> Array:

@@ -77,5 +77,5 @@ def _mark(axes: Axes, sections: Sequence[SectionOutcome], scale: float) -> None:
         for stretch in result.stretches:
             width = (stretch.to_mm - stretch.from_mm) % length
             station = (stretch.from_mm + width / 2) % length / length * scale
-            above = stretch.worst_mm > result.zone.upper_mm
+            above = stretch.worst_mm > result.zone.middle_mm
             axes.plot(station, section.slice.height_mm, "^" if above else "v", ms=6, mfc="none", mec="black", mew=1.0)

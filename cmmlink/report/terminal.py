@@ -10,10 +10,11 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn
 from rich.table import Table
 
-from cmmlink.events import Arrived, Counts, Event, Judged, RunStarted
+from cmmlink.events import Counts
+from cmmlink.run_state import RunState
+from cmmlink.run_view import RunView
 from cmmlink.words import VERDICT_WORDS
-from drivers import LinkDown, LinkUp, ScanOpened
-from inspection import InspectionResult, LiveUpdate, Rejection, ToleranceZone, Verdict
+from inspection import InspectionResult, Rejection, Verdict
 
 STYLES = {Verdict.CONFORM: "bold green", Verdict.UNCERTAIN: "bold yellow", Verdict.NONCONFORM: "bold red"}
 _REPAINTS_PER_S = 8
@@ -22,20 +23,13 @@ _MOST_STRETCHES = 10
 
 
 class LiveTable:
-    """A sink that keeps a table of the run on the screen, for as long as it is entered as a context."""
+    """A table of a run on the screen, for as long as it is entered as a context. It paints the newest state of the run's view."""
 
-    def __init__(self, console: Console, zone: ToleranceZone) -> None:
-        self._zone = zone
+    def __init__(self, console: Console, view: RunView) -> None:
+        self._view = view
         self._progress = Progress(TextColumn("{task.description}"), BarColumn(bar_width=40), MofNCompleteColumn(), console=console)
         self._bar: TaskID = self._progress.add_task("points", total=None)
-        self._started: RunStarted | None = None
-        self._begin_s: float | None = None
-        self._now_s = 0.0
-        self._counts = Counts()
-        self._update: LiveUpdate | None = None
-        self._worst = self._worst_station = math.nan
-        self._link = "waiting for the device"
-        self._live = Live(console=console, get_renderable=self._screen, refresh_per_second=_REPAINTS_PER_S, transient=True)
+        self._live = Live(console=console, get_renderable=self._paint, refresh_per_second=_REPAINTS_PER_S, transient=True)
 
     def __enter__(self) -> "LiveTable":
         self._live.start()
@@ -45,74 +39,29 @@ class LiveTable:
         """Clear the table, also when the run ended with an error."""
         self._live.stop()
 
-    def __call__(self, event: Event) -> None:
-        """Take one event; painting is rich's business, a few times a second."""
-        if isinstance(event, RunStarted):
-            self._started = event
-        elif isinstance(event, Arrived):
-            self._arrived(event)
-        elif isinstance(event, Judged):
-            self._judged(event)
-        else:
-            self._counts = event.counts
-
-    def _arrived(self, event: Arrived) -> None:
-        if self._begin_s is None:
-            self._begin_s, self._link = event.time_s, "open"
-        if isinstance(event.arrival, ScanOpened):
-            self._progress.update(self._bar, total=event.arrival.expected)
-            self._begin_s = event.time_s
-        elif isinstance(event.arrival, LinkDown):
-            self._link = f"lost: {event.arrival.reason}"
-        elif isinstance(event.arrival, LinkUp):
-            self._link = f"open again after {event.arrival.gap_s:.1f} s"
-
-    def _judged(self, event: Judged) -> None:
-        update = event.update
-        self._counts, self._update, self._now_s = event.counts, update, event.time_s
-        self._progress.update(self._bar, completed=event.counts.received)
-        if update.first == 0:
-            self._worst = math.nan
-        off = np.abs(update.deviation_mm - self._zone.middle_mm)
-        if np.isfinite(off).any():
-            index = int(np.nanargmax(off))
-            if not off[index] <= abs(self._worst - self._zone.middle_mm):
-                self._worst, self._worst_station = float(update.deviation_mm[index]), float(update.station_mm[index])
-
-    def _screen(self) -> Group:
-        counts, started = self._counts, self._started
-        elapsed_s = self._now_s - (self._begin_s or 0.0)
-        rate = counts.received / elapsed_s if elapsed_s > 0 else 0.0
-        rows = {
-            "part": " ".join(filter(None, [started.part, started.serial_number])) if started else "",
-            "device": f"{'SIMULATED, ' if started.simulated else ''}{started.device}" if started else "",
-            "link": self._link,
-            "points": f"{counts.received} received, {counts.judged} judged, {counts.rejected} rejected, {counts.lost} lost",
-            "rate": f"{rate:.0f} points/s",
-            "registration": self._registration(),
-            "worst": self._worst_words(),
-            "verdict": self._verdict(),
-        }
+    def _paint(self) -> Group:
+        state = self._view.state()
+        self._progress.update(self._bar, completed=state.received, total=state.expected)
         table = Table.grid(padding=(0, 3))
-        for name, words in rows.items():
+        for name, words in _table_rows(state).items():
             table.add_row(name, words)
         return Group(table, self._progress)
 
-    def _registration(self) -> str:
-        update = self._update
-        if update is None or update.state == "seeking":
-            return "seeking"
-        return update.state if update.state == "settled" else f"provisional, can move {update.can_move_mm:.4f} mm"
 
-    def _worst_words(self) -> str:
-        return "" if math.isnan(self._worst) else f"{self._worst:+.4f} mm at station {self._worst_station:.1f} mm"
-
-    def _verdict(self) -> str:
-        if math.isnan(self._worst):
-            return "not yet"
-        verdict = self._zone.verdict(self._worst)
-        provisional = "" if self._update is not None and self._update.state == "settled" else ", provisional"
-        return f"[{STYLES[verdict]}]{VERDICT_WORDS[verdict]}[/] so far{provisional}"
+def _table_rows(state: RunState) -> dict[str, str]:
+    worst, registration = state.worst, state.registration
+    moving = "" if registration.can_move_mm is None else f", can move {registration.can_move_mm:.4f} mm"
+    style = next(STYLES[verdict] for verdict, word in VERDICT_WORDS.items() if word == state.verdict.word)
+    return {
+        "part": escape(" ".join(filter(None, [state.part, state.serial_number]))),
+        "device": escape(f"{'SIMULATED, ' if state.simulated else ''}{state.device}"),
+        "link": state.link,
+        "points": f"{state.received} received, {state.judged} judged, {state.rejected} rejected, {state.lost} lost",
+        "rate": f"{state.rate_per_s:.0f} points/s",
+        "registration": registration.state + (moving if registration.state == "provisional" else ""),
+        "worst": "" if worst is None else f"{worst.deviation_mm:+.4f} mm at station {worst.station_mm:.1f} mm",
+        "verdict": f"[{style}]{state.verdict.word}[/]: {state.verdict.why}",
+    }
 
 
 def print_summary(console: Console, result: InspectionResult | None, counts: Counts, heading: str) -> None:
@@ -131,7 +80,7 @@ def print_summary(console: Console, result: InspectionResult | None, counts: Cou
 
 
 def _reservations(result: InspectionResult | None) -> Iterator[str]:
-    """What keeps the verdict from being the last word."""
+    """Reasons to treat the verdict with caution, one line each."""
     if result is None or result.worst is None:
         yield "nothing was judged"
         return

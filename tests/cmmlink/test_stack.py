@@ -1,8 +1,5 @@
-"""Sections of a surface from file to verdict: the phantom's known truth, and the command as its user meets it."""
+"""Sections of a surface from file to verdict: the known truth of a phantom, and surfaces without noise."""
 
-import csv
-import json
-import sys
 import threading
 import time
 from dataclasses import dataclass
@@ -14,48 +11,25 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
 from cmmlink import stack as ct
-from cmmlink.commands import main
 from cmmlink.errors import PlanError
-from cmmlink.plan.surface import CtPlan, load_ct_plan
 from cmmlink.stack import SectionOutcome, StackOutcome, inspect_stack
 from drivers.errors import MeshError
 from drivers.surface.open3d_process import Open3DMissing
 from inspection import RegistrationError, Verdict
+from tests.cmmlink.blade import chord_mm, inspect, plan_of, tapered
 from tests.drivers.surface.ct_phantom import (
-    GOE404,
     Defect,
     Phantom,
-    airfoil,
     make_phantom,
     noise_mm,
     write_nominal,
     write_spline,
     write_stl,
 )
-from tests.drivers.surface.meshes import Triangles, ascii_stl, binary_stl, box, tube, write
+from tests.drivers.surface.meshes import binary_stl, box, tube, write
 
 VOXEL = 0.1
 DEFECT = Defect(height_mm=0.1, station_mm=40.0, part_height_mm=2.0)
-
-
-def inspect(plan: CtPlan) -> StackOutcome:
-    return inspect_stack(plan, clock=time.monotonic, stop=threading.Event())
-
-
-def plan_of(mesh: Path, nominal: Path, sections: dict[str, object], **further: object) -> CtPlan:
-    settings = {
-        "part": {"name": "blade"},
-        "mesh": {"file": mesh},
-        "nominal": {"file": nominal},
-        "tolerance": {"lower_mm": -0.1, "upper_mm": 0.1},
-        "sections": sections,
-        "cut": {"cutter": "numpy"},  # starting Open3D takes a second; both give the same points
-        **further,
-    }
-    return CtPlan.model_validate(settings)
-
-
-# The phantom ----------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -122,38 +96,6 @@ def test_the_dust_is_set_aside(scanned: Scanned) -> None:
         assert len(section.slice.contours) == 1
         set_aside += section.slice.set_aside
     assert set_aside >= 5
-
-
-# Surfaces without noise ------------------------------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def spline() -> BSpline:
-    return airfoil(GOE404, 60.0)
-
-
-@pytest.fixture
-def blade(tmp_path: Path, spline: BSpline) -> tuple[Path, Path]:
-    """A straight blade from z = 0 to 20 mm, and its nominal."""
-    profile = spline(np.linspace(0, 1, 600))
-    return write(tmp_path / "blade.stl", binary_stl(tube(profile, np.array([0.0, 20.0])))), write_spline(spline, tmp_path / "blade.yaml")
-
-
-def chord_mm(spline: BSpline) -> float:
-    """How far the chords between 600 points stay off the profile."""
-    u = np.linspace(0, 1, 600)
-    ends, between = spline(u), spline((u[1:] + u[:-1]) / 2)
-    along = np.diff(ends, axis=0)
-    off = along[:, 0] * (between - ends[:-1])[:, 1] - along[:, 1] * (between - ends[:-1])[:, 0]
-    return float(np.max(np.abs(off) / np.linalg.norm(along, axis=1)))
-
-
-def tapered(spline: BSpline) -> Triangles:
-    """From full size at z = 0 to nine tenths at z = 20 mm, ruled along straight lines."""
-    profile = spline(np.linspace(0, 1, 600))
-    triangles = tube(profile, np.linspace(0.0, 20.0, 21))
-    triangles[:, :, :2] *= 1 - 0.005 * triangles[:, :, 2:]
-    return triangles
 
 
 def test_a_blade_as_nominal_conforms_closely(blade: tuple[Path, Path], spline: BSpline) -> None:
@@ -262,117 +204,6 @@ def test_a_cutter_that_breaks_down_in_the_middle_is_replaced_and_it_is_said(
     assert any("cut by numpy: the process with Open3D ended" in note for note in stack.notes)
 
 
-# The command ----------------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Ran:
-    code: int
-    out: str
-    err: str
-
-
-@pytest.fixture
-def cmmlink(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> "Command":
-    return Command(monkeypatch, capsys)
-
-
-@dataclass(frozen=True)
-class Command:
-    monkeypatch: pytest.MonkeyPatch
-    capsys: pytest.CaptureFixture[str]
-
-    def __call__(self, *arguments: object) -> Ran:
-        self.monkeypatch.setattr(sys, "argv", ["cmmlink", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        told = self.capsys.readouterr()
-        code = ended.value.code
-        assert isinstance(code, int)
-        assert "Traceback" not in told.err
-        return Ran(code, told.out, told.err)
-
-
-def test_the_command_writes_results_for_the_stack_and_every_section(cmmlink: Command, blade: tuple[Path, Path], tmp_path: Path) -> None:
-    out = tmp_path / "results"
-    earlier = out / "section-007_99.000mm"
-    earlier.mkdir(parents=True)
-    write(earlier / "deviations.csv", "of an earlier run")
-    arguments = [
-        "--nominal",
-        blade[1],
-        "--tolerance",
-        -0.05,
-        0.05,
-        "--heights",
-        5,
-        10.5,
-        15,
-        "--normal",
-        0,
-        0,
-        2,
-        "--out",
-        out,
-        "--json",
-        "--cutter",
-        "numpy",
-    ]
-    ran = cmmlink("ct", blade[0], *arguments, "--out", out, "--json")
-    assert ran.code == 0
-    facts = json.loads(ran.out)
-    assert json.loads((out / "result.json").read_text()) == facts
-    assert facts["verdict"] == "conform"
-    assert [cut["height_mm"] for cut in facts["slices"]] == [5, 10.5, 15]
-    assert {"contours", "verdict", "worst", "registration", "stretches", "profile_error_mm", "set_aside"} <= set(facts["slices"][0])
-    assert sorted(path.name for path in out.iterdir()) == [
-        "result.json", "section-001_5.000mm", "section-002_10.500mm", "section-003_15.000mm", "sections.csv", "stack.png",
-    ]  # fmt: skip
-    own = out / "section-002_10.500mm"
-    assert sorted(path.name for path in own.iterdir()) == ["contours.csv", "deviations.csv", "profile.png"]
-    with (own / "contours.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    assert len(rows) == facts["slices"][1]["received"]
-    assert {row["z_mm"] for row in rows} == {"10.500000"}
-    assert {(row["closed"], row["hole"]) for row in rows} == {("closed", "outer")}
-    for picture in (out / "stack.png", own / "profile.png"):
-        assert picture.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
-
-
-def test_the_exit_status_is_that_of_the_worst_section(cmmlink: Command, blade: tuple[Path, Path], tmp_path: Path, spline: BSpline) -> None:
-    mesh = write(tmp_path / "tapered.stl", ascii_stl(tapered(spline)))
-    options = ["--nominal", blade[1], "--tolerance", -0.1, 0.1, "--cutter", "numpy"]
-    assert cmmlink("ct", mesh, *options, "--heights", 0.2).code == 0
-    ran = cmmlink("ct", mesh, *options, "--heights", 0.2, 10)
-    assert ran.code == 1
-    assert "NOT CONFORM  2 sections" in ran.out
-    small = write_spline(spline, tmp_path / "small.yaml", 0.95)
-    assert cmmlink("ct", mesh, *options, "--heights", 0.2, 10, "--nominal-at", 10, small).code == 0
-    assert cmmlink("ct", mesh, *options, "--heights", 0.2, "--uncertainty", 0.099).code == 3
-
-
-def test_a_plan_says_the_same_as_options(cmmlink: Command, blade: tuple[Path, Path], tmp_path: Path) -> None:
-    text = (
-        "part: {name: blade}\nmesh: {file: blade.stl}\nnominal: {file: blade.yaml}\ntolerance: {lower_mm: -0.05, upper_mm: 0.05}\n"
-        "sections: {every_mm: 5, from_mm: 5, to_mm: 10}\ncut: {cutter: numpy}\n"
-    )
-    by_plan = cmmlink("ct", write(tmp_path / "plan.yaml", text), "--json")
-    options = ["--nominal", blade[1], "--tolerance", -0.05, 0.05, "--every", 5, "--from", 5, "--to", 10, "--cutter", "numpy"]
-    by_options = cmmlink("ct", blade[0], *options, "--json")
-    assert by_plan.code == by_options.code == 0
-    assert json.loads(by_plan.out)["slices"] == json.loads(by_options.out)["slices"]
-
-
-def test_an_option_beside_a_plan_is_refused_and_not_ignored(cmmlink: Command, blade: tuple[Path, Path], tmp_path: Path) -> None:
-    text = "part: {name: blade}\nmesh: {file: blade.stl}\nnominal: {file: blade.yaml}\ntolerance: {lower_mm: -0.05, upper_mm: 0.05}\n"
-    plan = write(tmp_path / "plan.yaml", text + "sections: {heights_mm: [5]}\ncut: {cutter: numpy}\n")
-    for option in (("--tolerance", -1e-7, 1e-7), ("--heights", 3, 4), ("--reject-outliers",), ("--coverage-min", 0.95)):
-        ran = cmmlink("ct", plan, *option)
-        assert (ran.code, ran.out) == (2, "")
-        assert f"{option[0]} stands beside a plan" in ran.err
-    assert cmmlink("ct", plan, "--no-pictures", "--json").code == 0
-
-
 def test_a_stack_cut_short_proves_nothing(blade: tuple[Path, Path]) -> None:
     stop = threading.Event()
     plan = plan_of(*blade, {"heights_mm": (5.0, 10.0, 15.0)})
@@ -382,49 +213,6 @@ def test_a_stack_cut_short_proves_nothing(blade: tuple[Path, Path]) -> None:
     assert (stack.result_json()["verdict"], stack.result_json()["complete"]) == ("uncertain", False)
     assert stack.notes[-1] == "aborted by the operator after 1 of 3 sections"
     assert inspect(plan).result_json()["complete"] is True
-
-
-@pytest.mark.parametrize(
-    ("line", "message"),
-    [
-        ("sections: {heights_mm: [1], every_mm: 2}", "line 5: sections is a mapping; expected either heights_mm or every_mm"),
-        ("sections: {}", "expected either heights_mm or every_mm"),
-        ("sections: {heights_mm: [1, x]}", "sections.heights_mm[1] is 'x'; expected a number"),
-        ("sections: {heights: [1]}", "sections.heights is not a known key; did you mean heights_mm?"),
-        ("sections: {heights_mm: [1], normal: [0, 0, 0]}", "expected a direction other than [0, 0, 0]"),
-        ("sections: {heights_mm: [1]}\ncut: {cutter: knife}", "cut.cutter is 'knife'"),
-    ],
-)
-def test_a_bad_plan_is_told_with_its_line_and_key(tmp_path: Path, line: str, message: str) -> None:
-    text = "part: {name: b}\nmesh: {file: b.stl}\nnominal: {file: b.dat}\ntolerance: {lower_mm: -1, upper_mm: 1}\n" + line + "\n"
-    with pytest.raises(PlanError) as caught:
-        load_ct_plan(write(tmp_path / "plan.yaml", text))
-    assert message in str(caught.value)
-    assert str(tmp_path / "plan.yaml") in str(caught.value)
-
-
-def test_bad_input_is_one_message_and_status_2(cmmlink: Command, blade: tuple[Path, Path], tmp_path: Path) -> None:
-    mesh, nominal = blade
-    options = ["--nominal", nominal, "--tolerance", -0.05, 0.05, "--cutter", "numpy"]
-    cut_off = write(tmp_path / "cut.stl", mesh.read_bytes()[:1000])
-    cases: list[tuple[list[object], str]] = [
-        ([cut_off, *options, "--heights", 5], "truncated"),
-        ([tmp_path / "nowhere.stl", *options, "--heights", 5], "nowhere.stl"),
-        ([tmp_path / "part.step", *options, "--heights", 5], "expected .stl, .ply or .obj"),
-        ([mesh, *options, "--heights", 25], "misses the surface"),
-        ([mesh, *options], "either heights_mm or every_mm"),
-        ([mesh, *options, "--every", 0], "--every is 0: expected a number greater than 0"),
-        ([mesh, *options, "--every", 1e-9], "expected 1 to 100000"),
-        ([mesh, *options, "--heights", 5, "--normal", 0, 0, 0], "direction"),
-        ([mesh, *options, "--heights", 5, "--nominal-at", "x", nominal], "--nominal-at x="),
-        ([mesh, "--heights", 5], "needs --nominal FILE and --tolerance LO HI"),
-        ([mesh, *options, "--heights", 5, "--nonsense", 1], "No such option"),
-    ]
-    for arguments, message in cases:
-        ran = cmmlink("ct", *arguments)
-        assert ran.code == 2, arguments
-        assert message in ran.err
-        assert ran.out == ""
 
 
 def test_a_bad_surface_names_the_place(tmp_path: Path, blade: tuple[Path, Path]) -> None:

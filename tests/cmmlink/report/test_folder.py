@@ -1,0 +1,40 @@
+"""The folder of results."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from cmmlink.errors import PlanError
+from cmmlink.events import Counts
+from cmmlink.report.folder import prepare, write_results
+from cmmlink.result_json import result_json
+from inspection import NominalProfile
+from tests.cmmlink.judged_oval import bumped, inspect_oval
+
+
+def test_the_folder_holds_what_it_says(profile: NominalProfile, tmp_path: Path) -> None:
+    folder = tmp_path / "a" / "b"
+    facts = result_json(inspect_oval(profile, bumped()), Counts())
+    written = write_results(folder, facts, inspect_oval(profile, bumped()), profile, "oval")
+    assert sorted(written) == sorted(path.name for path in folder.iterdir()) == ["deviations.csv", "profile.png", "result.json"]
+    assert json.loads((folder / "result.json").read_text(encoding="utf-8")) == facts
+
+
+def test_an_earlier_result_does_not_stay_beside_a_run_without_one(profile: NominalProfile, tmp_path: Path) -> None:
+    write_results(tmp_path, {}, inspect_oval(profile, 0.0), profile, "oval")
+    assert write_results(tmp_path, {"verdict": "uncertain"}, None, profile, "oval") == ["result.json"]
+    assert [path.name for path in tmp_path.iterdir()] == ["result.json"]
+
+
+def test_a_prepared_folder_exists_and_is_empty(tmp_path: Path) -> None:
+    prepare(tmp_path / "a" / "b")
+    prepare(None)
+    assert list((tmp_path / "a" / "b").iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["file", "file/below"])
+def test_a_folder_that_takes_no_files_is_named(tmp_path: Path, name: str) -> None:
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    with pytest.raises(PlanError, match=r"file.*: the results cannot be written .*; choose another folder with --out"):
+        prepare(tmp_path / name)

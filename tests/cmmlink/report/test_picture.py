@@ -1,0 +1,48 @@
+"""The picture of a profile: its band, its whiskers, and points drawn by their verdicts."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+from matplotlib.image import imread
+
+from cmmlink.report.picture import magnification, write_picture
+from inspection import NominalProfile
+from tests.cmmlink.judged_oval import bumped, inspect_oval
+
+
+def pixels_of(path: Path, colour: str) -> int:
+    """Number of pixels of this colour, or nearly so where lines are smoothed."""
+    return int((np.abs(imread(path)[:, :, :3] - to_rgb(colour)) < 0.1).all(axis=2).sum())
+
+
+ABOVE, BELOW, GOOD, UNPROVEN, BAND = "#c2410c", "#6d28d9", "#2a7fa5", "#a16207", "#dfe7ee"
+
+
+def test_the_picture_shows_band_whiskers_and_what_is_out(profile: NominalProfile, tmp_path: Path) -> None:
+    good, bad = tmp_path / "good.png", tmp_path / "bad.png"
+    write_picture(inspect_oval(profile, 0.02), profile, "oval", good)
+    write_picture(inspect_oval(profile, bumped()), profile, "oval", bad)
+    assert imread(good).shape[:2] == (880, 1320)
+    assert min(pixels_of(good, BAND), pixels_of(bad, BAND)) > 10_000
+    assert pixels_of(good, GOOD) > 100
+    assert min(pixels_of(bad, ABOVE), pixels_of(bad, BELOW)) > 10
+    assert pixels_of(good, BELOW) == 0
+    assert pixels_of(bad, ABOVE) > pixels_of(good, ABOVE)  # which has it only in the ring around its worst point
+
+
+@pytest.mark.parametrize("deviation_mm", [0.065, 0.075, -0.045, -0.055])
+def test_points_nearer_to_a_limit_than_the_uncertainty_are_drawn_neither_good_nor_out(
+    profile: NominalProfile, tmp_path: Path, deviation_mm: float
+) -> None:
+    """The zone is -0.05 .. 0.07 mm with U = 0.01 mm: inside and outside of a limit nothing is proven."""
+    write_picture(inspect_oval(profile, deviation_mm), profile, "oval", tmp_path / "a.png")
+    assert pixels_of(tmp_path / "a.png", UNPROVEN) > 1000
+    assert pixels_of(tmp_path / "a.png", GOOD) == pixels_of(tmp_path / "a.png", BELOW) == 0
+
+
+def test_the_magnification_is_a_round_number_that_shows_the_band(profile: NominalProfile) -> None:
+    factor = magnification(inspect_oval(profile, 0.0), profile)
+    assert factor in {step * power for step in (1, 2, 5) for power in (1, 10, 100)}
+    assert 0.024 <= factor * 0.12 / np.hypot(20, 16) <= 0.06

@@ -1,0 +1,40 @@
+"""deviations.csv: a row for every point."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cmmlink.deviations_csv import COLUMNS, write_deviations
+from inspection import LiveInspection, NominalProfile, RigidTransform, ToleranceZone
+from tests.cmmlink.judged_oval import bumped, inspect_oval
+from tests.cmmlink.oval_part import oval_feet, oval_points, station_mm
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_deviations_csv_has_a_row_for_every_point(profile: NominalProfile, tmp_path: Path) -> None:
+    result = inspect_oval(profile, bumped())
+    write_deviations(result, tmp_path / "deviations.csv")
+    rows = rows_of(tmp_path / "deviations.csv")
+    assert tuple(rows[0]) == tuple(COLUMNS)
+    assert tuple(COLUMNS) == ("index", "x_mm", "y_mm", "station_mm", "foot_x_mm", "foot_y_mm", "deviation_mm", "verdict")
+    assert [int(row["index"]) for row in rows] == list(range(360))
+    truth = np.column_stack([oval_points(bumped()), [station_mm(i) for i in range(360)], oval_feet(), bumped()])
+    np.testing.assert_allclose([[float(row[name]) for name in list(COLUMNS)[1:7]] for row in rows], truth, atol=0.51e-6)
+    words = np.where(np.abs(bumped() - 0.01) > 0.07, "nonconform", "conform")
+    assert [row["verdict"] for row in rows] == words.tolist()
+
+
+def test_a_rejected_point_keeps_its_row_and_says_why(profile: NominalProfile, tmp_path: Path) -> None:
+    live = LiveInspection(profile, ToleranceZone(-0.05, 0.05), datum=RigidTransform.identity())
+    live.add([[10.0, 0.0], [np.nan, 1.0], [0.0, 8.3]])
+    write_deviations(live.finish(), tmp_path / "deviations.csv")
+    rows = rows_of(tmp_path / "deviations.csv")
+    assert [row["verdict"] for row in rows] == ["conform", "rejected: not finite", "nonconform"]
+    assert [rows[1][name] for name in list(COLUMNS)[1:7]] == [""] * 6
+    assert float(rows[2]["deviation_mm"]) == pytest.approx(0.3)

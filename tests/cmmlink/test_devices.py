@@ -1,0 +1,66 @@
+"""The catalogue of devices: what a plan's device becomes, how it is called, and what decodes it."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cmmlink.devices import connect, decoder_of, source_of, words_of
+from cmmlink.errors import PlanError
+from cmmlink.plan.scan import Plan
+from drivers import PointFileError, PointFileSource, RegisterDecoder
+from drivers.codecs.ascii_frames import AsciiDecoder
+from drivers.codecs.optoncdt_frames import OptoncdtDecoder
+from drivers.links.axis import ConstantFeed, FollowedAxis
+from drivers.links.modbus_scanner import ModbusScanner
+from drivers.links.serial_scanner import SerialScanner
+
+SENSOR = {"type": "serial", "address": "COM9", "format": "optoncdt", "options": {"range_mm": 50, "rate_hz": 1000}}
+POSITION = {"type": "serial", "address": "COM8"}
+REGISTERS = {"type": "modbus", "address": "localhost:502", "map": "gocator", "points": 7}
+
+
+def plan_with(device: dict[str, Any]) -> Plan:
+    tolerance = {"lower_mm": -0.1, "upper_mm": 0.1}
+    return Plan.model_validate({"part": {"name": "p"}, "nominal": {"file": "n.csv"}, "tolerance": tolerance, "device": device})
+
+
+@pytest.fixture
+def points(tmp_path: Path) -> dict[str, Any]:
+    (tmp_path / "p.csv").write_text("1,2\n3,4\n", encoding="utf-8")
+    return {"type": "file", "file": tmp_path / "p.csv"}
+
+
+def test_each_type_of_device_has_its_source(points: dict[str, Any]) -> None:
+    assert isinstance(source_of(plan_with(points)), PointFileSource)
+    assert isinstance(source_of(plan_with(POSITION)), SerialScanner)
+    assert isinstance(source_of(plan_with(REGISTERS)), ModbusScanner)
+    assert isinstance(source_of(plan_with(SENSOR | {"axis": {"feed_mm_s": 10}})), ConstantFeed)
+    assert isinstance(source_of(plan_with(SENSOR | {"axis": {"follow": POSITION}})), FollowedAxis)
+
+
+def test_each_type_of_device_has_its_decoder_where_bytes_are_recorded(points: dict[str, Any]) -> None:
+    assert isinstance(decoder_of(plan_with(POSITION).device), AsciiDecoder)
+    assert isinstance(decoder_of(plan_with(SENSOR).device), OptoncdtDecoder)
+    assert isinstance(decoder_of(plan_with(REGISTERS).device), RegisterDecoder)
+    assert decoder_of(plan_with(points).device) is None
+    assert decoder_of(plan_with(SENSOR | {"axis": {"feed_mm_s": 10}}).device) is None
+
+
+def test_a_device_is_called_by_its_type_and_where_it_is(points: dict[str, Any]) -> None:
+    assert [words_of(plan_with(device).device) for device in (points, SENSOR, REGISTERS)] == [
+        "file p.csv",
+        "serial COM9",
+        "modbus localhost:502",
+    ]
+    with connect(plan_with(points)) as device:
+        assert (device.device, device.simulated) == ("file p.csv", False)
+
+
+def test_a_device_that_cannot_be_is_a_wrong_plan() -> None:
+    with pytest.raises(PlanError, match=r"device: .*morse"):
+        source_of(plan_with(POSITION | {"format": "morse"}))
+    with pytest.raises(PlanError, match=r"device: .*no-such-map"):
+        source_of(plan_with(REGISTERS | {"map": "no-such-map"}))
+    with pytest.raises(PointFileError, match=r"none\.csv: no such file"):
+        source_of(plan_with({"type": "file", "file": "none.csv"}))

@@ -1,0 +1,88 @@
+"""One run of a plan: its record, its sinks, and what comes of it."""
+
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from cmmlink.devices import Connected
+from cmmlink.errors import StoreError
+from cmmlink.events import Event, Judged, RunFinished, RunStarted, Sink
+from cmmlink.record.reader import list_runs, open_to_read, recorded_run
+from cmmlink.run import FinishedRun, carry_out
+from drivers import LinkError
+from tests.cmmlink.recorded import Script, scan_arrivals, small_plan, small_profile, today
+
+
+def run(source: Script, records: Path | None, *sinks: Sink, on_ready: Callable[[], None] = lambda: None) -> FinishedRun:
+    plan = small_plan().model_copy(update={"operator": "A. Operator"})
+    return carry_out(
+        plan,
+        small_profile(),
+        Connected(source, "scripted", simulated=True),
+        records=records,
+        clock=time.monotonic,
+        now=today,
+        stop=threading.Event(),
+        sinks=sinks,
+        on_ready=on_ready,
+    )
+
+
+def test_a_finished_run_is_what_its_record_says(tmp_path: Path) -> None:
+    finished = run(Script(*scan_arrivals()), tmp_path)
+    assert finished.evidence is not None
+    with open_to_read(tmp_path, today) as store:
+        recorded = recorded_run(store, finished.evidence.run)
+    assert recorded.chain_sha256 == finished.evidence.chain_sha256
+    document = finished.result_json()
+    assert recorded.result is not None
+    assert {key: document[key] for key in recorded.result} == recorded.result
+    assert (document["run"], document["operator"], document["simulated"]) == (recorded.run, "A. Operator", True)
+    assert document["received"] == document["judged"] + document["rejected"] == 612
+    assert finished.title == f"{small_plan().part.name} {small_plan().part.serial_number} (SIMULATED)"
+
+
+def test_without_a_folder_nothing_is_recorded_and_the_result_is_the_same(tmp_path: Path) -> None:
+    kept, unkept = run(Script(*scan_arrivals()), tmp_path), run(Script(*scan_arrivals()), None)
+    assert unkept.evidence is None
+    assert kept.evidence is not None
+    assert unkept.result_json().items() <= kept.result_json().items()
+    assert set(kept.result_json()) - set(unkept.result_json()) == {"run", "chain_sha256", "plan_sha256", "nominal_sha256", "software"}
+
+
+def test_ready_is_said_before_the_device_is_asked_and_sinks_hear_after_the_recorder(tmp_path: Path) -> None:
+    heard: list[str] = []
+
+    def sink(event: Event) -> None:
+        if isinstance(event, RunStarted):
+            with open_to_read(tmp_path, today, close_interrupted=False) as store:
+                assert [begin.kind for begin, _ in store.begins_and_ends()] == ["run"]
+        if isinstance(event, RunStarted | Judged | RunFinished):
+            heard.append(type(event).__name__)
+
+    run(Script(lambda: heard.append("asked"), *scan_arrivals()), tmp_path, sink, on_ready=lambda: heard.append("ready"))
+    assert heard[0] == "ready"
+    assert set(heard[1:3]) == {"RunStarted", "asked"}
+    assert (set(heard[3:-1]), heard[-1]) == ({"Judged"}, "RunFinished")
+
+
+def test_a_device_that_fails_ends_the_run_and_does_not_raise(tmp_path: Path) -> None:
+    def unplug() -> None:
+        raise LinkError("unplugged")
+
+    finished = run(Script(*scan_arrivals()[:9], unplug), tmp_path)
+    assert finished.outcome.ending == "interrupted"
+    assert str(finished.outcome.failure) == "unplugged"
+    assert finished.result_json()["verdict"] == "uncertain"
+    assert list_runs(tmp_path, today)[0]["state"] == "interrupted"
+
+
+def test_a_record_that_cannot_be_kept_is_no_run(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    asked: list[bool] = []
+    with pytest.raises(StoreError, match="choose another folder with --records"):
+        run(Script(lambda: asked.append(True)), tmp_path / "file")
+    assert asked == []
