@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from inspection.kernels.layout import BOX_HIGH_X, BOX_WIDTH
+
 Array = NDArray[np.float64]
 
 
@@ -14,11 +16,11 @@ def box_tree(leaf_boxes_mm: Array) -> Array:
     """
     count = len(leaf_boxes_mm)
     q = 1 << max(0, (count - 1).bit_length())
-    boxes = np.full((2 * q, 4), np.inf)
-    boxes[:, 2:] = -np.inf
+    boxes = np.full((2 * q, BOX_WIDTH), np.inf)
+    boxes[:, BOX_HIGH_X:] = -np.inf
     boxes[q : q + count] = leaf_boxes_mm
     while q > 1:
-        children = boxes[q : 2 * q].reshape(q // 2, 2, 4)
-        boxes[q // 2 : q] = np.hstack([children[:, :, :2].min(axis=1), children[:, :, 2:].max(axis=1)])
+        children = boxes[q : 2 * q].reshape(q // 2, 2, BOX_WIDTH)
+        boxes[q // 2 : q] = np.hstack([children[:, :, :BOX_HIGH_X].min(axis=1), children[:, :, BOX_HIGH_X:].max(axis=1)])
         q //= 2
     return boxes

@@ -12,7 +12,24 @@ from numpy.typing import NDArray
 from inspection.box_tree import box_tree
 from inspection.curve import NurbsCurve, left_limit
 from inspection.errors import NominalError
-from inspection.kernels.layout import VERTEX_WIDTH
+from inspection.kernels.layout import (
+    BOUND_WIDTH,
+    CORNER,
+    OPEN_END,
+    PIECE_DEGREE,
+    PIECE_END,
+    PIECE_FIRST,
+    PIECE_LAST,
+    PIECE_U,
+    VERTEX_KIND,
+    VERTEX_NORMAL_X,
+    VERTEX_NORMAL_Y,
+    VERTEX_STATION,
+    VERTEX_U,
+    VERTEX_WIDTH,
+    VERTEX_X,
+    VERTEX_Y,
+)
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -74,14 +91,14 @@ def cut_into_pieces(curve: NurbsCurve) -> CurvePieces:
     low, high, span_low, span_high = _halve_spans(curve, size)
     width, middle = high - low, (low + high) / 2
     smooth_before, smooth_after = low > span_low, high < span_high
-    first = np.where(smooth_before, np.maximum(-0.5 - _OVERLAP, (span_low - middle) / width), -0.5)
-    last = np.where(smooth_after, np.minimum(0.5 + _OVERLAP, (span_high - middle) / width), 0.5)
+    first = np.where(smooth_before, np.maximum(-PIECE_END - _OVERLAP, (span_low - middle) / width), -PIECE_END)
+    last = np.where(smooth_after, np.minimum(PIECE_END + _OVERLAP, (span_high - middle) / width), PIECE_END)
     coefficients = _quintic_coefficients(curve, middle, width)
     before, after, vertices, cones = _links(curve, low)
-    is_end = np.append(vertices[:, 5] == 2, False)
+    is_end = np.append(vertices[:, VERTEX_KIND] == OPEN_END, False)
     grain = np.where(is_end, _VERTEX_GRAIN, -_VERTEX_GRAIN)
     slack_before, slack_after = (np.where(link < 0, grain[np.where(link < 0, -1 - link, -1)], 1e-9) for link in (before, after))
-    rows = np.column_stack([coefficients.reshape(-1, 12), middle, width, first - slack_before, last + slack_after])
+    rows = np.column_stack([coefficients.reshape(-1, PIECE_U), middle, width, first - slack_before, last + slack_after])
     rows = np.column_stack([rows, _arc_length_coefficients(rows, curve.station_mm(low))])
     return _measure_pieces(rows, before, after, vertices, cones)
 
@@ -130,7 +147,7 @@ def _is_fine_enough(curve: NurbsCurve, low: Array, high: Array, size: float) -> 
 def _is_polynomial(curve: NurbsCurve) -> bool:
     """Whether every knot span is a polynomial of degree five or less as it stands."""
     assert curve.weights is not None
-    return curve.degree <= 5 and bool(np.all(curve.weights == curve.weights[0]))
+    return curve.degree <= PIECE_DEGREE and bool(np.all(curve.weights == curve.weights[0]))
 
 
 def _is_quintic(curve: NurbsCurve, low: Array, high: Array, size: float) -> NDArray[np.bool_]:
@@ -168,8 +185,8 @@ def _quintic_coefficients(curve: NurbsCurve, middle: Array, width: Array) -> Arr
 
 def _arc_length_coefficients(rows: Array, start_mm: Array) -> Array:
     """Coefficients (p, 8) of the arc length from the start of the curve: the integral of the sextic through seven values of the speed."""
-    c = rows[:, :12].reshape(-1, 2, 6)
-    first, last = rows[:, 14:15], rows[:, 15:16]
+    c = _coordinates(rows)
+    first, last = rows[:, PIECE_FIRST, None], rows[:, PIECE_LAST, None]
     t = (first + last) / 2 + (last - first) / 2 * np.cos((2 * np.arange(7) + 1) * np.pi / 14)  # (p, 7)
     velocity = np.einsum("pdk,kpt->ptd", c[:, :, 1:] * np.arange(1, 6), _powers(t, 5))
     speed = np.hypot(velocity[..., 0], velocity[..., 1])
@@ -205,17 +222,17 @@ def _links(curve: NurbsCurve, low: Array) -> tuple[Index, Index, Array, Array]:
     made = []
     for corner in curve.corners:
         follower = int(np.argmin(np.abs(low - corner)))
-        made.append(_vertex_row(curve, corner, 1.0))
+        made.append(_vertex_row(curve, corner, CORNER))
         after[before[follower]], before[follower] = -len(made), -len(made)
     if not curve.closed:
         before[0], after[-1] = -1 - len(made), -2 - len(made)
-        made += [_vertex_row(curve, end, 2.0) for end in curve.domain]
+        made += [_vertex_row(curve, end, OPEN_END) for end in curve.domain]
         made[-2][1][0], made[-1][1][1] = 0.0, 0.0
     rows, cones = np.array([row for row, _ in made]), np.array([cone for _, cone in made])
     return before, after, rows.reshape(-1, VERTEX_WIDTH), cones.reshape(-1, 2, 2)
 
 
-def _vertex_row(curve: NurbsCurve, u: float, kind: float) -> tuple[Array, Array]:
+def _vertex_row(curve: NurbsCurve, u: float, kind: int) -> tuple[Array, Array]:
     """The row of one vertex, and the unit tangents (2, 2) before and after it.
 
     Its pseudo-normal is the bisector of the two normals; at a cusp, where they cancel, it is the later one.
@@ -223,18 +240,21 @@ def _vertex_row(curve: NurbsCurve, u: float, kind: float) -> tuple[Array, Array]
     here = np.array([u])
     point, tangent = curve.derivatives(here, 1)[:, 0]
     later = tangent / np.hypot(*tangent)
-    tangent = curve.derivatives(left_limit(here, curve), 1)[1, 0] if kind == 1.0 else later
+    tangent = curve.derivatives(left_limit(here, curve), 1)[1, 0] if kind == CORNER else later
     earlier = tangent / np.hypot(*tangent)
     both = later + earlier
     both = both / np.hypot(*both) if np.hypot(*both) > 1e-9 else later
-    station = float(curve.station_mm(here)[0])
-    return np.array([point[0], point[1], -both[1], both[0], u, kind, station, 0.0]), np.array([earlier, later])
+    row = np.zeros(VERTEX_WIDTH)
+    row[VERTEX_X], row[VERTEX_Y] = point
+    row[VERTEX_NORMAL_X], row[VERTEX_NORMAL_Y] = -both[1], both[0]
+    row[VERTEX_U], row[VERTEX_KIND], row[VERTEX_STATION] = u, kind, curve.station_mm(here)[0]
+    return row, np.array([earlier, later])
 
 
 def _measure_pieces(rows: Array, before: Index, after: Index, vertices: Array, cones: Array) -> CurvePieces:
     """The pieces with their chords, frames and bounds, all worked out from their coefficients."""
-    c = rows[:, :12].reshape(-1, 2, 6)
-    first, last = rows[:, 14], rows[:, 15]
+    c = _coordinates(rows)
+    first, last = rows[:, PIECE_FIRST], rows[:, PIECE_LAST]
     t = first[:, None] + (last - first)[:, None] * np.linspace(0, 1, 9)  # (p, 9)
     powers = np.arange(6)
     velocity = np.einsum("pdk,ptk->ptd", c[:, :, 1:] * powers[1:], t[:, :, None] ** powers[:5])
@@ -242,7 +262,7 @@ def _measure_pieces(rows: Array, before: Index, after: Index, vertices: Array, c
     speed = np.hypot(velocity[..., 0], velocity[..., 1])
     curvature = (velocity[..., 0] * bend[..., 1] - velocity[..., 1] * bend[..., 0]) / speed**3
     spread = 0.25 * np.ptp(curvature, axis=1)  # how far the curvature may go beyond its values at nine places
-    start, stop = (np.einsum("pdk,k->pd", c, np.array(side) ** powers) for side in (-0.5, 0.5))
+    start, stop = (np.einsum("pdk,k->pd", c, np.array(side) ** powers) for side in (-PIECE_END, PIECE_END))
     tangent = c[:, :, 1] / np.hypot(c[:, 0, 1], c[:, 1, 1])[:, None]
     second = np.abs(c[:, :, 2:] * (powers[2:] * powers[1:5]) * 0.5 ** powers[:4]).sum(axis=2)  # bound of |C''|
     middle_speed = np.hypot(c[:, 0, 1], c[:, 1, 1])
@@ -266,12 +286,17 @@ def _measure_pieces(rows: Array, before: Index, after: Index, vertices: Array, c
     )
 
 
+def _coordinates(rows: Array) -> Array:
+    """The coefficients (p, 2, 6) of x and y in the rows of pieces."""
+    return rows[:, :PIECE_U].reshape(-1, 2, PIECE_DEGREE + 1)
+
+
 def derivative_bounds(pieces: CurvePieces) -> Array:
     """Bounds (p, 4) of the first four derivatives on each piece."""
-    c = np.abs(pieces.rows[:, :12].reshape(-1, 2, 6))
-    result = np.zeros((len(pieces), 4))
+    c = np.abs(_coordinates(pieces.rows))
+    result = np.zeros((len(pieces), BOUND_WIDTH))
     factor = np.ones(6)
-    for order in range(4):
+    for order in range(BOUND_WIDTH):
         factor = factor * np.maximum(np.arange(6) - order, 0)
         terms = c * factor * 0.5 ** np.maximum(np.arange(6) - order - 1, 0)
         result[:, order] = np.hypot(*terms.sum(axis=2).T)

@@ -124,7 +124,7 @@ def register_fine(
         raise ValueError(f"scheme must be gauss-newton or icp, not {scheme!r}")
     fit, outliers = _pose_fit(points, nominal, method, tip_radius_mm), np.zeros(len(points), dtype=bool)
     if robust:
-        outliers = fit.outliers(_pose_numbers(pose), OutlierLimit(_OUTLIER_MADS, float(gross_mm), _SETTLED_WEIGHTS_MM), _ROBUST_STEPS)
+        outliers = fit.find_outliers(_pose_numbers(pose), OutlierLimit(_OUTLIER_MADS, float(gross_mm), _SETTLED_WEIGHTS_MM), _ROBUST_STEPS)
         fit = _pose_fit(points[~outliers], nominal, method, tip_radius_mm)
     found = fit.settle(_pose_numbers(pose), _MOST_STEPS)
     return _registration(found, found.steps, found.settled, outliers)

@@ -12,13 +12,36 @@ from numpy.typing import NDArray
 
 from inspection.curve import NurbsCurve
 from inspection.curve_pieces import CurvePieces, cut_into_pieces, derivative_bounds, piece_tree
-from inspection.kernels.layout import BLOCK_LEVEL, FAR, LISTED, MOST_BRANCHES
+from inspection.kernels.layout import (
+    BLOCK_DEPTH,
+    BLOCK_LEVEL,
+    BLOCKS_ACROSS,
+    BLOCKS_PER_MM,
+    FAR,
+    FIRST_PARAMETER,
+    GRAIN_MM,
+    HEADER,
+    INTEGERS_END,
+    LAST_PARAMETER,
+    LEAVES,
+    LENGTH_MM,
+    LINKS_AT,
+    LIST_WIDTH,
+    LISTED,
+    OPEN_END,
+    ORIGIN_X,
+    ORIGIN_Y,
+    PIECE_FIRST,
+    PIECE_LAST,
+    PIECES,
+    PIECES_AT,
+    REALS_END,
+    VERTEX_KIND,
+)
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-LIST_WIDTH = 1 + MOST_BRANCHES
-HEADER = 16  # numbers before the packed tables, in both arrays
 _DEEPEST = 11  # smallest cells: half a thousandth of the size of the curve
 _NEAR = 0.015  # band in which cells may become that small, as a fraction of the size
 _BAND = 0.08  # band of the whole grid: beyond it every point is searched for along the whole curve
@@ -29,10 +52,8 @@ _STEEPEST = 0.9  # a cell is certified where curvature x signed distance stays b
 class FootGrid:
     """Packed tables of a curve for `kernels.project`.
 
-    reals      : header (origin x, y, blocks per mm, round-off of a place in mm, first and last parameter, length), then the pieces, their
-                 bounds, the boxes of the search tree, the vertices
-    integers   : header (blocks across, pieces, leaves of the tree, then where each table begins and the next ends, for the reals from 3,
-                 for the integers from 8), then the links of the pieces, blocks, cells, lists
+    reals      : header, then the pieces, their bounds, the boxes of the search tree, the vertices; see `kernels.layout`
+    integers   : header, then the links of the pieces, blocks, cells, lists
     pieces     : number of polynomial pieces
     cells      : number of cells of the grid
     band_mm    : half width of the band that the grid covers
@@ -196,7 +217,7 @@ def _may_end_at_vertex(pieces: CurvePieces, p: Index, place: Array, radius: floa
 
     The vertex of a piece is the one at its end; a piece at the start of an open curve has the one there.
     """
-    is_start = (pieces.before[p] < 0) & (pieces.vertices[-1 - np.minimum(pieces.before[p], -1), 5] == 2)
+    is_start = (pieces.before[p] < 0) & (pieces.vertices[-1 - np.minimum(pieces.before[p], -1), VERTEX_KIND] == OPEN_END)
     vertex = np.where(pieces.after[p] < 0, -1 - pieces.after[p], np.where(is_start, -1 - pieces.before[p], -1))
     x, y = place[:, 0] - pieces.vertices[vertex, 0], place[:, 1] - pieces.vertices[vertex, 1]
     cone = pieces.cones[vertex]
@@ -239,8 +260,8 @@ def _certify(
     certified &= _are_neighbours_certified(pieces, p, centre, radius)
     foot = along / np.maximum(1 - pieces.curvature[p] * aside, 0.1) / pieces.length_mm[p]
     reach = radius / np.clip(1 - view.steepest[nearest], 0.1, 1.0) / pieces.length_mm[p]
-    fits = (foot - reach >= pieces.rows[p, 14]) | (pieces.before[p] < 0)
-    fits &= (foot + reach <= pieces.rows[p, 15]) | (pieces.after[p] < 0)
+    fits = (foot - reach >= pieces.rows[p, PIECE_FIRST]) | (pieces.before[p] < 0)
+    fits &= (foot + reach <= pieces.rows[p, PIECE_LAST]) | (pieces.after[p] < 0)
     return branches, certified, fits
 
 
@@ -326,9 +347,12 @@ def _pack_grid(pieces: CurvePieces, origin: Array, root: float, size: float, lea
     index_tables = [np.zeros(HEADER, np.int64), links.ravel(), blocks.ravel(), cells, leaves.lists]
     real_at = np.cumsum([len(table) for table in tables])
     index_at = np.cumsum([len(table) for table in index_tables])
-    tables[0][:4] = [origin[0], origin[1], across / root, 16 * np.finfo(float).eps * (size + np.abs(origin).max())]
-    tables[0][4:7] = ends
-    index_tables[0][:13] = [across, len(pieces), len(boxes) // 2, *real_at, *index_at]
+    header, index_header = tables[0], index_tables[0]
+    header[ORIGIN_X], header[ORIGIN_Y] = origin
+    header[BLOCKS_PER_MM], header[GRAIN_MM] = across / root, 16 * np.finfo(float).eps * (size + np.abs(origin).max())
+    header[FIRST_PARAMETER], header[LAST_PARAMETER], header[LENGTH_MM] = ends
+    index_header[BLOCKS_ACROSS], index_header[PIECES], index_header[LEAVES] = across, len(pieces), len(boxes) // 2
+    index_header[PIECES_AT : REALS_END + 1], index_header[LINKS_AT : INTEGERS_END + 1] = real_at, index_at
     return FootGrid(_align(np.concatenate(tables)), np.concatenate(index_tables).astype(np.int32), len(pieces), len(cells), _BAND * size)
 
 
@@ -361,4 +385,4 @@ def _pack_cells(leaves: _Leaves) -> tuple[Index, Index]:
         y = ((leaves.y[rows] << fine) & ((1 << row_depth) - 1))[:, None, None] + step[None, :, None]
         place = offset[block[rows]][:, None, None] + (y << row_depth[:, None, None]) + x
         cells[place] = leaves.content[rows][:, None, None]
-    return np.where(deepest < 0, -1, 16 * offset[:-1] + deepest), cells
+    return np.where(deepest < 0, FAR, (offset[:-1] << BLOCK_DEPTH) + deepest), cells

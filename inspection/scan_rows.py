@@ -1,12 +1,13 @@
 """The points of a scan as growing arrays, a row for every received point, with what each was found to be."""
 
 import math
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inspection.deviations import feet_on
-from inspection.kernels import judge, placed, take_in
+from inspection.kernels import judge_rows, take_in
 from inspection.result import NOT_JUDGED, Rejection
 from inspection.rigid import RigidTransform
 from inspection.section import SectionPlane
@@ -41,12 +42,9 @@ class ScanRows:
 
     def judge(self, first: int, stop: int, pose: RigidTransform, terms: Terms) -> None:
         """Fill in rows first .. stop - 1 as they are with the points at this pose."""
-        x, y = pose.translation_mm
-        moved = placed(self.points, self.rejection, first, stop, (math.cos(pose.rotation_rad), math.sin(pose.rotation_rad), x, y))
-        zone = terms.zone
-        judgement = (terms.nominal.outward, *map(float, (terms.tip_radius_mm, zone.lower_mm, zone.upper_mm, zone.uncertainty_mm)))
+        place = (math.cos(pose.rotation_rad), math.sin(pose.rotation_rad), *pose.translation_mm.tolist())
         arrays = (self.actual, self.foot, self.normal, self.station, self.deviation, self.verdicts, self.rejection)
-        judge(feet_on(moved, terms.nominal, terms.method), judgement, first, arrays)
+        judge_rows(self.points, arrays, first, stop, place, partial(feet_on, nominal=terms.nominal, method=terms.method), terms.judgement)
 
     def usable_rows(self) -> NDArray[np.int64]:
         """Rows (k,) of points that a registration may use."""

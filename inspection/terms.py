@@ -1,9 +1,10 @@
 """What the points of a scan are held against, and how: everything that an inspection is told before the first point."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 from inspection.deviations import check_method, check_tip_radius
+from inspection.kernels import Judgement
 from inspection.methods import Method
 from inspection.nominal import NominalProfile
 from inspection.rigid import RigidTransform
@@ -24,6 +25,7 @@ class Terms:
     off_section_max_mm : points farther from the plane of the section are rejected; infinite for no limit
     coverage_min       : share of the nominal's length below which conformity is not proven
     reject_outliers    : leave gross outliers out of the fit, and reject them
+    judgement          : what of this turns a foot into a verdict, as the compiled loops take it
     """
 
     nominal: NominalProfile
@@ -35,12 +37,16 @@ class Terms:
     off_section_max_mm: float
     coverage_min: float
     reject_outliers: bool
+    judgement: Judgement = field(init=False)
 
     def __post_init__(self) -> None:
         check_tip_radius(self.tip_radius_mm, self.nominal)
         if self.fit not in get_args(FitName):
             raise ValueError(f"fit must be one of {', '.join(get_args(FitName))}, not {self.fit!r}")
         check_method(self.method)
+        zone = self.zone
+        limits = (float(self.tip_radius_mm), float(zone.lower_mm), float(zone.upper_mm), float(zone.uncertainty_mm))
+        object.__setattr__(self, "judgement", (self.nominal.outward, *limits))
 
     @property
     def known_pose(self) -> RigidTransform | None:

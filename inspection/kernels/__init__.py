@@ -14,7 +14,7 @@ from inspection.kernels.growing import GrowingSums
 from inspection.kernels.layout import SAMPLE_METHODS
 from inspection.kernels.on_samples import SampleTables, project_on_samples
 from inspection.kernels.pose import OutlierLimit, PoseEstimate, PoseFit
-from inspection.kernels.scan_rows import judge, placed, take_in
+from inspection.kernels.scan_rows import Judgement, RowArrays, judge_rows, take_in
 from inspection.kernels.thinning import strides
 
 __all__ = [
@@ -22,12 +22,13 @@ __all__ = [
     "CurveTables",
     "Feet",
     "GrowingSums",
+    "Judgement",
     "OutlierLimit",
     "PoseEstimate",
     "PoseFit",
+    "RowArrays",
     "SampleTables",
-    "judge",
-    "placed",
+    "judge_rows",
     "project",
     "project_on_samples",
     "strides",

@@ -98,7 +98,7 @@ class PoseFit:
         angle, x, y, mean_square, _, _ = state.tolist()
         return PoseEstimate((angle, x, y), steps, settled, mean_square, state[4:], covariance)
 
-    def outliers(self, pose: tuple[float, float, float], limit: OutlierLimit, most_steps: int) -> NDArray[np.bool_]:
+    def find_outliers(self, pose: tuple[float, float, float], limit: OutlierLimit, most_steps: int) -> NDArray[np.bool_]:
         """Points (m,) beyond the limit once the fit by Tukey's weights has settled."""
         found = np.zeros(len(self.weights), dtype=np.bool_)
         _find_outliers(self._problem, self._samples, self._memory, pose, limit, most_steps, found)
@@ -117,7 +117,7 @@ def _settle_pose(problem: Any, samples: Any, memory: Any, state: Any, covariance
         steps += 1
         step, next_pose, share, lower = newton_step(here, span[2]), pose, 1.0, False
         for _ in range(_HALVINGS):
-            next_pose = _moved_pose(pose, span, step, share)
+            next_pose = _move_pose(pose, span, step, share)
             # It changes no deviation by more, so there is nothing to project again; without any point nothing was fitted.
             settled = share * step[3] <= _STANDSTILL_MM and here[COUNT] > 0.0
             if settled:
@@ -128,19 +128,31 @@ def _settle_pose(problem: Any, samples: Any, memory: Any, state: Any, covariance
                 break
             share *= 0.5
         if lower and steps >= _HOVERING_STEPS and share * step[3] < _HOVERING_MM and trial[COUNT] != here[COUNT]:
-            for i in range(len(weights)):
-                weights[i] *= takes_part[i] * new_part[i]
+            _leave_out_hovering(weights, takes_part, new_part)
             _add_up(weights, takes_part, new_part, outward, tip, next_pose, span, moved, feet, trial)
         if lower:
             here, trial = trial, here
             takes_part, new_part = new_part, takes_part
         if lower or settled:
             pose = next_pose
-    state[0], state[1], state[2] = pose
-    state[3] = here[SQUARE] / here[COUNT] if here[COUNT] > 0.0 else np.inf
-    state[4], state[5] = _centre(pose, span)
-    fill_covariance(here, span[2], here[SQUARE] / max(here[COUNT] - 3.0, 1.0), covariance)
+    _report(here, pose, span, state, covariance)
     return steps, settled
+
+
+@kernel
+def _leave_out_hovering(weights: Any, before: Any, after: Any) -> None:
+    """Leave out the points that took part at only one of two poses: an open end moves to and fro beside them."""
+    for i in range(len(weights)):
+        weights[i] *= before[i] * after[i]
+
+
+@kernel
+def _report(sums: Any, pose: Any, span: Any, state: Any, covariance: Any) -> None:
+    """The pose, the mean square of the deviations, the centre of the points, and the covariance."""
+    state[0], state[1], state[2] = pose
+    state[3] = sums[SQUARE] / sums[COUNT] if sums[COUNT] > 0.0 else np.inf
+    state[4], state[5] = _centre(pose, span)
+    fill_covariance(sums, span[2], sums[SQUARE] / max(sums[COUNT] - 3.0, 1.0), covariance)
 
 
 @kernel
@@ -164,7 +176,7 @@ def _find_outliers(problem: Any, samples: Any, memory: Any, pose: Any, wanted: A
             found[i] = off[i] >= limit and takes_part[i] > 0.0
         _add_up(weights, takes_part, takes_part, outward, tip, pose, span, moved, feet, sums)
         step = newton_step(sums, span[2])
-        pose = _moved_pose(pose, span, step, 1.0)
+        pose = _move_pose(pose, span, step, 1.0)
         if step[3] <= wanted.settled_mm:
             break
 
@@ -192,7 +204,7 @@ def _centre(pose: Any, span: Any) -> tuple[float, float]:
 
 
 @kernel
-def _moved_pose(pose: Any, span: Any, step: Any, share: float) -> tuple[float, float, float]:
+def _move_pose(pose: Any, span: Any, step: Any, share: float) -> tuple[float, float, float]:
     """The pose after a share of a step: its rotation about the centre, which moves by its shift alone."""
     x, y = _centre(pose, span)
     angle = pose[0] + share * step[2]

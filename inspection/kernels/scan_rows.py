@@ -1,5 +1,6 @@
 """Points of a scan, row by row: machine points in, verdicts out."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,32 @@ from inspection.kernels.layout import (
 )
 
 Array = NDArray[np.float64]
+Codes = NDArray[np.int8]
+RowArrays = tuple[Array, Array, Array, Array, Array, Codes, Codes]  # plain tuples: a named one takes numba a microsecond a call
+Judgement = tuple[float, float, float, float, float]
+
+
+def judge_rows(
+    section_mm: Array,
+    rows: RowArrays,
+    first: int,
+    stop: int,
+    pose: tuple[float, float, float, float],
+    project: Callable[[Array], Feet],
+    judgement: Judgement,
+) -> None:
+    """Place rows first .. stop - 1 of the section points (n, 2), project them, and enter what they are found to be.
+
+    rows      : surface points, nominal points and directions of the deviation (n, 2 each), station and deviation in mm (n,), codes of the
+                verdict and of the rejection (n,); NaN and NOT_JUDGED where there is no verdict
+    pose      : cosine and sine of the rotation, then the shift in mm (x, y)
+    project   : feet of points (m, 2) in nominal coordinates; a row that cannot be used comes as NaN
+    judgement : 1.0 where left of the curve is out of material, else -1.0; tip radius, lower and upper limit, uncertainty in mm
+    """
+    moved = np.empty((stop - first, 2))
+    _place(section_mm, rows[-1], first, pose, moved)
+    feet = project(moved)
+    _judge(feet.foot_mm, feet.distance_mm, feet.gradient, feet.station_mm, feet.vertex, judgement, first, rows)
 
 
 def take_in(points_mm: Array, plane: Array, off_section_max_mm: float, section_mm: Array, rejection: NDArray[np.int8], at: int) -> None:
@@ -54,15 +81,8 @@ def _take_in(points: Any, plane: Any, off_section_max: float, section: Any, reje
             rejection[row] = NOT_REJECTED
 
 
-def placed(section_mm: Array, rejection: NDArray[np.int8], first: int, stop: int, pose: tuple[float, float, float, float]) -> Array:
-    """Rows first .. stop - 1 in nominal coordinates by (cos, sin, x, y); NaN where a row cannot be used."""
-    moved = np.empty((stop - first, 2))
-    _placed(section_mm, rejection, first, pose, moved)
-    return moved
-
-
 @kernel
-def _placed(section: Any, rejection: Any, first: int, pose: Any, moved: Any) -> None:
+def _place(section: Any, rejection: Any, first: int, pose: Any, moved: Any) -> None:
     c, s, tx, ty = pose
     for i in range(len(moved)):
         row = first + i
@@ -72,15 +92,6 @@ def _placed(section: Any, rejection: Any, first: int, pose: Any, moved: Any) -> 
             x, y = section[row, 0], section[row, 1]
             moved[i, 0] = c * x - s * y + tx
             moved[i, 1] = s * x + c * y + ty
-
-
-def judge(feet: Feet, judgement: tuple[float, ...], first: int, rows: tuple[Any, ...]) -> None:
-    """Enter what feet say from row `first` on.
-
-    judgement : outward, tip radius, lower and upper limit, uncertainty
-    rows      : arrays actual_mm, foot_mm, gradient, station_mm, deviation_mm, verdicts, rejection
-    """
-    _judge(feet.foot_mm, feet.distance_mm, feet.gradient, feet.station_mm, feet.vertex, judgement, first, rows)
 
 
 @kernel

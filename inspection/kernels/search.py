@@ -125,14 +125,16 @@ def _closest_on_piece(pieces: Any, bounds: Any, piece: int, x: float, y: float, 
     closest, square_least = 0.0, np.inf
     level, place = 0, 0  # the interval of number `place` of 2 ** level
     while True:
-        half = 0.5 / (1 << level)
-        middle = (2 * place + 1) * half - 0.5
+        half = PIECE_END / (1 << level)
+        middle = (2 * place + 1) * half - PIECE_END
         rx, ry, vx, vy, hx, hy, kx, ky = derivatives_at(pieces, row, x, y, middle)
         square = rx * rx + ry * ry
         if square < square_least:
             square_least, closest = square, middle
             least = min(least, square)
         distance = np.sqrt(square)
+        # The tangential distance is f = (C - M) . C'. By Leibniz f' (`slope`) = |C'|^2 + (C - M) . C'', and its next derivatives are
+        # 3 C' . C'' + (C - M) . C''' and 3 |C''|^2 + 4 C' . C''' + (C - M) . C'''': of the last, `bound` is one over the interval.
         slope = vx * vx + vy * vy + rx * hx + ry * hy
         bound = 3.0 * bend * bend + 4.0 * fast * twist + (distance + fast * half) * fourth
         change = half * abs(3.0 * (vx * hx + vy * hy) + rx * kx + ry * ky) + 0.5 * half * half * bound
