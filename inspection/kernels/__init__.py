@@ -14,7 +14,7 @@ from inspection.kernels.growing import GrowingSums
 from inspection.kernels.layout import SAMPLE_METHODS
 from inspection.kernels.on_samples import SampleTables, project_on_samples
 from inspection.kernels.pose import OutlierLimit, PoseEstimate, PoseFit
-from inspection.kernels.scan_rows import Judgement, RowArrays, judge_rows, take_in
+from inspection.kernels.rows import Judgement, RowArrays, judge_rows, take_in
 from inspection.kernels.thinning import strides
 
 __all__ = [

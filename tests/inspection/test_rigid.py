@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from inspection import RigidTransform
-from inspection.kernels import placed
+from inspection.kernels.rows import place_rows
 from inspection.rigid import best_motion, rotation_about
 from tests.inspection import profiles
 
@@ -56,7 +56,7 @@ def test_the_compiled_motion_is_the_one_in_numpy_to_the_last_bit() -> None:
         pose = RigidTransform(rng.uniform(-4, 4), rng.normal(0, 300, 2))
         points = rng.normal(0, 10.0 ** rng.uniform(-3, 4), (200, 2))
         x, y = pose.translation_mm
-        moved = placed(points, np.zeros(200, dtype=np.int8), 0, 200, (np.cos(pose.rotation_rad), np.sin(pose.rotation_rad), x, y))
+        moved = place_rows(points, np.zeros(200, dtype=np.int8), 0, 200, (np.cos(pose.rotation_rad), np.sin(pose.rotation_rad), x, y))
         assert np.array_equal(moved, pose.apply(points))
 
 

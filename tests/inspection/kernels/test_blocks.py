@@ -1,53 +1,20 @@
-"""The compiled closest point against the independent oracle and closed forms; the compiled methods against plain numpy."""
-
-import os
-import subprocess
-import sys
-from collections.abc import Callable
-from functools import cache
+"""The closest point of many places against the independent oracle and closed forms."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numba import njit
 from scipy.spatial import cKDTree
 
-from inspection import NominalProfile, NurbsCurve, discretize
-from inspection.foot_grid import FootGrid, build_foot_grid
-from inspection.kernels import SAMPLE_METHODS, Feet, compiling, project, project_on_samples
-from inspection.kernels.nearest_sample import nearest_sample
+from inspection import NurbsCurve
+from inspection.foot_grid import build_foot_grid
+from inspection.kernels import Feet, project
 from tests.inspection import profiles
-from tests.inspection import projections_reference as reference
+from tests.inspection.kernels.places import grid_of, scattered
 from tests.inspection.oracle import Closest, closest_point
 from tests.inspection.profiles import Array, curve_of
 
 FIELDS = Feet._fields
-
-
-@cache
-def grid_of(name: str) -> FootGrid:
-    return build_foot_grid(curve_of(name))
-
-
-def scattered(curve: NurbsCurve, rng: np.random.Generator, count: int) -> Array:
-    """Points on the curve, near it, in its band, at its ends or trailing edge, and anywhere."""
-    first, last = curve.domain
-    u = rng.uniform(first, last, 3 * count)
-    offset = np.concatenate([np.zeros(count // 4), rng.normal(0, 0.05, count), rng.uniform(-1, 1, 2 * count - count // 4)])
-    near_ends = np.concatenate(
-        [first + 0.05 * (last - first) * rng.uniform(0, 1, count) ** 3, last - 0.05 * (last - first) * rng.uniform(0, 1, count) ** 3]
-    )
-    box = curve.point(np.linspace(first, last, 300))
-    return np.vstack(
-        [
-            profiles.offset_points(curve, u, offset),
-            profiles.offset_points(curve, near_ends, rng.normal(0, 0.2, 2 * count)),
-            curve.point(np.array([first, last])).repeat(count // 4, axis=0) + rng.normal(0, 0.3, (2 * (count // 4), 2)),
-            rng.uniform(box.min(axis=0) - 15, box.max(axis=0) + 15, (count, 2)),
-            box[0] + rng.normal(0, 1000.0, (3, 2)),
-        ]
-    )
 
 
 def assert_closest(feet: Feet, truth: Closest, points: Array, curve: NurbsCurve) -> None:
@@ -113,9 +80,6 @@ def test_no_point_of_the_curve_is_closer_among_many(name: str) -> None:
     assert (np.abs(feet.distance_mm) <= cKDTree(dense).query(places)[0] + 1e-12).all()
     assert np.abs(curve.point(feet.parameter) - feet.foot_mm).max() < 1e-11
     assert np.abs(np.hypot(*(places - feet.foot_mm).T) - np.abs(feet.distance_mm)).max() < 1e-12
-
-
-# ---- closed forms
 
 
 def test_distance_from_a_circle() -> None:
@@ -196,9 +160,6 @@ def test_the_centre_of_a_circle_is_a_radius_from_wherever_its_foot_is() -> None:
     assert np.hypot(*feet.foot_mm[0]) == pytest.approx(25.0, abs=1e-12)
 
 
-# ---- invariance
-
-
 @settings(max_examples=15, deadline=None)
 @given(
     name=st.sampled_from(["P1", "P2", "P3", "ellipse", "NACA 2412 sharp"]),
@@ -215,75 +176,6 @@ def test_moving_curve_and_points_together_moves_the_feet(name: str, angle: float
     assert np.abs(a.distance_mm - b.distance_mm).max() < 2e-12
     assert np.abs(profiles.rotated(a.foot_mm, angle, shift) - b.foot_mm).max() < 1e-10
     assert np.abs(profiles.rotated(a.gradient, angle) - b.gradient).max() < 1e-10
-
-
-def test_veaw_is_finite_where_its_two_directions_cancel() -> None:
-    square = discretize(profiles.square(40.0), samples=400, step_min=0.5)
-    ends = np.vstack([square.poles.edge_left_mm, square.poles.edge_right_mm])
-    feet = project_on_samples(ends[np.isfinite(ends).all(axis=1)], square.grid, square.sample_table, "veaw")
-    for field in FIELDS:
-        assert np.isfinite(getattr(feet, field)).all(), field
-
-
-def test_equally_close_feet_are_chosen_alike_in_any_order() -> None:
-    # near the medial axis of a thin edge one foot is worked out on two pieces, with other last bits
-    rng, grid = np.random.default_rng(1), grid_of("NACA 2412 sharp")
-    for _ in range(8):  # of these 400,000 points some twenty depended on their order before ties were settled
-        points = np.column_stack([rng.uniform(97.0, 100.0, 50_000), rng.normal(0, 2.0, 50_000)])
-        order = rng.permutation(len(points))
-        here, there = project(points, grid, threads=1), project(points[order], grid, threads=1)
-        for field in FIELDS:
-            assert np.array_equal(getattr(here, field)[order], getattr(there, field)), field
-
-
-def test_the_nearest_sample_is_the_nearest_of_coarse_ones_as_well() -> None:
-    rng = np.random.default_rng(1)
-    for trial in range(25):
-        curve = profiles.periodic(int(rng.integers(2, 5)), rng.normal(0, 30, (int(rng.integers(5, 14)), 2)))
-        nominal = discretize(curve, samples=int(rng.integers(8, 40)), step_min=0.5)
-        centre, size = nominal.points_mm.mean(axis=0), np.hypot(*np.ptp(nominal.points_mm, axis=0))
-        points = centre + rng.uniform(-1, 1, (1500, 2)) * size
-        table, u = nominal.sample_table, project(points, nominal.grid).parameter
-        begin = np.clip((u - table.domain[0]) / (table.domain[1] - table.domain[0]) * len(table.starts), 0, len(table.starts) - 1)
-        samples, links, boxes, starts, _ = table.flat
-        stack = np.empty(64, dtype=np.int64)
-        found = [
-            nearest_sample(x, y, starts[k], samples, links, boxes, stack)
-            for (x, y), k in zip(points.tolist(), begin.astype(int).tolist(), strict=True)
-        ]
-        distance = np.hypot(*(points - nominal.points_mm[found]).T)
-        assert np.abs(distance - nominal.tree.query(points)[0]).max() < 1e-12 * size, trial
-
-
-def test_where_no_cache_can_be_kept_loops_are_compiled_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    def without_cache(**options: bool) -> Callable[[Callable[[], int]], Callable[[], int]]:
-        if options.pop("cache", False):
-            raise RuntimeError("cannot cache function: no locator available")
-        return njit(**options)  # type: ignore[no-any-return]
-
-    monkeypatch.setattr(compiling, "njit", without_cache)
-    assert compiling.kernel(lambda: 7)() == 7
-
-
-FORKED = """
-import os
-import numpy as np
-from inspection.foot_grid import build_foot_grid
-from inspection.kernels import project
-from tests.inspection import profiles
-
-grid, points = build_foot_grid(profiles.p3()), np.random.default_rng(1).uniform(-60, 60, (20_000, 2))
-before = project(points, grid, threads=3).distance_mm
-child = os.fork()
-if child == 0:
-    os._exit(0 if np.array_equal(project(points, grid, threads=3).distance_mm, before) else 1)
-assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
-"""
-
-
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
-def test_a_forked_process_does_not_wait_for_the_threads_it_left_behind() -> None:
-    subprocess.run([sys.executable, "-W", "ignore", "-c", FORKED], check=True, timeout=120)
 
 
 @pytest.mark.parametrize("name", ["P2", "P3", "MH42 sharp", "NACA 4412 blunt", "square"])
@@ -320,49 +212,3 @@ def test_very_far_points_are_at_their_distance() -> None:
     feet = project(points, build_foot_grid(profiles.circle(25.0)))
     wanted = np.hypot(*points.T) - 25.0
     assert (np.abs(-feet.distance_mm - wanted) <= 1e-15 * wanted).all()
-
-
-# ---- tables
-
-
-def test_tables_do_not_depend_on_samples_and_stay_as_they_are() -> None:
-    grid = grid_of("P3")
-    for array in (grid.reals, grid.integers):
-        with pytest.raises(ValueError, match="read-only"):
-            array[0] = 0
-    assert grid.band_mm > 0.05 * 100
-
-
-# ---- the paper's methods
-
-
-@pytest.mark.parametrize("method", SAMPLE_METHODS)
-@pytest.mark.parametrize("name", ["P1", "P2", "P3", "ellipse", "stadium", "square", "NACA 2412 sharp", "NACA 4412 blunt", "MH42"])
-def test_compiled_method_is_the_plain_one(name: str, method: str) -> None:
-    plain: dict[str, Callable[[Array, NominalProfile], Feet]] = {
-        "circle": reference.circle,
-        "chord": reference.chord,
-        "pcp": reference.pcp,
-        "veaw": reference.veaw,
-    }
-    for samples in (60, 1000):
-        nominal = discretize(curve_of(name), samples=samples, step_min=0.9 / samples, pole_angle_min_deg=90.0)
-        points = scattered(curve_of(name), np.random.default_rng(42), 150)
-        wanted = plain[method](points, nominal)
-        found = project_on_samples(points, grid_of(name), nominal.sample_table, method)
-        for field in FIELDS:
-            assert np.abs(getattr(found, field) - getattr(wanted, field)).max() < 1e-11, (samples, field)
-        assert np.array_equal(found.vertex, wanted.vertex)
-
-
-@pytest.mark.parametrize("method", SAMPLE_METHODS)
-def test_no_bit_of_a_compiled_method_depends_on_the_batch(method: str) -> None:
-    table = discretize(curve_of("P3"), samples=500, step_min=1e-3).sample_table
-    points = scattered(curve_of("P3"), np.random.default_rng(43), 400)
-    whole = project_on_samples(points, grid_of("P3"), table, method)
-    cut = [project_on_samples(part, grid_of("P3"), table, method) for part in np.array_split(points, 37)]
-    many = project_on_samples(np.vstack([points] * 20), grid_of("P3"), table, method, threads=2)
-    for field in FIELDS:
-        wanted = getattr(whole, field)
-        assert np.array_equal(np.concatenate([getattr(part, field) for part in cut]), wanted), field
-        assert np.array_equal(getattr(many, field), np.concatenate([wanted] * 20)), field

@@ -47,9 +47,7 @@ def judge_rows(
     project   : feet of points (m, 2) in nominal coordinates; a row that cannot be used comes as NaN
     judgement : 1.0 where left of the curve is out of material, else -1.0; tip radius, lower and upper limit, uncertainty in mm
     """
-    moved = np.empty((stop - first, 2))
-    _place(section_mm, rows[-1], first, pose, moved)
-    feet = project(moved)
+    feet = project(place_rows(section_mm, rows[-1], first, stop, pose))
     _judge(feet.foot_mm, feet.distance_mm, feet.gradient, feet.station_mm, feet.vertex, judgement, first, rows)
 
 
@@ -79,6 +77,13 @@ def _take_in(points: Any, plane: Any, off_section_max: float, section: Any, reje
             rejection[row] = OFF_SECTION
         else:
             rejection[row] = NOT_REJECTED
+
+
+def place_rows(section_mm: Array, rejection: Codes, first: int, stop: int, pose: tuple[float, float, float, float]) -> Array:
+    """Rows first .. stop - 1 in nominal coordinates; NaN where a row cannot be used."""
+    moved = np.empty((stop - first, 2))
+    _place(section_mm, rejection, first, pose, moved)
+    return moved
 
 
 @kernel
