@@ -1,9 +1,14 @@
 PYTHON ?= python3
 BIN := .venv/bin
+# Every installation here takes the versions of constraints.txt, the build tool's too: what passed today passes in a year.
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
+INSTALL := $(PIP) --no-build-isolation --editable
 
-.PHONY: demo test bench paper soak
+.PHONY: demo install test lowest platforms upgrade bench paper soak
 demo: .venv/installed
 	$(BIN)/cmmlink demo --out demo-result
+
+install: .venv/all-installed
 
 test: .venv/test-installed
 	$(BIN)/ruff check .
@@ -12,6 +17,19 @@ test: .venv/test-installed
 	$(BIN)/lint-imports
 	$(BIN)/pytest -n 2 $(PYTEST_OPTIONS)
 	@tests/page/check $(PAGE_OPTIONS)
+
+# The lowest versions that pyproject.toml allows, on Python 3.11 and without the extras, must pass the fast tests.
+LOWEST_PYTHON ?= python3.11
+lowest: .venv/lowest/installed
+	.venv/lowest/bin/python -m pytest -n 2 $(FAST_TESTS)
+
+# For every system of the README the versions of constraints.txt must exist as wheels.
+platforms: .venv/test-installed
+	.ci/platforms $(BIN)/uv
+
+# Resolve every version anew and run everything with it; constraints.txt and .ci/lowest.txt stay as they were where that fails.
+upgrade: .venv/test-installed
+	.ci/upgrade $(BIN)/uv
 
 # A hundred recording processes killed at random moments; every acknowledged point must be there.
 soak: .venv/test-installed
@@ -32,16 +50,26 @@ paper: .venv/bench-installed
 	@$(PYTHON) -c 'import ensurepip' 2>/dev/null || { echo "This Python cannot make virtual environments. On Debian or Ubuntu: apt install python3-venv" >&2; exit 1; }
 	$(PYTHON) -m venv .venv
 
-.venv/installed: pyproject.toml | .venv/bin/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+.venv/installed: pyproject.toml constraints.txt | .venv/bin/python
+	$(PIP) hatchling editables
+	$(INSTALL) .
+	touch $@
+
+.venv/all-installed: .venv/installed
+	@$(INSTALL) '.[all]' || echo "Not every extra has wheels for this system; cmmlink works without them, see README.md." >&2
 	@$(BIN)/python -m cmmlink.commands.open3d_doctor
 	touch $@
 
-.venv/bench-installed: pyproject.toml | .venv/bin/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test,bench]'
-	touch $@ .venv/installed .venv/test-installed
+.venv/test-installed: .venv/all-installed
+	$(INSTALL) '.[test]'
+	touch $@
 
-.venv/test-installed: pyproject.toml | .venv/bin/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
-	@$(BIN)/python -m cmmlink.commands.open3d_doctor
-	touch $@ .venv/installed
+.venv/bench-installed: .venv/test-installed
+	$(INSTALL) '.[bench]'
+	touch $@
+
+.venv/lowest/installed: .ci/lowest.txt .venv/test-installed
+	$(BIN)/uv venv --quiet --clear --no-python-downloads --python $(LOWEST_PYTHON) .venv/lowest
+	$(BIN)/uv pip install --quiet --python .venv/lowest --only-binary :all: --requirements .ci/lowest.txt
+	$(BIN)/uv pip install --quiet --python .venv/lowest --no-deps --no-build-isolation --editable .
+	touch $@

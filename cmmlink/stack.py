@@ -253,7 +253,8 @@ def _cutter(plan: CtPlan, sections: int, open3d: Callable[[], Open3DProcess], no
         return open3d()
     if wanted == "open3d":
         raise PlanError(f"{status.sentence()}; or cut with numpy, which gives the same points")
-    notes.append(f"cut by numpy. {status.sentence()}")
+    if status.installed:  # where it is not, numpy is what was chosen
+        notes.append(f"cut by numpy. {status.sentence()}")
     return NumpyCutter()
 
 

@@ -16,6 +16,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--parity", default="N", choices=["N", "E", "O"])
     group = parser.getgroup("browser", "tests/cmmlink/console in Chromium")
     group.addoption("--require-browser", action="store_true", help="fail where the tests in a browser would be skipped")
+    group.addoption("--require-open3d", action="store_true", help="fail where the tests with Open3D would be skipped")
     group.addoption("--screenshots", metavar="DIR", help="keep pictures of the console's pages in this folder")
 
 

@@ -15,7 +15,7 @@ def look_after_open3d(
     run: Callable[[Sequence[str]], int] | None = None,
     is_root: bool | None = None,
 ) -> bool:
-    """Return whether Open3D can be loaded, after installing missing system libraries where apt and root allow it."""
+    """Return whether Open3D works or is not installed, after installing missing system libraries where apt and root allow it."""
     found = status()
     root = is_root if is_root is not None else hasattr(os, "geteuid") and os.geteuid() == 0
     if found.version is None and found.mend is not None and mend_open3d(found, run or _run, root):
@@ -23,8 +23,8 @@ def look_after_open3d(
         found = status()
     say(found.sentence())
     if found.version is None:
-        say("surfaces are cut by numpy meanwhile, with the same points; PLY and OBJ files need Open3D")
-    return found.version is not None
+        say("surfaces are cut by numpy, with the same points; PLY and OBJ files need Open3D")
+    return found.version is not None or not found.installed
 
 
 def _run(command: Sequence[str]) -> int:

@@ -48,6 +48,7 @@ class Open3DStatus:
     """Whether Open3D can be loaded.
 
     version : None when it cannot
+    installed : whether it is there at all; it is an extra, and nothing is wrong where it is not
     missing : shared libraries that the system lacks
     mend    : the exact command that mends it, when one is known
     reason  : what the import said
@@ -57,13 +58,16 @@ class Open3DStatus:
     missing: tuple[str, ...] = ()
     mend: tuple[str, ...] | None = None
     reason: str = ""
+    installed: bool = True
 
     def sentence(self) -> str:
         """One line for the operator."""
         if self.version:
             return f"Open3D {self.version} can be loaded"
+        if not self.installed:
+            return f"Open3D is not installed{f'; install it with: {_quote(self.mend)}' if self.mend else f', and {self.reason}'}"
         what = f"the system lacks {', '.join(self.missing)}" if self.missing else self.reason
-        return f"Open3D cannot be loaded: {what}" + (f"; mend it with: {' '.join(self.mend)}" if self.mend else "")
+        return f"Open3D cannot be loaded: {what}" + (f"; mend it with: {_quote(self.mend)}" if self.mend else "")
 
 
 class Open3DProcess:
@@ -184,14 +188,31 @@ def status_from(hello: dict[str, Any], which: Callable[[str], str | None] = shut
     """Read the first message of the child, and find the command that would mend what it complains of."""
     if "version" in hello:
         return Open3DStatus(str(hello["version"]))
+    if not hello.get("installed"):
+        if _wheel_exists():
+            return Open3DStatus(None, mend=(sys.executable, "-m", "pip", "install", "cmmlink[open3d]"), installed=False)
+        return Open3DStatus(None, reason="the package index has no wheel of it for this system", installed=False)
     missing = tuple(hello.get("missing", ()))
-    return Open3DStatus(None, missing, _mending_command(missing, bool(hello.get("installed")), which), str(hello.get("error", "")))
+    return Open3DStatus(None, missing, _mending_command(missing, which), str(hello.get("error", "")))
 
 
-def _mending_command(missing: tuple[str, ...], installed: bool, which: Callable[[str], str | None]) -> tuple[str, ...] | None:
-    if not installed:
-        linux_x86 = sys.platform == "linux" and platform.machine() == "x86_64"
-        return (sys.executable, "-m", "pip", "install", "open3d-cpu==0.20.*" if linux_x86 else "open3d==0.20.*", "libusb-package")
+def _wheel_exists() -> bool:
+    """Whether Open3D 0.20 has a wheel for this system: the markers of the extra in pyproject.toml, and the C library."""
+    if sys.version_info >= (3, 15):
+        return False
+    if sys.platform == "linux":
+        library, version = platform.libc_ver()
+        new = library == "glibc" and tuple(int(part) for part in version.split(".")[:2]) >= (2, 35)
+        return new and platform.machine() in ("x86_64", "aarch64")
+    return (sys.platform, platform.machine()) in (("darwin", "arm64"), ("win32", "AMD64"))
+
+
+def _quote(command: Sequence[str]) -> str:
+    """Spell a command as every shell takes it."""
+    return " ".join(f'"{word}"' if set(word) & set(" []") else word for word in command)
+
+
+def _mending_command(missing: tuple[str, ...], which: Callable[[str], str | None]) -> tuple[str, ...] | None:
     if missing and which("apt-get"):
         return ("apt-get", "install", "--yes", *(LIBRARIES[name][0] for name in missing))
     if missing and which("dnf"):

@@ -32,11 +32,19 @@ def test_missing_libraries_are_installed_by_root_and_looked_at_again() -> None:
     assert said == ["installed for Open3D: libgl1 libegl1", "Open3D 0.20.0 can be loaded"]
 
 
+def test_an_extra_that_is_not_installed_is_no_fault() -> None:
+    said: list[str] = []
+    absent = Open3DStatus(None, mend=("python", "-m", "pip", "install", "cmmlink[open3d]"), installed=False)
+    assert look_after_open3d(said.append, status=lambda: absent, run=_never, is_root=True)
+    assert said[0] == 'Open3D is not installed; install it with: python -m pip install "cmmlink[open3d]"'
+    assert "cut by numpy" in said[1]
+
+
 def test_without_root_the_exact_command_is_said() -> None:
     said: list[str] = []
     assert not look_after_open3d(said.append, status=lambda: LACKING, run=_never, is_root=False)
     assert said[0].endswith("lacks libGL.so.1, libEGL.so.1; mend it with: apt-get install --yes libgl1 libegl1")
-    assert "cut by numpy meanwhile" in said[1]
+    assert "cut by numpy," in said[1]
 
 
 def _never(command: Sequence[str]) -> int:

@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -18,14 +17,6 @@ from tests.drivers.surface.ct_phantom import make_phantom
 from tests.drivers.surface.meshes import A, B, Triangles, ascii_stl, binary_stl, box, ellipse, rotation, tube, write
 
 CUBE = box((0, 0, 0), (10, 10, 10))
-
-
-@pytest.fixture(scope="module")
-def open3d() -> Iterator[Open3DProcess]:
-    with Open3DProcess() as process:
-        if process.status().version is None:
-            pytest.skip(process.status().sentence())
-        yield process
 
 
 def mesh_of(triangles: NDArray[np.floating]) -> SurfaceMesh:
@@ -157,7 +148,8 @@ def test_open3d_and_numpy_agree_on_loose_triangles(open3d: Open3DProcess, seed: 
             assert np.abs(c.points_mm - d.points_mm).max() < 1e-12
 
 
-def test_open3d_is_never_loaded_into_this_process() -> None:
+def test_open3d_is_never_loaded_into_this_process(open3d: Open3DProcess) -> None:
+    assert open3d.status().version is not None
     program = (
         "import sys\n"
         "from drivers.surface.cut import cut_surface\n"
@@ -169,9 +161,6 @@ def test_open3d_is_never_loaded_into_this_process() -> None:
         "assert len(found.contours) == 1\n"
         "assert not any(name.split('.')[0] == 'open3d' for name in sys.modules)\n"
     )
-    with Open3DProcess() as process:
-        if process.status().version is None:
-            pytest.skip(process.status().sentence())
     subprocess.run([sys.executable, "-c", program], check=True, cwd=Path(__file__).parents[3])
 
 

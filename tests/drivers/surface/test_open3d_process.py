@@ -1,7 +1,6 @@
 """Open3D in its own process: found or not found, alive or gone, and its files good or bad."""
 
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -12,14 +11,6 @@ from drivers.surface.open3d_process import Open3DMissing, Open3DProcess, Open3DS
 from tests.drivers.surface.meshes import Triangles, box, write
 
 CUBE = box((0, 0, 0), (10, 10, 10))
-
-
-@pytest.fixture(scope="module")
-def open3d() -> Iterator[Open3DProcess]:
-    with Open3DProcess() as process:
-        if process.status().version is None:
-            pytest.skip(process.status().sentence())
-        yield process
 
 
 def ply(triangles: Triangles, vertices: int | None = None) -> str:
@@ -78,7 +69,7 @@ def test_a_process_that_ends_at_once_is_a_status_and_an_error_not_a_hang() -> No
             process.cut(CUBE)
 
 
-def test_a_process_that_was_killed_is_started_again() -> None:
+def test_a_process_that_was_killed_is_started_again(open3d: Open3DProcess) -> None:
     with Open3DProcess() as process:
         name = process.name
         above = CUBE - [0, 0, 5.0]
@@ -110,11 +101,40 @@ def test_missing_libraries_name_the_exact_command() -> None:
     assert status_from(hello, which=lambda name: None).mend is None
 
 
-def test_open3d_that_is_not_installed_names_the_exact_command() -> None:
-    status = status_from({"error": "No module named 'open3d'", "installed": False, "missing": []}, which=lambda name: None)
-    assert status.mend is not None
-    assert status.mend[:4] == (sys.executable, "-m", "pip", "install")
-    assert "0.20" in status.mend[4]
+def test_open3d_that_is_not_installed_names_the_one_pip_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.platform", "darwin")
+    monkeypatch.setattr("platform.machine", lambda: "arm64")
+    status = status_from({"error": "No module named 'open3d'", "installed": False, "missing": []})
+    assert not status.installed
+    assert status.mend == (sys.executable, "-m", "pip", "install", "cmmlink[open3d]")
+    assert status.sentence().startswith("Open3D is not installed; install it with: ")
+    assert status.sentence().endswith(' -m pip install "cmmlink[open3d]"')
+
+
+@pytest.mark.parametrize(
+    ("system", "machine", "library", "exists"),
+    [
+        ("linux", "x86_64", ("glibc", "2.35"), True),
+        ("linux", "aarch64", ("glibc", "2.41"), True),
+        ("linux", "x86_64", ("glibc", "2.28"), False),  # RHEL 8
+        ("linux", "x86_64", ("glibc", "2.9"), False),
+        ("linux", "x86_64", ("", ""), False),  # musl
+        ("linux", "riscv64", ("glibc", "2.41"), False),
+        ("darwin", "arm64", ("", ""), True),
+        ("darwin", "x86_64", ("", ""), False),
+        ("win32", "AMD64", ("", ""), True),
+        ("win32", "ARM64", ("", ""), False),
+    ],
+)
+def test_where_open3d_has_no_wheel_no_command_is_named(
+    system: str, machine: str, library: tuple[str, str], exists: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.platform", system)
+    monkeypatch.setattr("platform.machine", lambda: machine)
+    monkeypatch.setattr("platform.libc_ver", lambda: library)
+    status = status_from({"error": "No module named 'open3d'", "installed": False, "missing": []})
+    assert (status.mend is not None) is exists
+    assert ("has no wheel of it for this system" in status.sentence()) is not exists
 
 
 @pytest.mark.parametrize(("is_root", "exit_status", "mended"), [(True, 0, True), (True, 100, False), (False, 0, False)])
