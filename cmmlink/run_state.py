@@ -55,6 +55,7 @@ class RunState:
 
     began         : date and time of day, ISO 8601
     ending        : null while the run is on; message says why a run has no result, or what failed
+    link_detail   : why the link was lost, or how long it was away; empty while it never was
     streaming     : whether the device shows itself alive now
     expected      : number of points the device announced
     latency_s     : how long the newest judged point waited for its verdict
@@ -75,6 +76,7 @@ class RunState:
     message: str
     remark: str
     link: LinkPhase
+    link_detail: str
     streaming: bool
     received: int
     judged: int

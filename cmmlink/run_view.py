@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 
 from cmmlink.events import Arrived, Counts, Ending, Event, Judged, RunStarted
 from cmmlink.extremes import DEVIATION, FOOT_X, NORMAL_X, STATION, VERDICT, ChangedBins, Extremes, PointsVersion
+from cmmlink.plan.scan import Plan
 from cmmlink.result_json import number, result_json
 from cmmlink.run_state import LinkPhase, Phase, RegistrationState, RunState, VerdictState, WorstPoint, ZoneLimits
 from cmmlink.words import VERDICT_NAMES, VERDICT_WORDS
-from drivers import Heartbeat, LinkDown, PointBatch, ScanClosed, ScanOpened
+from drivers import Heartbeat, LinkDown, LinkUp, PointBatch, ScanClosed, ScanOpened
 from inspection import JudgedRows, LiveUpdate, NominalProfile, ToleranceZone, Verdict, coverage
 
 _COUNTED = ("received", "judged", "rejected", "lost", "damaged_bytes", "rejected_by_reason")
@@ -50,6 +51,12 @@ class RunContext:
     coverage_min: float
     buffer_points: int
     began: datetime
+
+    @classmethod
+    def of(cls, plan: Plan, profile: NominalProfile, began: datetime, number: str, plan_name: str) -> "RunContext":
+        """What a plan says of a run that begins, or began, at a time of day."""
+        coverage_min = plan.registration.coverage_min
+        return cls(number, plan_name, profile, plan.tolerance.zone, coverage_min, plan.buffer_points, began)
 
 
 class _Received(NamedTuple):
@@ -85,6 +92,7 @@ class RunView:
         self._phase: Phase = "preparing"
         self._counts = Counts()
         self._link: LinkPhase = "connecting"
+        self._link_detail = ""
         self._expected: int | None = None
         self._device_name = ""
         self._received: deque[_Received] = deque()
@@ -172,11 +180,12 @@ class RunView:
             self._alive_s = event.time_s
         link: LinkPhase = "down" if isinstance(arrival, LinkDown) else "closed" if isinstance(arrival, ScanClosed) else "up"
         begins = link != "down" and self._phase in ("preparing", "starting")
-        opened = isinstance(arrival, ScanOpened)
-        if link == self._link and not begins and not opened:
+        if link == self._link and not begins and not isinstance(arrival, (ScanOpened, LinkUp)):
             return  # most arrivals change nothing that is shown
         with self._lock:
             self._link = link
+            if isinstance(arrival, (LinkDown, LinkUp)):
+                self._link_detail = arrival.reason if isinstance(arrival, LinkDown) else f"back after {arrival.gap_s:.1f} s"
             if begins and self._phase != "ending":
                 self._phase = "measuring"
             if isinstance(arrival, ScanOpened):
@@ -251,6 +260,7 @@ class RunView:
             message=self._failure or (ended.message if ended else ""),
             remark=self._remark,
             link=self._link,
+            link_detail=self._link_detail,
             streaming=self._phase in ("measuring", "ending") and self._link == "up",
             received=counts.received,
             judged=counts.judged,

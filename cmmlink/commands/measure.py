@@ -104,8 +104,7 @@ def run(
 def _run(plan: Plan, profile: NominalProfile, connect: Connect, output: Output) -> int:
     """Carry out a plan with a record and, where somebody looks at the terminal, with a live table; report what came of it."""
     quiet = output.headless or output.as_json or not sys.stderr.isatty()
-    zone, coverage_min = plan.tolerance.zone, plan.registration.coverage_min
-    view = RunView(RunContext("", "", profile, zone, coverage_min, plan.buffer_points, now()), time.monotonic, now)
+    view = RunView(RunContext.of(plan, profile, now(), number="", plan_name=""), time.monotonic, now)
     table = nullcontext() if quiet else LiveTable(Console(stderr=True), view)
     with connect(plan) as device, stop_on_ctrl_c() as stop, table:
         finished = carry_out(

@@ -19,7 +19,7 @@ from cmmlink.record.reader import find_run, list_runs, open_to_read, recorded_ru
 from cmmlink.record.replay import Replay, recorded_plan, recorded_profile, replay
 from cmmlink.record.store import Store
 from cmmlink.result_json import result_json
-from cmmlink.run_view import Ended
+from cmmlink.run_view import Ended, RunContext
 from drivers import Decoder
 from inspection import NominalProfile
 
@@ -37,6 +37,10 @@ class OpenedRun:
     started: RunStarted
     ended: Ended
 
+    def context(self, title: str) -> RunContext:
+        """What the run was judged by, under a title that pages show in place of a number."""
+        return RunContext.of(self.plan, self.profile, self.began, title, plan_name="")
+
 
 @dataclass(slots=True)
 class PastRuns:
@@ -50,16 +54,16 @@ class PastRuns:
     decoder_of: Callable[[Device], Decoder | None]
     clock: Callable[[], float]
     now: Callable[[], datetime]
-    _known: dict[str, RunRow] = field(default_factory=dict)
+    _known: dict[tuple[str, str], RunRow] = field(default_factory=dict)
 
     def runs(self) -> Sequence[RunRow]:
         """All runs, newest first. Raises StoreError."""
         entries = list_runs(self.folder, self.now)[::-1][:_MOST_LISTED]
-        unknown = [entry for entry in entries if entry["run"] not in self._known]
+        unknown = [entry for entry in entries if _key(entry) not in self._known]
         if unknown:
             with open_to_read(self.folder, self.now) as store:
-                self._known.update((entry["run"], _row_of(entry, _result_of(store, entry["run"]))) for entry in unknown)
-        return [self._known[entry["run"]] for entry in entries]
+                self._known.update((_key(entry), _row_of(entry, _result_of(store, entry["run"]))) for entry in unknown)
+        return [self._known[_key(entry)] for entry in entries]
 
     def open_run(self, run: str) -> OpenedRun:
         """Give one run as it was recorded. Raises StoreError, RunError."""
@@ -91,6 +95,11 @@ class PastRuns:
             run = find_run(store, run)
             export_files(store, run, Path(files))
             return Path(shutil.make_archive(str(folder / run), "zip", files))
+
+
+def _key(entry: dict[str, Any]) -> tuple[str, str]:
+    """What a line of the history is kept under: a run that was still being recorded when it was read is read again."""
+    return entry["run"], entry["state"]
 
 
 def _result_of(store: Store, run: str) -> dict[str, Any]:

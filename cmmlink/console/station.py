@@ -16,7 +16,6 @@ from cmmlink.console.ct_import import CtImport, InspectSurface
 from cmmlink.console.device_test import TESTING, listen_to_device
 from cmmlink.console.entry import Entry, next_serial_number
 from cmmlink.console.job import Job, JobKind
-from cmmlink.console.past_runs import OpenedRun
 from cmmlink.console.protocol import DeviceTest, History, StationState
 from cmmlink.console.refused import Refused, answer_errors
 from cmmlink.console.run_job import measure, raise_alarms, sink_of
@@ -139,7 +138,7 @@ class Station:
             records = self._records()
             with answer_errors():
                 recorded = records.open_run(run)
-            view = RunView(_context_of(recorded, f"replay of {recorded.run}"), self._setup.clock, self._setup.now)
+            view = RunView(recorded.context(f"replay of {recorded.run}"), self._setup.clock, self._setup.now)
             job.view = view
             self.show(view)
             job.start(lambda: self._replay(job, view, records, recorded.run))
@@ -190,7 +189,7 @@ class Station:
         with answer_errors():
             recorded = records.open_run(run)
         title = f"Recorded run {recorded.run} of {recorded.began:%Y-%m-%d %H:%M}"
-        view = RunView(_context_of(recorded, title), self._setup.clock, lambda: recorded.began)
+        view = RunView(recorded.context(title), self._setup.clock, lambda: recorded.began)
         view.recall(recorded.started, recorded.ended)
         return view
 
@@ -305,9 +304,8 @@ class Station:
         with self._lock:
             self._runs_begun += 1
             number = str(self._runs_begun)
-        plan, now = checked.plan, self._setup.now()
-        coverage_min, buffer_points = plan.registration.coverage_min, plan.buffer_points
-        context = RunContext(number, name, checked.profile, plan.tolerance.zone, coverage_min, buffer_points, now)
+        plan = checked.plan
+        context = RunContext.of(plan, checked.profile, self._setup.now(), number, name)
         view = RunView(context, self._setup.clock, self._setup.now)
         part, operator = plan.part, plan.operator or ""
         view(RunStarted(part.name, part.serial_number or "", operator, words_of(plan.device), simulated=False))
@@ -344,9 +342,3 @@ class Station:
             can_start=not running and choice is not None and choice.checked is not None,
             keeps_records=self._setup.records is not None,
         )
-
-
-def _context_of(recorded: OpenedRun, number: str) -> RunContext:
-    plan = recorded.plan
-    coverage_min, buffer_points = plan.registration.coverage_min, plan.buffer_points
-    return RunContext(number, "", recorded.profile, plan.tolerance.zone, coverage_min, buffer_points, recorded.began)

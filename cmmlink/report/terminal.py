@@ -55,7 +55,7 @@ def _table_rows(state: RunState) -> dict[str, str]:
     return {
         "part": escape(" ".join(filter(None, [state.part, state.serial_number]))),
         "device": escape(f"{'SIMULATED, ' if state.simulated else ''}{state.device}"),
-        "link": state.link,
+        "link": escape(": ".join(filter(None, [state.link, state.link_detail]))),
         "points": f"{state.received} received, {state.judged} judged, {state.rejected} rejected, {state.lost} lost",
         "rate": f"{state.rate_per_s:.0f} points/s",
         "registration": registration.state + (moving if registration.state == "provisional" else ""),

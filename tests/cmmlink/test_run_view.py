@@ -65,9 +65,9 @@ def test_phases_follow_the_device_and_the_operator(played: Played) -> None:
     state = view.state()
     assert (state.phase, state.link, state.device, state.expected) == ("measuring", "up", "scanner S-9", 400)
     played.arrive(LinkDown("unplugged"))
-    assert view.state().link == "down"
+    assert (view.state().link, view.state().link_detail) == ("down", "unplugged")
     played.arrive(LinkUp(0.5))
-    assert view.state().link == "up"
+    assert (view.state().link, view.state().link_detail) == ("up", "back after 0.5 s")
     view.end_soon()
     played.arrive(points(3))
     assert view.state().phase == "ending", "what still arrives does not make it measure again"

@@ -131,7 +131,7 @@ export interface ZoneLimits {
   readonly uncertainty_mm: number;
 }
 
-/** Everything that is shown of a run in numbers and words, as it was at one moment. began : date and time of day, ISO 8601 ending : null while the run is on; message says why a run has no result, or what failed streaming : whether the device shows itself alive now expected : number of points the device announced latency_s : how long the newest judged point waited for its verdict verdict_at_ms : when the newest verdict was given, ms since 1970 */
+/** Everything that is shown of a run in numbers and words, as it was at one moment. began : date and time of day, ISO 8601 ending : null while the run is on; message says why a run has no result, or what failed link_detail : why the link was lost, or how long it was away; empty while it never was streaming : whether the device shows itself alive now expected : number of points the device announced latency_s : how long the newest judged point waited for its verdict verdict_at_ms : when the newest verdict was given, ms since 1970 */
 export interface RunState {
   readonly number: string;
   readonly plan: string;
@@ -147,6 +147,7 @@ export interface RunState {
   readonly message: string;
   readonly remark: string;
   readonly link: "connecting" | "up" | "down" | "closed";
+  readonly link_detail: string;
   readonly streaming: boolean;
   readonly received: number;
   readonly judged: number;

@@ -66,7 +66,7 @@ def test_while_the_scan_runs_the_worst_point_and_the_verdict_so_far_stand_there(
 
 def test_a_lost_link_and_the_end_are_said(view: RunView, live: LiveInspection) -> None:
     view(Arrived(0.0, LinkDown("unplugged")))
-    assert paint(view)[0]["link"] == "down"
+    assert paint(view)[0]["link"] == "down: unplugged"
     live.add(oval_points(0.0))
     view(RunFinished("complete", live.finish(), Counts(received=360, judged=360), ""))
     assert paint(view)[0]["verdict"] == "CONFORM: all 360 points within tolerance"

@@ -1,0 +1,53 @@
+"""The runs on record as the console asks for them."""
+
+import time
+from pathlib import Path
+
+import pytest
+
+from cmmlink.console.past_runs import PastRuns
+from cmmlink.errors import RunError
+from cmmlink.events import RunFinished
+from tests.cmmlink.recorded import Script, no_decoder, record, scan_arrivals, today
+
+
+@pytest.fixture
+def past(tmp_path: Path) -> PastRuns:
+    return PastRuns(tmp_path / "records", no_decoder, time.monotonic, today)
+
+
+def test_a_folder_without_runs_has_no_history(past: PastRuns) -> None:
+    assert list(past.runs()) == []
+    with pytest.raises(RunError):
+        past.open_run("last")
+
+
+def test_a_run_that_is_being_recorded_is_listed_as_running_and_later_as_what_it_became(past: PastRuns) -> None:
+    during = []
+
+    def look(event: object) -> None:
+        if isinstance(event, RunFinished):
+            during.append((past.runs()[0], past.open_run("last")))
+
+    outcome, _ = record(past.folder, Script(*scan_arrivals()), before=[look])
+    row, opened = during[0]
+    assert (row.state, row.verdict, row.worst_mm) == ("running", None, None)
+    assert (opened.ended.ending, opened.ended.rows) == ("interrupted", None)
+    assert opened.ended.result["verdict"] == "uncertain"
+    after = past.runs()[0]
+    assert (after.run, after.state, after.received) == (row.run, "complete", outcome.counts.received)
+    assert outcome.result is not None
+    assert after.verdict == outcome.result.verdict.word
+    assert past.open_run("last").ended.ending == "complete"
+
+
+def test_runs_are_listed_newest_first_with_their_own_limits(past: PastRuns) -> None:
+    for _ in range(2):
+        record(past.folder, Script(*scan_arrivals(300)))
+    newest, oldest = past.runs()
+    assert newest.run > oldest.run
+    assert newest.began == oldest.began == today().isoformat(timespec="milliseconds")
+    assert (newest.part, newest.serial_number) == (oldest.part, "T-1")
+    assert newest.lower_mm is not None
+    assert newest.upper_mm is not None
+    assert newest.lower_mm < newest.upper_mm
