@@ -41,6 +41,8 @@ Positive = Annotated[float, Field(gt=0)]
 _DEEPEST = 20
 _NULL = ("", "~", "null", "Null", "NULL")
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # libyaml where the wheel has it: a hundred times faster on long lists
+# Too deep, as far as brackets alone tell: they open more often than is allowed before one closes.
+_MANY_BRACKETS = re.compile(rf"[\[{{](?:[^\[\]{{}}]*[\[{{]){{{_DEEPEST}}}")
 
 
 class Settings(BaseModel):
@@ -82,7 +84,9 @@ class _Document:
 
 def _read(text: str) -> _Document:
     document = _Document()
-    events = yaml.parse(text, Loader=_LOADER)
+    # libyaml reads up to 1,024 characters ahead of its events and has a limit of nesting of its own, which may then speak before ours.
+    # The reader in Python has none.
+    events = yaml.parse(text, Loader=yaml.SafeLoader if _MANY_BRACKETS.search(text) else _LOADER)
     try:
         for event in events:
             if isinstance(event, yaml.DocumentStartEvent):
