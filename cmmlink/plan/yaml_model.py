@@ -82,11 +82,23 @@ class _Document:
     lines: dict[Path, int] = field(default_factory=dict)
 
 
+class _StopAtDepth(yaml.SafeLoader):
+    """The reader in Python, stopped by our limit of nesting while it reads ahead.
+
+    It and libyaml read up to 1,024 characters ahead of the events that they hand out: brackets in a row cost the one half a second,
+    and the other meets a limit of its own there.
+    """
+
+    def fetch_flow_collection_start(self, TokenClass: Any) -> None:
+        """Count a bracket that opens."""
+        super().fetch_flow_collection_start(TokenClass)
+        if self.flow_level > _DEEPEST + 1:
+            raise YamlError(f"line {self.line + 1}: nested more than {_DEEPEST} deep")
+
+
 def _read(text: str) -> _Document:
     document = _Document()
-    # libyaml reads up to 1,024 characters ahead of its events and has a limit of nesting of its own, which may then speak before ours.
-    # The reader in Python has none.
-    events = yaml.parse(text, Loader=yaml.SafeLoader if _MANY_BRACKETS.search(text) else _LOADER)
+    events = yaml.parse(text, Loader=_StopAtDepth if _MANY_BRACKETS.search(text) else _LOADER)
     try:
         for event in events:
             if isinstance(event, yaml.DocumentStartEvent):

@@ -175,7 +175,8 @@ MISTAKES = {
     "tab": ("part:\n\tname: x\n", "line 2: not valid YAML"),
     "deep": ("[" * 3000, "line 1: nested more than 20 deep"),
     "deep mappings": ("{a: " * 3000, "line 1: nested more than 20 deep"),
-    "deep keys in a row": ("{" * 3000, "line 1: a key must be a single word"),
+    "deep keys in a row": ("{" * 3000, "line 1: nested more than 20 deep"),
+    "deep after text": (SHORT + "out: x  # " + "[" * 30 + "\nrecords: " + "[" * 22, "line 8: nested more than 20 deep"),
     "deep with words between": ("[a," * 3000, "line 1: nested more than 20 deep"),
     "deep dashes": ("- " * 3000, "line 1: nested more than 20 deep"),
     "deep lines": ("".join(" " * depth + "part:\n" for depth in range(1200)), "line 22: nested more than 20 deep"),
@@ -194,6 +195,11 @@ def test_mistake_is_named_with_file_line_key_and_what_is_allowed(tmp_path: Path,
     assert str(caught.value).startswith(f"{path}: ")
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_brackets_in_text_are_no_nesting(tmp_path: Path) -> None:
+    plan = load_plan(written(tmp_path, SHORT.replace("blade,", f"'{'[' * 3000}',", 1) + "# " + "{" * 3000))
+    assert plan.part.name == "[" * 3000
 
 
 def test_further_mistakes_are_counted(tmp_path: Path) -> None:
