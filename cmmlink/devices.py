@@ -5,7 +5,7 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 
 from cmmlink.errors import PlanError
-from cmmlink.plan.scan import Device, FileDevice, ModbusDevice, Plan, SerialDevice
+from cmmlink.plan import Device, FileDevice, ModbusDevice, Plan, SerialDevice
 from drivers import Decoder, PointFileSource, RegisterDecoder, ScanSource, decoder, load_map
 from drivers.links.axis import Beam, ConstantFeed, FollowedAxis
 from drivers.links.serial_scanner import SerialScanner, ports

@@ -11,8 +11,7 @@ import numpy as np
 from cmmlink.errors import PlanError
 from cmmlink.events import RunStarted
 from cmmlink.nominal_files import NominalFile, load_nominal, material_side
-from cmmlink.plan.scan import Datum, Discretisation, Nominal, Plan, Registration, place_of
-from cmmlink.plan.surface import CtPlan
+from cmmlink.plan import CtPlan, Datum, Discretisation, Nominal, Plan, Registration, place_of
 from inspection import FitName, LiveInspection, Method, NominalProfile, RigidTransform, SectionPlane, discretize
 
 

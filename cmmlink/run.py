@@ -16,9 +16,8 @@ from cmmlink.devices import Connected
 from cmmlink.events import RunStarted, Sink
 from cmmlink.from_plan import inspection_of, run_started
 from cmmlink.pipeline import RunOutcome, run_inspection
-from cmmlink.plan.scan import Plan
-from cmmlink.record.reader import open_to_record
-from cmmlink.record.recorder import Recorder, RecordReference, RunInputs
+from cmmlink.plan import Plan
+from cmmlink.record import Recorder, RecordReference, RunInputs, open_to_record
 from cmmlink.result_json import identity_json, result_json
 from inspection import NominalProfile, rehearse
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from cmmlink.events import Arrived, Counts, Ending, Event, Judged, RunStarted
 from cmmlink.extremes import DEVIATION, FOOT_X, NORMAL_X, STATION, VERDICT, ChangedBins, Extremes, PointsVersion
-from cmmlink.plan.scan import Plan
+from cmmlink.plan import Plan
 from cmmlink.result_json import number, result_json
 from cmmlink.run_state import LinkPhase, Phase, RegistrationState, RunState, VerdictState, WorstPoint, ZoneLimits
 from cmmlink.words import VERDICT_NAMES, VERDICT_WORDS

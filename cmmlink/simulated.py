@@ -9,7 +9,7 @@ from pathlib import Path
 
 from cmmlink.demo import write_part_path
 from cmmlink.devices import Connected, source_of, words_of
-from cmmlink.plan.scan import Plan
+from cmmlink.plan import Plan
 from drivers import LinkError
 from inspection import NominalProfile
 

@@ -19,8 +19,7 @@ from cmmlink.events import Counts
 from cmmlink.from_plan import discretize_file, run_started, section_inspection_of
 from cmmlink.nominal_files import goes_round, load_nominal
 from cmmlink.pipeline import RunOutcome, run_inspection
-from cmmlink.plan.scan import Discretisation
-from cmmlink.plan.surface import CtPlan
+from cmmlink.plan import CtPlan, Discretisation
 from cmmlink.result_json import result_json
 from drivers.surface import (
     Contour,

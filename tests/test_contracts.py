@@ -130,7 +130,7 @@ def test_the_version_stands_in_one_place() -> None:
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     project = settings["project"]
     assert project["dynamic"] == ["version"]
-    assert settings["tool"]["hatch"]["version"]["path"] == "cmmlink/__init__.py"
+    assert settings["tool"]["hatch"]["version"]["path"] == "cmmlink/version.py"
     assert re.fullmatch(r"\d+\.\d+\.\d+", cmmlink.__version__)
     assert project["scripts"] == {"cmmlink": "cmmlink.commands:main"}
 

@@ -12,7 +12,6 @@ from typing import Annotated
 
 import typer
 
-from cmmlink import __version__
 from cmmlink.commands.console import serve_console
 from cmmlink.commands.exit_codes import DEVICE_FAILED, NO_RECORD, STOPPED, UNUSABLE, fail
 from cmmlink.commands.measure import demo, inspect, run
@@ -20,6 +19,7 @@ from cmmlink.commands.records import export, replay, runs, show, verify
 from cmmlink.commands.setup import check, doctor, list_ports, nominal, simulate
 from cmmlink.commands.surfaces import ManyHeights, ct
 from cmmlink.errors import PlanError, RunError, StoreError
+from cmmlink.version import __version__
 from drivers import DeviceError, MeshError, PointFileError
 from inspection import InspectionError, while_compiling
 

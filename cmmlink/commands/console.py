@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from platformdirs import user_data_path
 
-from cmmlink import __version__
 from cmmlink.buffer import CAPACITY_POINTS
 from cmmlink.commands.options import NoBrowser, Records, records_folder
 from cmmlink.commands.output import Output, now, report_outcome, stop_on_ctrl_c
@@ -24,13 +23,12 @@ from cmmlink.console.station_setup import StationSetup
 from cmmlink.devices import Connect, connect, decoder_of, serial_ports
 from cmmlink.errors import PlanError
 from cmmlink.from_plan import run_started
-from cmmlink.plan.scan import Plan
-from cmmlink.plan.surface import CtPlan, load_ct_plan
-from cmmlink.report.folder import prepare, write_run
-from cmmlink.report.stack_folder import write_stack
+from cmmlink.plan import CtPlan, Plan, load_ct_plan
+from cmmlink.report import prepare, write_run, write_stack
 from cmmlink.run import FinishedRun
 from cmmlink.run_view import Ended, RunContext
 from cmmlink.stack import SectionOutcome, inspect_stack, surface_words
+from cmmlink.version import __version__
 from cmmlink.words import VERDICT_WORDS
 
 if TYPE_CHECKING:

@@ -31,9 +31,8 @@ from cmmlink.demo import plan_file as demo_plan_file
 from cmmlink.devices import Connect, connect
 from cmmlink.errors import PlanError
 from cmmlink.from_plan import check_plan, inspection_of, profile_of
-from cmmlink.plan.scan import Plan, load_plan
-from cmmlink.report.folder import prepare
-from cmmlink.report.terminal import LiveTable
+from cmmlink.plan import Plan, load_plan
+from cmmlink.report import LiveTable, prepare
 from cmmlink.run import carry_out
 from cmmlink.run_view import RunContext, RunView
 from cmmlink.simulated import connect_demo_device

@@ -8,8 +8,8 @@ import typer
 from pydantic import BaseModel, ValidationError
 
 from cmmlink.errors import PlanError
-from cmmlink.plan.yaml_model import words_of_allowed
-from cmmlink.record.reader import default_folder
+from cmmlink.plan import words_of_allowed
+from cmmlink.record import default_folder
 
 PlanFile = Annotated[Path, typer.Argument(metavar="PLAN.yaml", help="The inspection plan.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of words.")]

@@ -16,8 +16,7 @@ from rich.console import Console
 
 from cmmlink.commands.exit_codes import DEVICE_FAILED, EXIT_OF, UNUSABLE
 from cmmlink.console.launch import graphical_browser
-from cmmlink.report.folder import write_run
-from cmmlink.report.terminal import print_summary
+from cmmlink.report import print_summary, write_run
 from cmmlink.run import FinishedRun
 
 

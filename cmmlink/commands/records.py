@@ -10,12 +10,8 @@ from cmmlink.commands.exit_codes import EXIT_OF, NO_RECORD, UNUSABLE, fail
 from cmmlink.commands.options import Json, Out, Records, RunName, records_folder
 from cmmlink.commands.output import now, print_json, terminal
 from cmmlink.devices import decoder_of
-from cmmlink.record.export import export_run
-from cmmlink.record.reader import check_chain, describe, find_run, list_runs, open_to_read, recorded_run
-from cmmlink.record.replay import Replay
-from cmmlink.record.replay import replay as replay_run
-from cmmlink.report.folder import write_results
-from cmmlink.report.terminal import print_summary
+from cmmlink.record import Replay, check_chain, describe, export_run, find_run, list_runs, open_to_read, recorded_run, replay_run
+from cmmlink.report import print_summary, write_results
 from inspection import Method
 
 _DETAILS = ("run", "started", "ended", "state", "message", "verdict", "part", "serial_number", "operator", "device", "chain_sha256")

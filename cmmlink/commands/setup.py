@@ -8,7 +8,6 @@ from typing import Annotated, Any
 
 import typer
 
-from cmmlink import __version__
 from cmmlink.commands.exit_codes import UNUSABLE
 from cmmlink.commands.open3d_doctor import look_after_open3d
 from cmmlink.commands.options import Closed, Json, PlanFile
@@ -18,8 +17,9 @@ from cmmlink.devices import serial_ports, source_of, words_of
 from cmmlink.errors import PlanError
 from cmmlink.from_plan import check_plan, name_place, profile_of
 from cmmlink.nominal_files import NominalFile, load_nominal, material_side
-from cmmlink.plan.scan import load_plan
-from cmmlink.record.reader import default_folder
+from cmmlink.plan import load_plan
+from cmmlink.record import default_folder
+from cmmlink.version import __version__
 from drivers import LinkError
 from inspection import rehearse
 

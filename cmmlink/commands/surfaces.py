@@ -17,10 +17,8 @@ from cmmlink.commands.exit_codes import EXIT_OF
 from cmmlink.commands.options import Closed, Json, NominalScale, Out, RejectOutliers, Uncertainty, plan_from_options
 from cmmlink.commands.output import Output, print_json, stop_on_ctrl_c, terminal
 from cmmlink.errors import PlanError
-from cmmlink.plan.surface import CtPlan, CutterName, NominalAt, load_ct_plan
-from cmmlink.report.folder import prepare
-from cmmlink.report.stack_folder import write_stack
-from cmmlink.report.terminal import STYLES
+from cmmlink.plan import CtPlan, CutterName, NominalAt, load_ct_plan
+from cmmlink.report import STYLES, prepare, write_stack
 from cmmlink.stack import SectionOutcome, StackOutcome, inspect_stack
 from cmmlink.words import VERDICT_WORDS
 from inspection import FitName, Material, Method

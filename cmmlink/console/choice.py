@@ -8,7 +8,7 @@ from cmmlink.console.protocol import ChosenPlan
 from cmmlink.devices import words_of
 from cmmlink.errors import PlanError
 from cmmlink.from_plan import check_plan
-from cmmlink.plan.scan import FileDevice, Plan, load_plan
+from cmmlink.plan import FileDevice, Plan, load_plan
 from drivers import PointFileError
 from inspection import InspectionError, NominalProfile
 

@@ -7,7 +7,7 @@ from cmmlink.console.choice import CheckedPlan, Choice
 from cmmlink.console.device_test import UNTESTED
 from cmmlink.console.protocol import DeviceTest
 from cmmlink.console.refused import Refused, answer_errors
-from cmmlink.plan.scan import FileDevice
+from cmmlink.plan import FileDevice
 
 _LONGEST_NAME = 120
 

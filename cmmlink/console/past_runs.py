@@ -12,12 +12,21 @@ from typing import Any
 from cmmlink.console.protocol import RunRow
 from cmmlink.errors import StoreError
 from cmmlink.events import Counts, RunStarted, Sink
-from cmmlink.plan.scan import Device, Plan
-from cmmlink.record.bodies import unpack_document, unpack_judged
-from cmmlink.record.export import export_run as export_files
-from cmmlink.record.reader import find_run, list_runs, open_to_read, recorded_run
-from cmmlink.record.replay import Replay, recorded_plan, recorded_profile, replay
-from cmmlink.record.store import Store
+from cmmlink.plan import Device, Plan
+from cmmlink.record import (
+    Replay,
+    Store,
+    find_run,
+    list_runs,
+    open_to_read,
+    recorded_plan,
+    recorded_profile,
+    recorded_run,
+    replay_run,
+    unpack_document,
+    unpack_judged,
+)
+from cmmlink.record import export_run as export_files
 from cmmlink.result_json import result_json
 from cmmlink.run_view import Ended, RunContext
 from drivers import Decoder
@@ -87,7 +96,7 @@ class PastRuns:
         """Measure a run again from its record; returns a sentence on the result. Raises StoreError, RunError, PlanError."""
         with open_to_read(self.folder, self.now) as store:
             recorded = recorded_run(store, find_run(store, run))
-            return _comparison_of(replay(store, recorded, self.decoder_of, clock=self.clock, sinks=sinks, stop=stop), recorded.run)
+            return _comparison_of(replay_run(store, recorded, self.decoder_of, clock=self.clock, sinks=sinks, stop=stop), recorded.run)
 
     def export_run(self, run: str, folder: Path) -> Path:
         """Write one run as a zip archive into a folder. Raises StoreError, RunError, PlanError."""

@@ -23,7 +23,7 @@ from cmmlink.console.station_setup import Records, StationSetup
 from cmmlink.devices import words_of
 from cmmlink.errors import StoreError
 from cmmlink.events import RunStarted
-from cmmlink.plan.scan import Plan
+from cmmlink.plan import Plan
 from cmmlink.run_view import RunContext, RunView
 from drivers import DeviceError
 

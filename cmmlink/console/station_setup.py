@@ -12,7 +12,7 @@ from cmmlink.console.past_runs import OpenedRun
 from cmmlink.console.protocol import RunRow
 from cmmlink.devices import Connect
 from cmmlink.events import Sink
-from cmmlink.plan.scan import Plan
+from cmmlink.plan import Plan
 from cmmlink.run import FinishedRun
 
 

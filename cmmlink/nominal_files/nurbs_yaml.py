@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from cmmlink.nominal_files import NominalFile
-from cmmlink.plan.yaml_model import read_model
+from cmmlink.plan import read_model
 from inspection import NominalError, NurbsCurve
 
 SUFFIXES = (".yaml", ".yml")

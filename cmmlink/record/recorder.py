@@ -14,15 +14,15 @@ from datetime import datetime
 from importlib import metadata
 from typing import Any
 
-from cmmlink import __version__
 from cmmlink.buffer import Buffer
 from cmmlink.errors import PlanError, StoreError
 from cmmlink.events import Arrived, Event, Judged, RunFinished, RunStarted
-from cmmlink.plan.scan import Plan, with_own_maps
+from cmmlink.plan import Plan, with_own_maps
 from cmmlink.record.bodies import PlacedArrival, pack_arrivals, pack_document, pack_judged, pack_points, pack_reads
 from cmmlink.record.chain import Draft, Kind
 from cmmlink.record.store import Store
 from cmmlink.result_json import number, result_json
+from cmmlink.version import __version__
 from drivers import PointBatch, Rejected, WireBytes, load_map
 from inspection import JudgedRows
 

@@ -18,8 +18,7 @@ from cmmlink.errors import PlanError, StoreError, YamlError
 from cmmlink.events import RunStarted, Sink
 from cmmlink.from_plan import inspection_of, profile_of
 from cmmlink.pipeline import RunOutcome, run_inspection
-from cmmlink.plan.scan import Device, Plan
-from cmmlink.plan.yaml_model import read_model
+from cmmlink.plan import Device, Plan, read_model
 from cmmlink.record.bodies import PlacedArrival
 from cmmlink.record.reader import RecordedRun, arrivals_of, points_of, reads_of
 from cmmlink.record.recorder import result_sha256, software
@@ -55,7 +54,7 @@ class Replay:
     identical: bool | None
 
 
-def replay(
+def replay_run(
     store: Store,
     recorded: RecordedRun,
     decoder_of: Callable[[Device], Decoder | None],

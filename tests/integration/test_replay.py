@@ -14,7 +14,7 @@ import pytest
 from cmmlink.demo import part_path
 from cmmlink.events import Arrived, Event, RunFinished
 from cmmlink.record.reader import list_runs, open_to_read, recorded_run
-from cmmlink.record.replay import Replay, replay
+from cmmlink.record.replay import Replay, replay_run
 from drivers.codecs.ascii_frames import AsciiDecoder
 from drivers.links.serial_scanner import SerialScanner
 from drivers.source import PointBatch
@@ -82,7 +82,7 @@ def recorded_scan(folder: Path, *faults: str, stop: threading.Event | None = Non
 
 def replayed(folder: Path, run: str, **changes: object) -> Replay:
     with open_to_read(folder, today) as store:
-        return replay(store, recorded_run(store, run), decoder_of, **changes)  # type: ignore[arg-type]
+        return replay_run(store, recorded_run(store, run), decoder_of, **changes)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("faults", FAULTS, ids=" ".join)
@@ -115,7 +115,7 @@ def test_a_run_cut_off_before_its_result_is_evaluated_from_what_was_kept(tmp_pat
         record(tmp_path, Script(*scan_arrivals()), before=[failing])
     with open_to_read(tmp_path, today) as store:
         (begin, _), *_ = store.begins_and_ends()
-        again = replay(store, recorded_run(store, begin.run), no_decoder)
+        again = replay_run(store, recorded_run(store, begin.run), no_decoder)
     assert again.identical is None
     assert again.outcome.ending == "interrupted"
     assert (again.result_json["received"], again.result_json["complete"], again.result_json["verdict"]) == (612, False, "uncertain")
@@ -124,7 +124,7 @@ def test_a_run_cut_off_before_its_result_is_evaluated_from_what_was_kept(tmp_pat
 def test_points_are_replayed_where_there_are_no_wire_bytes(tmp_path: Path) -> None:
     _, recorder = record(tmp_path, Script(*scan_arrivals()))
     with open_to_read(tmp_path, today) as store:
-        again = replay(store, recorded_run(store, recorder.run), no_decoder)
+        again = replay_run(store, recorded_run(store, recorder.run), no_decoder)
     assert again.identical is True
     assert (again.outcome.counts.rejected, again.outcome.counts.lost) == (12, 3)
 
@@ -154,7 +154,7 @@ def test_the_recorded_nominal_counts_not_the_file_of_that_name_today(tmp_path: P
         recorded = recorded_run(store, run)
         moved = recorded.plan.replace("nominal.csv", "gone.csv")
         assert moved != recorded.plan
-        again = replay(store, type(recorded)(recorded.header, moved, recorded.nominal, recorded.end, recorded.result, ""), decoder_of)
+        again = replay_run(store, type(recorded)(recorded.header, moved, recorded.nominal, recorded.end, recorded.result, ""), decoder_of)
     assert again.identical is True
 
 

@@ -15,7 +15,7 @@ import yaml
 from cmmlink.devices import decoder_of
 from cmmlink.errors import StoreError
 from cmmlink.record.reader import open_to_read, recorded_run
-from cmmlink.record.replay import replay
+from cmmlink.record.replay import replay_run
 from tests.cmmlink.recorded import Script, record, scan_arrivals, today
 from tests.integration.simulated import Simulated, simulated
 
@@ -125,7 +125,7 @@ def test_a_map_in_a_record_that_cannot_be_read_is_named_with_its_run(tmp_path: P
         for register_map in ({"device": "d", "pattern": "latest", "points": points}, str(tmp_path / "gone")):
             tree["device"] = {"type": "modbus", "address": "h:502", "map": register_map}
             with pytest.raises(StoreError, match=f"the device in the plan of run {recorder.run} cannot be read"):
-                replay(store, dataclasses.replace(recorded, plan=yaml.safe_dump(tree)), decoder_of)
+                replay_run(store, dataclasses.replace(recorded, plan=yaml.safe_dump(tree)), decoder_of)
 
 
 def test_a_map_with_a_mistake_is_named_with_its_file(tmp_path: Path) -> None:
