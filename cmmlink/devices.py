@@ -5,10 +5,10 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 
 from cmmlink.errors import PlanError
-from cmmlink.plan import Device, FileDevice, ModbusDevice, Plan, SerialDevice
-from drivers import Decoder, PointFileSource, RegisterDecoder, ScanSource, decoder, load_map
+from cmmlink.plan import Device, FileDevice, ModbusDevice, Plan, SerialDevice, map_of
+from drivers import Decoder, PointFileSource, RegisterDecoder, ScanSource, decoder
 from drivers.links.axis import Beam, ConstantFeed, FollowedAxis
-from drivers.links.serial_scanner import SerialScanner, ports
+from drivers.links.link_settings import LinkSettings
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,9 +52,15 @@ def decoder_of(device: Device) -> Decoder | None:
 
 
 def _decoder(device: SerialDevice | ModbusDevice) -> Decoder:
-    if isinstance(device, SerialDevice):
-        return decoder(device.format, **device.options)
-    return RegisterDecoder(load_map(device.map), count=device.points)
+    return _stream_decoder(device) if isinstance(device, SerialDevice) else _register_decoder(device)
+
+
+def _stream_decoder(device: SerialDevice) -> Decoder:
+    return decoder(device.format, **device.options)
+
+
+def _register_decoder(device: ModbusDevice) -> RegisterDecoder:
+    return RegisterDecoder(map_of(device.map), count=device.points)
 
 
 def _source_with_axis(device: SerialDevice | ModbusDevice) -> ScanSource:
@@ -70,30 +76,20 @@ def _source_with_axis(device: SerialDevice | ModbusDevice) -> ScanSource:
 
 
 def _link(device: SerialDevice | ModbusDevice) -> ScanSource:
+    """The source of a device's own points. Its library is loaded here, for those who need it."""
+    settings = LinkSettings(device.baud_rate, device.parity, device.silence_s, device.reconnect_s)
     if isinstance(device, SerialDevice):
-        return SerialScanner(
-            device.address,
-            _decoder(device),
-            baud_rate=device.baud_rate,
-            parity=device.parity,
-            silence_s=device.silence_s,
-            reconnect_s=device.reconnect_s,
-        )
-    from drivers.links.modbus_scanner import ModbusScanner  # noqa: PLC0415 - pymodbus is loaded for those who need it
+        from drivers.links.serial_scanner import SerialScanner  # noqa: PLC0415 - it loads pyserial
 
-    return ModbusScanner(
-        device.address,
-        load_map(device.map),
-        device_id=device.device_id,
-        count=device.points,
-        baud_rate=device.baud_rate,
-        parity=device.parity,
-        timeout_s=device.timeout_s,
-        silence_s=device.silence_s,
-        reconnect_s=device.reconnect_s,
-    )
+        return SerialScanner(device.address, _stream_decoder(device), settings)
+    from drivers.links.modbus_scanner import ModbusScanner  # noqa: PLC0415 - it loads pymodbus
+
+    registers = _register_decoder(device)
+    return ModbusScanner(device.address, registers, settings, device_id=device.device_id, timeout_s=device.timeout_s)
 
 
 def serial_ports() -> list[tuple[str, str]]:
     """Name and description of every serial port that this computer has now."""
+    from drivers.links.serial_scanner import ports  # noqa: PLC0415 - it loads pyserial
+
     return ports()

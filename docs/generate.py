@@ -71,7 +71,7 @@ REGISTER_MAP = """
 # The register map of a Modbus device
 
 Any device that keeps its points in registers needs a map and nothing else. The map says which registers hold what and how they are to be
-read. Addresses count from 0, as on the wire: register 40001 of a manual is usually the holding register 0 here. `drivers/codecs/maps` holds
+read. Addresses count from 0, as on the wire: register 40001 of a manual is usually the holding register 0 here. `drivers/maps` holds
 the maps that are shipped, to copy from.
 
 ```yaml

@@ -7,11 +7,12 @@ scipy and Open3D are loaded only by those who import from there.
 
 from drivers.codecs import decoder, decoders
 from drivers.codecs.register_decoder import RegisterDecoder
-from drivers.codecs.register_map import RegisterMap, load_map, shipped_maps
+from drivers.codecs.register_map import RegisterMap, register_map
 from drivers.errors import DeviceError, DeviceRefused, LinkError, MeshError, PointFileError, ProtocolError
 from drivers.files.point_file import PointFile, PointFileSource, convert_to_mm, points_of, read_points
 from drivers.files.text_table import Columns, parse_columns, read_text
 from drivers.links.capture import Capture
+from drivers.maps import shipped_map, shipped_maps
 from drivers.source import (
     Arrival,
     Damaged,
@@ -57,10 +58,11 @@ __all__ = [
     "convert_to_mm",
     "decoder",
     "decoders",
-    "load_map",
     "parse_columns",
     "points_of",
     "read_points",
     "read_text",
+    "register_map",
+    "shipped_map",
     "shipped_maps",
 ]

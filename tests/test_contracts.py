@@ -16,9 +16,9 @@ import pytest
 
 import cmmlink
 import inspection
+from cmmlink.plan.own_maps import map_of
 from cmmlink.plan.scan import load_plan
 from cmmlink.plan.surface import load_ct_plan
-from drivers import load_map
 from tests.cmmlink.command import cmmlink as cmmlink_command
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -188,7 +188,7 @@ def test_the_plans_and_maps_of_a_page_can_be_read(page: str, text: str, tmp_path
             file.write_text(f"part: {{name: a}}\nnominal: {{file: b}}\ntolerance: {{lower_mm: 0, upper_mm: 1}}\n{device}", encoding="utf-8")
             load_plan(file)
     elif text.startswith("device:"):
-        load_map(file)
+        map_of(file)
     elif "\nmesh:" in text:
         load_ct_plan(file)
     else:

@@ -1,5 +1,6 @@
 """Plans of every kind: what may stand in them, and how they are read. This is the front door of the package."""
 
+from cmmlink.plan.own_maps import map_of
 from cmmlink.plan.scan import (
     Datum,
     Device,
@@ -37,6 +38,7 @@ __all__ = [
     "line_of",
     "load_ct_plan",
     "load_plan",
+    "map_of",
     "place_of",
     "read_model",
     "with_own_maps",

@@ -4,6 +4,7 @@ The one source is the model itself: its JSON schema, which pydantic makes of typ
 docs/plan.md, ct-plan.md, register-map.md and results.md are written from what is given here.
 """
 
+import json
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -40,7 +41,7 @@ class Group:
 
 def groups_of(model: type[BaseModel], mode: str = "validation") -> tuple[Group, ...]:
     """Describe all keys of a model: its own, then those of each mapping in it, every kind of mapping once."""
-    schema = model.model_json_schema(mode="serialization" if mode == "serialization" else "validation")
+    schema = _merge_equal(model.model_json_schema(mode="serialization" if mode == "serialization" else "validation"))
     definitions: Mapping[str, Any] = schema.get("$defs", {})
     places: dict[str, str] = {}  # of each definition: the path under which it is described
     waiting: list[tuple[str, Mapping[str, Any]]] = [("", schema)]
@@ -58,6 +59,15 @@ def groups_of(model: type[BaseModel], mode: str = "validation") -> tuple[Group, 
         found.append(Group(path, _join_lines(mapping.get("description", "")), keys))
         waiting = [(places[definition], definitions[definition]) for definition in inner] + waiting
     return tuple(found)
+
+
+def _merge_equal(schema: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Let one definition stand for all that say the same, so that they are described once."""
+    text, first = json.dumps(schema), dict[str, str]()
+    for name, definition in schema.get("$defs", {}).items():
+        said = json.dumps(definition, sort_keys=True)
+        text = text.replace(f'"#/$defs/{name}"', f'"#/$defs/{first.setdefault(said, name)}"')
+    return dict(json.loads(text))
 
 
 def table(group: Group, *, defaults: bool = True) -> str:

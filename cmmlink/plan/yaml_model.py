@@ -58,7 +58,7 @@ def read_model(text: str, model: type[Model]) -> Model:
         return model.model_validate(document.value)
     except ValidationError as failure:
         # A misspelt key first: the same slip makes another key missing.
-        errors = sorted(failure.errors(), key=lambda error: error["type"] != "extra_forbidden")
+        errors = sorted(failure.errors(), key=lambda error: error["type"] not in ("extra_forbidden", "unknown_name"))
         problems = [_explain(error, document, model) for error in errors]
     line, message = problems[0]
     others = f" (and {len(problems) - 1} more after this one)" if len(problems) > 1 else ""
@@ -165,6 +165,8 @@ def _explain(error: ErrorDetails, document: _Document, model: type[BaseModel]) -
     kind = error["type"]
     if kind == "extra_forbidden":
         return line, f"{key} is not a known key;{_did_you_mean(str(path[-1]), _keys(owner))}"
+    if kind == "unknown_name":
+        return line, f"{key} is not a known key;{_did_you_mean(str(path[-1]), error['ctx']['allowed'].split(', '))}"
     if kind == "missing":
         return line, f"{key} is missing: expected {_meaning(owner, str(path[-1]))}"
     if kind in ("union_tag_not_found", "union_tag_invalid"):
@@ -197,6 +199,11 @@ def _place(location: tuple[str | int, ...], document: _Document, model: type[Bas
     here: Any = model
     owner: type[BaseModel] | None = model
     for part in location:
+        if part == "[key]":  # what is wrong is the key itself
+            continue
+        if typing.get_origin(here) is dict:
+            owner, here, path = None, typing.get_args(here)[1], (*path, part)
+            continue
         chosen = [choice for choice in _models(here) if _tag(choice) == part]
         if (*path, part) not in document.lines and chosen:
             here = chosen[0]

@@ -17,13 +17,13 @@ from typing import Any
 from cmmlink.buffer import Buffer
 from cmmlink.errors import PlanError, StoreError
 from cmmlink.events import Arrived, Event, Judged, RunFinished, RunStarted
-from cmmlink.plan import Plan, with_own_maps
+from cmmlink.plan import Plan, map_of, with_own_maps
 from cmmlink.record.bodies import PlacedArrival, pack_arrivals, pack_document, pack_judged, pack_points, pack_reads
 from cmmlink.record.chain import Draft, Kind
 from cmmlink.record.store import Store
 from cmmlink.result_json import number, result_json
 from cmmlink.version import __version__
-from drivers import PointBatch, Rejected, WireBytes, load_map
+from drivers import PointBatch, Rejected, WireBytes
 from inspection import JudgedRows
 
 COMMIT_S = 0.1
@@ -49,7 +49,7 @@ class RunInputs:
         A map is kept as it was understood, every default filled in: how its file spells it may read otherwise another day.
         """
         try:
-            device = with_own_maps(plan.device, lambda own: load_map(own).model_dump(mode="json"))
+            device = with_own_maps(plan.device, lambda own: map_of(own).model_dump(mode="json"))
         except ValueError as error:
             raise PlanError(f"device: {error}") from None
         plan = plan.model_copy(update={"device": device})

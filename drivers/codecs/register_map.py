@@ -1,25 +1,37 @@
-"""Modbus devices as data: a YAML map says which registers hold what, and how they are to be read.
+"""Modbus devices as data: a map says which registers hold what, and how they are to be read. Reading the map's text is done elsewhere.
 
 Every field says in its description what it means, as do the tables of the names that a block may hold; docs/register-map.md is
 written from them.
 """
 
 import math
+import re
 from binascii import crc_hqx
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
+from functools import partial
 from typing import Annotated, Any, Literal
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    GetJsonSchemaHandler,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, PydanticCustomError
 
-MAPS = Path(__file__).parent / "maps"
+KEY = "[key]"  # how pydantic marks a place that is a key and no value
 MOST_REGISTERS = 125  # that one answer can carry
 MOST_FIFO = 31
-DEEPEST = 20  # collections within each other; a map needs four
 NUMPY_TYPES = {
     "uint16": ">u2", "int16": ">i2", "uint32": ">u4", "int32": ">i4", "uint64": ">u8", "int64": ">i8", "float32": ">f4", "float64": ">f8"
 }  # fmt: skip
@@ -63,14 +75,24 @@ POINTS_FIELDS = {
 }
 
 
-def _refuse_truth_value(given: object) -> object:
-    if isinstance(given, bool):  # pydantic takes true for 1, YAML takes yes and on for true
-        raise ValueError("true or false where a number belongs")
+def _whole(given: object) -> object:
+    """Read whole numbers as YAML writes them, hexadecimal ones too, and refuse truth values, which pydantic takes for 0 and 1."""
+    if isinstance(given, bool):
+        raise ValueError("a whole number, not true or false")
+    if isinstance(given, str):
+        with suppress(ValueError):
+            return int(given, 0)
     return given
 
 
-Whole = Annotated[int, BeforeValidator(_refuse_truth_value)]
-Number = Annotated[float, BeforeValidator(_refuse_truth_value)]
+def _number(given: object) -> object:
+    if isinstance(given, bool):
+        raise ValueError("a number, not true or false")
+    return given
+
+
+Whole = Annotated[int, BeforeValidator(_whole)]
+Number = Annotated[float, BeforeValidator(_number)]
 
 
 class _Part(BaseModel):
@@ -95,7 +117,7 @@ class RegisterField(_Part):
     @classmethod
     def _refuse_zero_scale(cls, scale: float) -> float:
         if scale == 0.0 or not math.isfinite(1.0 / scale):  # ticks per second are 1 / scale
-            raise ValueError("a scale of 0, or too close to it, makes every value the same")
+            raise ValueError("a factor that is not 0, nor so close to it that every value is the same")
         return scale
 
     @property
@@ -125,13 +147,51 @@ class Block(_Part):
         """Registers of one entry: as said, or up to the last field."""
         return max(self.registers, *(field.at + field.registers for field in self.fields.values()), 0)
 
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """Describe every kind of block as a block: the kinds differ in the names of their fields only."""
+        return handler(schema if cls is Block else Block.__pydantic_core_schema__)
+
     @model_validator(mode="after")
     def _refuse_what_does_not_fit(self) -> "Block":
         if self.size > MOST_REGISTERS:
-            raise ValueError(f"{self.size} registers; one answer carries at most {MOST_REGISTERS}")
+            raise ValueError(f"at most {MOST_REGISTERS} registers in one entry, which is what one answer carries, not {self.size}")
         if self.at + self.size * self.entries > 65536:
-            raise ValueError(f"{self.entries} entries of {self.size} registers from {self.at} end after register 65535")
+            raise ValueError(f"an end by register 65535, after which {self.entries} entries of {self.size} registers from {self.at} on end")
         return self
+
+
+def _refuse_other_names(allowed: Mapping[str, str], name: str) -> str:
+    if name not in allowed:
+        raise PydanticCustomError("unknown_name", "one of {allowed}", {"allowed": ", ".join(allowed)})
+    return name
+
+
+_NAMES = "the numbers in the block by their names"
+
+
+class StatusBlock(Block):
+    """What is read besides the points."""
+
+    fields: dict[Annotated[str, AfterValidator(partial(_refuse_other_names, STATUS_FIELDS))], RegisterField] = Field(
+        min_length=1, description=_NAMES
+    )
+
+
+class PopBlock(Block):
+    """What takes the oldest message out of a queue."""
+
+    fields: dict[Annotated[str, AfterValidator(partial(_refuse_other_names, POP_FIELDS))], RegisterField] = Field(
+        min_length=1, description=_NAMES
+    )
+
+
+class PointsBlock(Block):
+    """The points, or the rest of a message."""
+
+    fields: dict[Annotated[str, AfterValidator(partial(_refuse_other_names, POINTS_FIELDS))], RegisterField] = Field(
+        min_length=1, description=_NAMES
+    )
 
 
 class RegisterMap(_Part):
@@ -144,109 +204,35 @@ class RegisterMap(_Part):
         default="high-first", description="which register of a number of 32 or 64 bits comes first"
     )
     pattern: Literal["latest", "ring", "queue", "fifo"] = Field(description="how the device hands its points over")
-    status: Block | None = Field(default=None, description="what is read besides the points; a ring needs it")
-    pop: Block | None = Field(default=None, description="what takes the oldest message out of a queue")
-    points: Block = Field(description="the points")
+    status: StatusBlock | None = Field(default=None, description="what is read besides the points; a ring needs it")
+    pop: PopBlock | None = Field(default=None, description="what takes the oldest message out of a queue")
+    points: PointsBlock = Field(description="the points")
 
     @model_validator(mode="after")
     def _refuse_what_is_missing(self) -> "RegisterMap":
-        _refuse_unknown_fields(self.status, STATUS_FIELDS, "status")
-        _refuse_unknown_fields(self.pop, POP_FIELDS, "pop")
-        _refuse_unknown_fields(self.points, POINTS_FIELDS, "points")
         named = set(self.points.fields) | (set(self.pop.fields) if self.pop else set())
         if not named & {"x", "y", "z"}:
-            raise ValueError("points: none of x, y, z is named")
+            raise ValueError("at least one of x, y and z among the fields of points")
         if self.pattern == "ring" and (self.status is None or "written" not in self.status.fields):
-            raise ValueError("a ring needs the field written in status")
+            raise ValueError("the field written in status, which a ring needs")
         if (self.pattern == "queue") != (self.pop is not None):
-            raise ValueError("a queue, and only a queue, needs a block pop")
+            raise ValueError("a block pop for a queue, and for no other pattern")
         if self.pattern != "latest" and "sequence" not in named:
-            raise ValueError(f"a {self.pattern} needs a field sequence, or a loss would not show")
+            raise ValueError(f"a field sequence, without which a {self.pattern} would not show a loss")
         if self.pattern == "fifo" and self.points.size > MOST_FIFO:
-            raise ValueError(f"an entry of {self.points.size} registers; function 24 hands over at most {MOST_FIFO}")
+            raise ValueError(f"at most {MOST_FIFO} registers in one entry, which is what function 24 hands over, not {self.points.size}")
         return self
 
 
-def _refuse_unknown_fields(block: Block | None, names: Mapping[str, str], where: str) -> None:
-    unknown = sorted(set(block.fields) - set(names)) if block else []
-    if unknown:
-        raise ValueError(f"{where}: field {unknown[0]!r} is none of {', '.join(sorted(names))}")
-
-
-def shipped_maps() -> dict[str, Path]:
-    """Files of the maps that are shipped, by their names."""
-    return {file.stem: file for file in sorted(MAPS.glob("*.yaml"))}
-
-
-def load_map(name: str | Path | Mapping[str, Any]) -> RegisterMap:
-    """Read a map: the name of one that is shipped, any other YAML file, or its content; raise `ValueError` naming file, line and key.
-
-    A shipped name as text is always the shipped map, whatever else bears that name; a `Path` is always a file.
-    """
-    if isinstance(name, Mapping):
-        return _checked(name, "map", lambda _: "")
-    path = shipped_maps().get(name, Path(name)) if isinstance(name, str) else name
-    text = _text_of(path)
-    try:
-        _refuse_what_no_map_needs(text, path)
-    except yaml.YAMLError as error:
-        raise ValueError(f"{path}: no YAML: {error}") from error
-    try:
-        tree = yaml.safe_load(text)
-    except (yaml.YAMLError, ValueError) as error:  # what looks like a date and is none is a ValueError of the reader's
-        raise ValueError(f"{path}: no YAML: {error}") from error
-    return _checked(tree, str(path), lambda keys: f", line {_line_of(text, keys)}")
-
-
-def _text_of(path: Path) -> str:
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise ValueError(f"{path}: {error.strerror or error}; give a YAML file or one of {', '.join(shipped_maps())}") from error
-    try:
-        text = data.decode("utf-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise ValueError(f"{path}: byte {error.start + 1} is not UTF-8; save the map as UTF-8") from error
-    if "\0" in text:  # every other byte of UTF-16 without its mark
-        raise ValueError(f"{path}: not a text in UTF-8; save the map as UTF-8")
-    return text
-
-
-def _refuse_what_no_map_needs(text: str, path: Path) -> None:
-    """Refuse deep nesting, which would exhaust the stack of the reader proper, and tags, at which it may fail in any way."""
-    depth = 0
-    for event in yaml.parse(text, Loader=yaml.SafeLoader):
-        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-        where = f"{path}, line {event.start_mark.line + 1 if event.start_mark else 1}"
-        if depth > DEEPEST:
-            raise ValueError(f"{where}: nested more than {DEEPEST} deep")
-        if getattr(event, "tag", None) not in (None, "!"):
-            raise ValueError(f"{where}: the tag {getattr(event, 'tag', '')} is not supported; write the plain value")
-
-
-def _checked(tree: object, file: str, line_of: Callable[[list[str]], str]) -> RegisterMap:
+def register_map(tree: Mapping[str, Any]) -> RegisterMap:
+    """Make a map of its content. Raises ValueError naming the key, what is expected and what was found."""
     try:
         return RegisterMap.model_validate(tree)
     except ValidationError as error:
         first = error.errors()[0]
-        keys = [str(key) for key in first["loc"]]
-        where = line_of(keys) if keys else ""
-        raise ValueError(f"{file}{where}: {'.'.join(keys) or 'map'}: {first['msg']}; found {first['input']!r:.80}") from error
-
-
-def _line_of(text: str, keys: Iterable[str]) -> int:
-    """Return the line on which the innermost of the nested keys that exists stands."""
-    node, line = yaml.compose(text, Loader=yaml.SafeLoader), 1
-    for key in keys:
-        if not isinstance(node, yaml.MappingNode):
-            break
-        for name, value in node.value:
-            if name.value == key:
-                node, line = value, name.start_mark.line + 1
-                break
-        else:
-            break
-    return line
+        key = ".".join(str(part) for part in first["loc"] if part != KEY) or "map"
+        expected = re.sub(r"^(Value error, |Input should be )", "", first["msg"])
+        raise ValueError(f"{key}: expected {expected}; found {first['input']!r:.80}") from error
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,13 +21,14 @@ from pymodbus.pdu import ModbusPDU
 from pymodbus.pdu.file_message import ReadFifoQueueResponse
 
 from drivers.codecs.register_decoder import RegisterDecoder
-from drivers.codecs.register_map import RegisterMap
 from drivers.codecs.register_pdus import READ_FIFO
 from drivers.errors import LinkError
+from drivers.links.link_settings import LinkSettings
 from drivers.links.reconnect import keep_up
 from drivers.source import Arrival, Damaged, ScanClosed, WireBytes
 
 TRIES = 3  # of one request, before the link counts as lost
+USUAL = LinkSettings(19_200, "E")  # of an RTU line, as the standard says
 BUSY = (5, 6)  # exceptions that ask for patience: accepted, busy
 
 
@@ -46,32 +47,24 @@ class ModbusScanner:
     def __init__(
         self,
         address: str,
-        register_map: RegisterMap,
+        decoder: RegisterDecoder,
+        settings: LinkSettings = USUAL,
         *,
         device_id: int = 1,
-        count: int | None = None,
-        baud_rate: int = 19_200,
-        parity: str = "E",
         timeout_s: float = 1.0,
         poll_s: float = 0.002,
-        silence_s: float = 3.0,
-        reconnect_s: float = 0.0,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """`timeout_s` must exceed the slowest answer.
+        """`timeout_s` must exceed the slowest answer; `poll_s` is the pause when nothing new was there.
 
-        Without a new point or a moving heartbeat for `silence_s` the link counts as lost; it is tried again for
-        `reconnect_s`. `poll_s` is the pause when nothing new was there.
+        A device that answers, but with no new point and no moving heartbeat, is as silent as one that does not.
         """
         self._address = address
-        self._decoder = RegisterDecoder(register_map, count=count)
+        self._decoder = decoder
+        self._settings = settings
         self._device_id = device_id
-        self._baud_rate = baud_rate
-        self._parity = parity
         self._timeout_s = timeout_s
         self._poll_s = poll_s
-        self._silence_s = silence_s
-        self._reconnect_s = reconnect_s
         self._clock = clock
         self._stopped = threading.Event()
 
@@ -81,7 +74,9 @@ class ModbusScanner:
 
     def arrivals(self) -> Iterator[Arrival]:
         """Open the link, yield what arrives, end after `ScanClosed`."""
-        return keep_up(lambda: closing(self._open()), self._scan, reconnect_s=self._reconnect_s, stopped=self._stopped, clock=self._clock)
+        return keep_up(
+            lambda: closing(self._open()), self._scan, reconnect_s=self._settings.reconnect_s, stopped=self._stopped, clock=self._clock
+        )
 
     def _scan(self, client: ModbusBaseSyncClient) -> Iterator[Arrival]:
         last_news_s = self._clock()
@@ -98,8 +93,8 @@ class ModbusScanner:
                 return
             if any(not isinstance(arrival, Damaged) for arrival in found):
                 last_news_s = self._clock()
-            elif self._clock() - last_news_s > self._silence_s:
-                silence = f"for {self._silence_s:g} s without a new point or a moving heartbeat"
+            elif self._clock() - last_news_s > self._settings.silence_s:
+                silence = f"for {self._settings.silence_s:g} s without a new point or a moving heartbeat"
                 raise LinkError(f"{self._address}: the device answers, but {silence}; is it scanning?")
             if self._decoder.idle:
                 self._stopped.wait(self._poll_s)
@@ -139,7 +134,9 @@ class ModbusScanner:
         if colon and port.isdigit() and "/" not in self._address:
             client = ModbusTcpClient(host, port=int(port), timeout=self._timeout_s, retries=0)
         else:
-            client = ModbusSerialClient(self._address, timeout=self._timeout_s, retries=0, baudrate=self._baud_rate, parity=self._parity)
+            client = ModbusSerialClient(
+                self._address, timeout=self._timeout_s, retries=0, baudrate=self._settings.baud_rate, parity=self._settings.parity
+            )
         client.register(FifoAnswer)
         if not client.connect():
             raise LinkError(f"{self._address}: no Modbus device opens there; is it switched on, plugged in, free, and named right?")

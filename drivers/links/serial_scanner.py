@@ -13,11 +13,13 @@ from contextlib import closing
 import serial
 
 from drivers.errors import DeviceError, LinkError, ProtocolError
+from drivers.links.link_settings import LinkSettings
 from drivers.links.reconnect import keep_up
 from drivers.source import Arrival, Damaged, Decoder, ScanClosed, WireBytes
 
 POLL_S = 0.05  # how long a read waits before it looks whether to stop
 LARGEST_READ = 1 << 16
+USUAL = LinkSettings(115_200, "N")
 
 
 def ports() -> list[tuple[str, str]]:
@@ -34,20 +36,13 @@ class SerialScanner:
         self,
         address: str,
         decoder: Decoder,
+        settings: LinkSettings = USUAL,
         *,
-        baud_rate: int = 115_200,
-        parity: str = serial.PARITY_NONE,
-        silence_s: float = 3.0,
-        reconnect_s: float = 0.0,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Without a byte for `silence_s` the link counts as lost; a lost link is tried again for `reconnect_s`."""
         self._address = serial_address(address)
         self._decoder = decoder
-        self._baud_rate = baud_rate
-        self._parity = parity
-        self._silence_s = silence_s
-        self._reconnect_s = reconnect_s
+        self._settings = settings
         self._clock = clock
         self._stopped = threading.Event()
 
@@ -57,10 +52,12 @@ class SerialScanner:
 
     def arrivals(self) -> Iterator[Arrival]:
         """Open the link, yield what arrives, end after `ScanClosed`."""
-        return keep_up(lambda: closing(self._open()), self._scan, reconnect_s=self._reconnect_s, stopped=self._stopped, clock=self._clock)
+        return keep_up(
+            lambda: closing(self._open()), self._scan, reconnect_s=self._settings.reconnect_s, stopped=self._stopped, clock=self._clock
+        )
 
     def _scan(self, port: serial.Serial) -> Iterator[Arrival]:
-        watch = _Watch(self._silence_s, self._clock())
+        watch = _Watch(self._settings.silence_s, self._clock())
         try:
             while not self._stopped.is_set():
                 self._write(port, self._decoder.request())
@@ -81,18 +78,18 @@ class SerialScanner:
     def _raise_if_dead(self, state: str) -> None:
         """Raise what the watch found."""
         if state == "silent":
-            raise LinkError(f"{self._address}: silent for {self._silence_s:g} s; is the device switched on and scanning?")
+            raise LinkError(f"{self._address}: silent for {self._settings.silence_s:g} s; is the device switched on and scanning?")
         if state == "garbled":
             raise ProtocolError(
-                f"{self._address}: bytes arrive but for {self._silence_s:g} s not one valid frame; "
-                f"check baud rate ({self._baud_rate}), parity ({self._parity}) and the format of the device"
+                f"{self._address}: bytes arrive but for {self._settings.silence_s:g} s not one valid frame; "
+                f"check baud rate ({self._settings.baud_rate}), parity ({self._settings.parity}) and the format of the device"
             )
 
     def _open(self) -> serial.Serial:
         options = {"exclusive": True} if os.name == "posix" else {}
         try:
             return serial.serial_for_url(
-                self._address, baudrate=self._baud_rate, parity=self._parity, timeout=POLL_S, write_timeout=1.0, **options
+                self._address, baudrate=self._settings.baud_rate, parity=self._settings.parity, timeout=POLL_S, write_timeout=1.0, **options
             )
         except (serial.SerialException, OSError, ValueError) as error:
             hint = "is it plugged in, free, and named right? `cmmlink ports` lists the ports"

@@ -13,8 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from drivers.codecs.register_map import load_map
+from drivers.codecs.register_decoder import RegisterDecoder
 from drivers.links.modbus_scanner import ModbusScanner
+from drivers.maps import shipped_map
 from drivers.source import PointBatch, WireBytes
 from tests.integration.simulated import simulated
 
@@ -24,7 +25,7 @@ WARM_UP = 500
 
 def reads() -> None:
     with tempfile.TemporaryDirectory() as folder, simulated("modbus-ring", "127.0.0.1:0", Path(folder), rate_hz=1.0, count=10) as device:
-        scanner = ModbusScanner(device.address, load_map("generic-ring"))
+        scanner = ModbusScanner(device.address, RegisterDecoder(shipped_map("generic-ring")))
         client = scanner._open()
         request = bytes.fromhex("03 0064 007D")
         times_s = []
@@ -44,7 +45,7 @@ def points() -> None:
     count = 50_000
     with tempfile.TemporaryDirectory() as folder, simulated("modbus-ring", "127.0.0.1:0", Path(folder), "--unpaced", count=count) as device:
         received, asked, start_s = 0, 0, time.perf_counter()
-        for arrival in ModbusScanner(device.address, load_map("generic-ring")).arrivals():
+        for arrival in ModbusScanner(device.address, RegisterDecoder(shipped_map("generic-ring"))).arrivals():
             received += len(arrival) if isinstance(arrival, PointBatch) else 0
             asked += isinstance(arrival, WireBytes)
         took_s = time.perf_counter() - start_s

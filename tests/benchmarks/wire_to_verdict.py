@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from cmmlink.events import Event, Judged, RunStarted
 from cmmlink.pipeline import run_inspection
 from drivers.codecs.binary_frames import BinaryDecoder
+from drivers.links.link_settings import LinkSettings
 from drivers.links.serial_scanner import SerialScanner
 from inspection import LiveInspection, NurbsCurve, RigidTransform, ToleranceZone, discretize
 
@@ -61,7 +62,7 @@ def latencies_ms(rate_hz: int) -> NDArray[np.float64]:
             judged_s.append((time.monotonic(), event.counts.judged))
 
     live = LiveInspection(nominal, ToleranceZone(-0.05, 0.05), datum=RigidTransform(0.0, np.zeros(2)), fit="none")
-    source = SerialScanner(f"127.0.0.1:{port}", BinaryDecoder(), silence_s=30.0)
+    source = SerialScanner(f"127.0.0.1:{port}", BinaryDecoder(), LinkSettings(115_200, "N", silence_s=30.0))
     started = RunStarted("benchmark", "", "", "TCP", simulated=True)
     outcome = run_inspection(source, live, [note], started, buffer_points=500_000, clock=time.monotonic, stop=threading.Event())
     written_s = ours.recv()

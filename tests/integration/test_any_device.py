@@ -14,8 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cmmlink.plan.own_maps import map_of
 from drivers.codecs import decoder, decoders
-from drivers.codecs.register_map import load_map
+from drivers.codecs.register_decoder import RegisterDecoder
+from drivers.links.link_settings import LinkSettings
 from drivers.links.modbus_scanner import ModbusScanner
 from drivers.links.serial_scanner import SerialScanner
 from drivers.source import Arrival, PointBatch, ScanClosed, ScanSource, WireBytes
@@ -26,11 +28,11 @@ SIMULATED = {"serial": "ascii", "binary": "binary", "binary-block": "binary", "m
 Open = Callable[[], ScanSource]
 
 
-def opener(address: str, name: str, options: dict[str, float], parity: str, baud_rate: int) -> Open:
+def opener(address: str, name: str, options: dict[str, float], settings: LinkSettings) -> Open:
     """Return what makes a source: a format's name is a stream, a map's name or file is Modbus."""
     if name in decoders():
-        return lambda: SerialScanner(address, decoder(name, **options), baud_rate=baud_rate, parity=parity)
-    return lambda: ModbusScanner(address, load_map(name), baud_rate=baud_rate, parity=parity)
+        return lambda: SerialScanner(address, decoder(name, **options), settings)
+    return lambda: ModbusScanner(address, RegisterDecoder(map_of(name)), settings)
 
 
 @pytest.fixture(params=["hardware", *SIMULATED])
@@ -42,10 +44,10 @@ def open_source(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Open
     if address is not None:
         options = {key: float(value) for key, _, value in (text.partition("=") for text in config.getoption("--option"))}
         name = config.getoption("--map") or config.getoption("--format")
-        yield opener(address, name, options, config.getoption("--parity"), config.getoption("--baud-rate"))
+        yield opener(address, name, options, LinkSettings(config.getoption("--baud-rate"), config.getoption("--parity")))
         return
     with simulated(request.param, "127.0.0.1:0", tmp_path, count=20_000) as device:
-        yield opener(device.address, SIMULATED[request.param], {}, "N", 115_200)
+        yield opener(device.address, SIMULATED[request.param], {}, LinkSettings(115_200, "N"))
 
 
 def first_points(source: ScanSource, count: int) -> list[Arrival]:

@@ -9,6 +9,7 @@ import pytest
 
 from drivers.codecs.ascii_frames import AsciiDecoder
 from drivers.errors import LinkError, ProtocolError
+from drivers.links.link_settings import LinkSettings
 from drivers.links.serial_scanner import SerialScanner
 from drivers.source import Arrival, LinkDown, LinkUp, PointBatch, ScanClosed, ScanOpened
 from tests.drivers.codecs.streams import Account, account, only_sent_points
@@ -22,7 +23,7 @@ COUNT = 1000
 
 
 def scanned(device: Simulated, silence_s: float = 3.0) -> Account:
-    return account(SerialScanner(device.address, AsciiDecoder(), silence_s=silence_s).arrivals())
+    return account(SerialScanner(device.address, AsciiDecoder(), LinkSettings(115_200, "N", silence_s=silence_s)).arrivals())
 
 
 @pytest.mark.parametrize("line", LINES)
@@ -82,7 +83,7 @@ def test_a_killed_device_ends_with_a_clear_error(line: str, tmp_path: Path) -> N
 @pytest.mark.parametrize("line", LINES)
 def test_an_unplugged_line_comes_back_and_the_run_goes_on(line: str, tmp_path: Path) -> None:
     with simulated("serial", line, tmp_path, "--fault=unplug:0.05@300") as device:
-        arrivals = list(SerialScanner(device.address, AsciiDecoder(), reconnect_s=20.0).arrivals())
+        arrivals = list(SerialScanner(device.address, AsciiDecoder(), LinkSettings(115_200, "N", reconnect_s=20.0)).arrivals())
     book = account(arrivals)
     kinds = [type(arrival) for arrival in book.others]
     assert kinds == [ScanOpened, LinkDown, LinkUp, ScanClosed]
@@ -108,7 +109,7 @@ def test_bytes_of_another_format_are_called_so(tmp_path: Path) -> None:
 
 def test_stop_ends_the_scan_from_another_thread(tmp_path: Path) -> None:
     with simulated("serial", "127.0.0.1:0", tmp_path, "--fault=silence@100") as device:
-        source = SerialScanner(device.address, AsciiDecoder(), silence_s=60.0)
+        source = SerialScanner(device.address, AsciiDecoder(), LinkSettings(115_200, "N", silence_s=60.0))
         ended = threading.Thread(target=lambda: list(source.arrivals()))
         ended.start()
         source.stop()
@@ -133,7 +134,7 @@ def test_a_port_in_use_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("line", LINES)
 def test_a_restarted_device_begins_a_new_scan(line: str, tmp_path: Path) -> None:
     with simulated("serial", line, tmp_path, "--fault=restart:0.05@300") as device:
-        arrivals = list(SerialScanner(device.address, AsciiDecoder(), reconnect_s=20.0).arrivals())
+        arrivals = list(SerialScanner(device.address, AsciiDecoder(), LinkSettings(115_200, "N", reconnect_s=20.0)).arrivals())
     assert [type(arrival) for arrival in account(arrivals).others] == [ScanOpened, LinkDown, LinkUp, ScanOpened, ScanClosed]
     again = account(arrivals[max(place for place, arrival in enumerate(arrivals) if isinstance(arrival, ScanOpened)) :])
     assert (again.sequence, again.lost) == (list(range(COUNT)), 0)

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from drivers.codecs.binary_frames import BinaryDecoder
+from drivers.links.link_settings import LinkSettings
 from drivers.links.serial_scanner import SerialScanner
 from drivers.source import LinkDown, LinkUp, ScanClosed, ScanOpened
 from tests.drivers.codecs.streams import account, only_sent_points
@@ -44,7 +45,7 @@ def test_damage_gives_no_wrong_point_and_the_true_loss(device: str, tmp_path: Pa
 
 def test_an_unplugged_line_comes_back_and_the_run_goes_on(tmp_path: Path) -> None:
     with simulated("binary", "127.0.0.1:0", tmp_path, "--fault=unplug:0.05@300") as running:
-        book = account(SerialScanner(running.address, BinaryDecoder(), reconnect_s=20.0).arrivals())
+        book = account(SerialScanner(running.address, BinaryDecoder(), LinkSettings(115_200, "N", reconnect_s=20.0)).arrivals())
     assert [type(arrival) for arrival in book.others] == [ScanOpened, LinkDown, LinkUp, ScanClosed]
     only_sent_points(book, running.sent_mm, HALF_UNIT_MM)
     assert 300 <= len(book.sequence) == COUNT - book.lost

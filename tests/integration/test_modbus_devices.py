@@ -10,9 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers.codecs.register_map import load_map
+from drivers.codecs.register_decoder import RegisterDecoder
 from drivers.errors import DeviceRefused, LinkError, ProtocolError
+from drivers.links.link_settings import LinkSettings
 from drivers.links.modbus_scanner import ModbusScanner
+from drivers.maps import shipped_map
 from drivers.source import Arrival, Heartbeat, LinkDown, LinkUp, PointBatch, ScanClosed, ScanOpened
 from tests.drivers.codecs.streams import Account, account, only_sent_points
 from tests.integration.simulated import Simulated, simulated
@@ -24,8 +26,11 @@ RTU = pytest.param("pty", marks=pytest.mark.skipif(os.name != "posix", reason="p
 MAPS = {"modbus-ring": "generic-ring", "modbus-fifo": "generic-fifo", "gocator": "gocator"}
 
 
-def source(device: Simulated, map_name: str, **options: float) -> ModbusScanner:
-    return ModbusScanner(device.address, load_map(map_name), baud_rate=115_200, parity="N", **options)  # type: ignore[arg-type]
+def source(
+    device: Simulated, map_name: str, *, count: int | None = None, silence_s: float = 3.0, reconnect_s: float = 0.0, **waits_s: float
+) -> ModbusScanner:
+    settings = LinkSettings(115_200, "N", silence_s, reconnect_s)
+    return ModbusScanner(device.address, RegisterDecoder(shipped_map(map_name), count=count), settings, **waits_s)  # type: ignore[arg-type]
 
 
 def kinds(book: Account) -> list[type[Arrival]]:
@@ -180,8 +185,8 @@ def test_a_device_that_is_not_there_yet_is_waited_for(tmp_path: Path) -> None:
     with simulated("modbus-ring", TCP, tmp_path) as device:
         address = device.address
     with pytest.raises(LinkError, match="no Modbus device opens there"):
-        list(ModbusScanner(address, load_map("generic-ring")).arrivals())
-    waiting = ModbusScanner(address, load_map("generic-ring"), reconnect_s=20.0).arrivals()
+        list(ModbusScanner(address, RegisterDecoder(shipped_map("generic-ring"))).arrivals())
+    waiting = ModbusScanner(address, RegisterDecoder(shipped_map("generic-ring")), LinkSettings(19_200, "E", reconnect_s=20.0)).arrivals()
     assert isinstance(next(waiting), LinkDown)
     with simulated("modbus-ring", address, tmp_path, "--unpaced"):
         book = account(waiting)

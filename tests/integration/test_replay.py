@@ -16,6 +16,7 @@ from cmmlink.events import Arrived, Event, RunFinished
 from cmmlink.record.reader import list_runs, open_to_read, recorded_run
 from cmmlink.record.replay import Replay, replay_run
 from drivers.codecs.ascii_frames import AsciiDecoder
+from drivers.links.link_settings import LinkSettings
 from drivers.links.serial_scanner import SerialScanner
 from drivers.source import PointBatch
 from inspection import Verdict
@@ -66,7 +67,8 @@ def recorded_scan(folder: Path, *faults: str, stop: threading.Event | None = Non
     options = ["--tip-radius-mm", "1", "--rotation-deg", "30", *(f"--fault={fault}" for fault in faults)]
     folder.mkdir(exist_ok=True)
     with simulated("serial", "127.0.0.1:0", folder, *options, count=COUNT, path_mm=path) as device:
-        source = SerialScanner(device.address, AsciiDecoder(), silence_s=0.5, reconnect_s=2.0 if "unplug" in str(faults) else 0.0)
+        settings = LinkSettings(115_200, "N", silence_s=0.5, reconnect_s=2.0 if "unplug" in str(faults) else 0.0)
+        source = SerialScanner(device.address, AsciiDecoder(), settings)
         outcome, recorder = record(folder, source, stop=stop, before=[abort])
     ending = (
         "aborted"

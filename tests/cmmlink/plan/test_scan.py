@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from cmmlink.errors import PlanError
+from cmmlink.plan.own_maps import map_of
 from cmmlink.plan.scan import FileDevice, ModbusDevice, Plan, SerialDevice, load_plan
 from cmmlink.plan.yaml_model import read_model
 from cmmlink.record.recorder import RunInputs
-from drivers.codecs.register_map import load_map
 from inspection import ToleranceZone
 
 SHORT = """\
@@ -286,7 +286,7 @@ def test_an_unknown_map_lists_what_is_shipped(tmp_path: Path) -> None:
     device = with_device(tmp_path, "{type: modbus, address: 'h:502', map: generic-rng}").device
     assert isinstance(device, ModbusDevice)
     with pytest.raises(ValueError, match=r"generic-rng: .*; give a YAML file or one of generic-fifo, generic-ring, gocator, riftek-rf60x"):
-        load_map(device.map)
+        map_of(device.map)
 
 
 FOLLOWING = "{type: serial, address: COM3, format: riftek, axis: {follow: {type: modbus, address: 'h:502', map: mymap}}}"
@@ -303,21 +303,21 @@ def test_a_map_of_ones_own_is_kept_as_it_was_understood(tmp_path: Path, device: 
         kept = kept.axis.follow  # type: ignore[assignment]
     assert isinstance(kept, ModbusDevice)
     assert isinstance(kept.map, dict)
-    assert load_map(kept.map) == load_map(tmp_path / "mymap")
-    assert str(load_map(kept.map).points.fields["x"].offset) == "-0.0"
+    assert map_of(kept.map) == map_of(tmp_path / "mymap")
+    assert str(map_of(kept.map).points.fields["x"].offset) == "-0.0"
 
 
 @pytest.mark.parametrize("name", ["generic-fifo", "generic-ring", "gocator", "riftek-rf60x"])
 def test_every_shipped_map_taken_over_as_ones_own_is_kept_exactly(tmp_path: Path, name: str) -> None:
     (tmp_path / "blade.dat").write_text("0 0", encoding="utf-8")
-    (tmp_path / "mymap").write_text(yaml.safe_dump(load_map(name).model_dump(mode="json")), encoding="utf-8")
+    (tmp_path / "mymap").write_text(yaml.safe_dump(map_of(name).model_dump(mode="json")), encoding="utf-8")
     kept = read_model(RunInputs.of(with_device(tmp_path, "{type: modbus, address: 'h:502', map: mymap}")).plan, Plan).device
     assert isinstance(kept, ModbusDevice)
-    assert load_map(kept.map) == load_map(name)
+    assert map_of(kept.map) == map_of(name)
 
 
 def test_a_map_that_cannot_be_kept_is_a_mistake_in_the_plan(tmp_path: Path) -> None:
     (tmp_path / "blade.dat").write_text("0 0", encoding="utf-8")
     (tmp_path / "mymap").write_text(OWN_MAP.replace("finished: 0", "finished: true"), encoding="utf-8")
-    with pytest.raises(PlanError, match=r"device: .*mymap, line 3: status\.fields\.state\.finished: .*true or false"):
+    with pytest.raises(PlanError, match=r"mymap: line 3: status\.fields\.state\.finished is 'true'; expected a whole number"):
         RunInputs.of(with_device(tmp_path, "{type: modbus, address: 'h:502', map: mymap}"))

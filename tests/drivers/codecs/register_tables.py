@@ -6,10 +6,11 @@ from binascii import crc_hqx
 import numpy as np
 
 from drivers.codecs.register_decoder import RegisterDecoder
-from drivers.codecs.register_map import RegisterMap, load_map
+from drivers.codecs.register_map import RegisterMap
+from drivers.maps import shipped_map
 from drivers.source import Arrival, ScanClosed
 
-RING = load_map("generic-ring")
+RING = shipped_map("generic-ring")
 
 
 class Table:

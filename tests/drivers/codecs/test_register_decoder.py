@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from drivers.codecs.register_decoder import RegisterDecoder
-from drivers.codecs.register_map import load_map
 from drivers.errors import DeviceRefused, ProtocolError
+from drivers.maps import shipped_map
 from tests.drivers.codecs.register_tables import RING, Ring, turns
 from tests.drivers.codecs.streams import account
 
 
 def test_golden_bytes_of_a_reading() -> None:
     """Laid out as in the Modbus Application Protocol V1.1b3, 6.4: function, address, count; function, byte count, data."""
-    decoder = RegisterDecoder(load_map("riftek-rf60x"))
+    decoder = RegisterDecoder(shipped_map("riftek-rf60x"))
     assert decoder.request() == bytes.fromhex("04 0006 0001")
     # RF602 manual p. 17: value 02A5h of a 50 mm sensor is 2.066 mm
     book = account(decoder.feed(bytes.fromhex("04 0006 0001  04 02 02A5")))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from drivers.codecs.register_decoder import RegisterDecoder
-from drivers.codecs.register_map import load_map
+from drivers.maps import shipped_map
 from drivers.source import Arrival, ScanClosed, ScanOpened
 from tests.drivers.codecs.register_tables import LATEST, RING, Gocator, Ring, Table, turns, without_sent
 from tests.drivers.codecs.streams import account, crc_bitwise
@@ -146,7 +146,7 @@ def test_the_latest_point_is_taken_once_and_gaps_are_counted() -> None:
 
 
 def test_a_queue_is_popped_before_it_is_read_and_never_read_twice() -> None:
-    table, decoder = Gocator(), RegisterDecoder(load_map("gocator"))
+    table, decoder = Gocator(), RegisterDecoder(shipped_map("gocator"))
     arrivals = turns(decoder, table)
     table.queue = [(17, 1000, -250), (18, 2000, 0x80000000), (21, 3000, 250)]
     table.registers[978] = 1
@@ -164,7 +164,7 @@ def test_a_queue_is_popped_before_it_is_read_and_never_read_twice() -> None:
 
 
 def test_a_fifo_hands_over_whole_points() -> None:
-    fifo_map, table = load_map("generic-fifo"), Table()
+    fifo_map, table = shipped_map("generic-fifo"), Table()
     decoder = RegisterDecoder(fifo_map)
 
     def entry(number: int) -> list[int]:

@@ -11,13 +11,14 @@ from pymodbus.exceptions import ConnectionException, ModbusIOException
 from pymodbus.pdu import ExceptionResponse, ModbusPDU
 from pymodbus.pdu.register_message import ReadInputRegistersResponse
 
-from drivers.codecs.register_map import load_map
+from drivers.codecs.register_decoder import RegisterDecoder
 from drivers.errors import DeviceRefused, LinkError
 from drivers.links.modbus_scanner import FifoAnswer, ModbusScanner
+from drivers.maps import shipped_map
 from drivers.source import PointBatch, ScanClosed
 from tests.drivers.codecs.streams import account
 
-RIFTEK = load_map("riftek-rf60x")
+RIFTEK = shipped_map("riftek-rf60x")
 
 
 def answers(monkeypatch: pytest.MonkeyPatch, replies: list[ModbusPDU | Exception]) -> Iterator[object]:
@@ -31,7 +32,7 @@ def answers(monkeypatch: pytest.MonkeyPatch, replies: list[ModbusPDU | Exception
 
     monkeypatch.setattr(ModbusTcpClient, "connect", lambda _: True)
     monkeypatch.setattr(ModbusTcpClient, "read_input_registers", read)
-    return ModbusScanner("127.0.0.1:1", RIFTEK, count=3, poll_s=0.0, timeout_s=0.0).arrivals()
+    return ModbusScanner("127.0.0.1:1", RegisterDecoder(RIFTEK, count=3), poll_s=0.0, timeout_s=0.0).arrivals()
 
 
 def value(number: int) -> ModbusPDU:
@@ -90,7 +91,7 @@ def test_one_request_is_in_flight() -> None:
     """The library's server answers only the first of several requests in one segment; others may do the same."""
     server = OneByOne()
     server.start()
-    arrivals = list(ModbusScanner(server.address, RIFTEK, count=50, poll_s=0.0).arrivals())
+    arrivals = list(ModbusScanner(server.address, RegisterDecoder(RIFTEK, count=50), poll_s=0.0).arrivals())
     server.join(timeout=10.0)
     assert server.lengths == [12] * 50
     assert sum(len(arrival) for arrival in arrivals if isinstance(arrival, PointBatch)) == 50

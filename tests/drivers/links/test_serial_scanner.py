@@ -7,6 +7,7 @@ import serial
 
 from drivers.codecs.ascii_frames import AsciiDecoder
 from drivers.errors import DeviceError, LinkError, ProtocolError
+from drivers.links.link_settings import LinkSettings
 from drivers.links.serial_scanner import SerialScanner, serial_address
 from drivers.source import Arrival, Damaged, WireBytes
 
@@ -51,7 +52,7 @@ class Clock:
 
 def run(monkeypatch: pytest.MonkeyPatch, port: Port) -> Iterator[Arrival]:
     monkeypatch.setattr(serial, "serial_for_url", lambda *_, **__: port)
-    return SerialScanner("COM1", AsciiDecoder(), silence_s=3.0, clock=Clock()).arrivals()
+    return SerialScanner("COM1", AsciiDecoder(), LinkSettings(115_200, "N", silence_s=3.0), clock=Clock()).arrivals()
 
 
 FAILURES = [
