@@ -107,7 +107,7 @@ def project(points_mm: Array, grid: CurveTables, threads: int | None = None) -> 
 
 @kernel
 def project_points(points: Any, reals: Any, integers: Any, feet: Any, claimed: Any) -> None:
-    """Closest points of the flat points (2 m,), chunk by chunk as claimed, into feet.
+    """Project the flat points (2 m,), chunk by chunk as they are claimed, and write the results into feet.
 
     All points of a block are solved on the piece that their cell holds; those whose foot is not on that piece, or whose
     cell holds several stretches, queue until they fill a block of their own.
@@ -155,7 +155,7 @@ def project_points(points: Any, reals: Any, integers: Any, feet: Any, claimed: A
 def _queue_unsolved(
     values: Any, slots: Any, reals: Any, integers: Any, feet: Any, block: int, lanes: int, waiting: int, foot: Any, stack: Any
 ) -> int:
-    """Queue what the first pass left, or search for it; the number of waiting items."""
+    """Queue or search for what the first pass left. Returns the number of items that wait."""
     unsolved = 0
     for j in range(lanes):
         slots[UNSOLVED + unsolved] = j
@@ -180,6 +180,7 @@ def _queue_unsolved(
 
 @kernel
 def _push(values: Any, slots: Any, waiting: int, point: int, piece: int, tries: int, t: float) -> int:
+    """Put an item at the end of the queue: a point to be solved on a piece, from t on or, where that is NaN, from its middle."""
     item = WAITING + ITEM_WIDTH * waiting
     slots[item + ITEM_POINT], slots[item + ITEM_PIECE], slots[item + ITEM_TRIES] = point, piece, tries
     values[WAITING_T + waiting] = t
@@ -199,7 +200,7 @@ def _take(values: Any, slots: Any, points: Any, lanes: int, waiting: int) -> Non
 
 @kernel
 def _resume(values: Any, lanes: int, waiting: int) -> None:
-    """Items that have not converged yet go on from where they were."""
+    """Let items that have not converged yet go on from where they were."""
     for j in range(lanes):
         if not np.isnan(values[WAITING_T + waiting + j]):
             values[LANE_T + j] = values[WAITING_T + waiting + j]
@@ -207,7 +208,7 @@ def _resume(values: Any, lanes: int, waiting: int) -> None:
 
 @kernel
 def _settle(values: Any, slots: Any, reals: Any, integers: Any, feet: Any, lanes: int, waiting: int, foot: Any, stack: Any) -> int:
-    """Offer the solved items to their points, send the others on."""
+    """Offer the solved items to their points and send the others on. Returns the number of items that wait."""
     for j in range(lanes):
         if slots[LANE_SOLVED + j] == 1:
             foot[FOOT_U], foot[FOOT_X], foot[FOOT_Y] = values[LANE_U + j], values[LANE_FOOT_X + j], values[LANE_FOOT_Y + j]
@@ -222,7 +223,10 @@ def _settle(values: Any, slots: Any, reals: Any, integers: Any, feet: Any, lanes
 
 @kernel
 def _advance(values: Any, slots: Any, reals: Any, integers: Any, feet: Any, j: int, waiting: int, foot: Any, stack: Any) -> int:
-    """The next try of an unsolved lane: once on the neighbouring piece, or the vertex there, or on from its t; else the search.
+    """Choose the next try of an unsolved lane. Returns the number of items that wait.
+
+    A foot beyond the piece is sought once on the neighbouring piece, or is the vertex there; one on the piece goes on from its t
+    for a few steps. Whatever is left then is searched for along the whole curve.
 
     Feet are accepted on the certified piece and its two neighbours only, so no try can end on another stretch of curve.
     """

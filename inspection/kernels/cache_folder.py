@@ -19,7 +19,7 @@ _IDLE_S = 3600.0  # an older version's folder in which nothing was written for s
 
 
 def stamp_of(package: Path) -> str:
-    """Changes with the name or content of any file of a package; empty for a package without files, as in an archive."""
+    """A text that changes with the name or content of any file of a package. Empty for a package without files, as in an archive."""
     files = sorted(package.glob("*.py"))
     content = hashlib.sha256()
     for file in files:

@@ -80,7 +80,7 @@ def fma(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
 
 @instructions
 def stack_reals(typing_context: Any) -> Any:
-    """Memory on the stack: the compiler then knows that it overlaps no table, and vectorises loops that read both."""
+    """Memory for REALS numbers on the stack. The compiler knows that it overlaps no table, and vectorises loops that read both."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         place = cgutils.alloca_once(builder, ir.ArrayType(ir.DoubleType(), REALS))
@@ -92,7 +92,7 @@ def stack_reals(typing_context: Any) -> Any:
 
 @instructions
 def stack_integers(typing_context: Any) -> Any:
-    """Likewise for integers."""
+    """Memory for INTEGERS integers on the stack."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         place = cgutils.alloca_once(builder, ir.ArrayType(ir.IntType(64), INTEGERS))
@@ -103,7 +103,7 @@ def stack_integers(typing_context: Any) -> Any:
 
 @instructions
 def rows_to_columns(typing_context: Any, table: Any, rows: Any, first: Any, target: Any, place: Any) -> Any:
-    """Eight rows of eight numbers of a table become eight columns: target[place + q BLOCK + i] = table[rows[first + i] + q].
+    """Turn eight rows of eight numbers of a table into eight columns: target[place + q BLOCK + i] = table[rows[first + i] + q].
 
     Whole rows are loaded and transposed in registers, which takes a third of the time of gathering single numbers.
     """
@@ -138,7 +138,7 @@ def rows_to_columns(typing_context: Any, table: Any, rows: Any, first: Any, targ
 
 @instructions
 def claim_chunk(typing_context: Any, claimed: Any) -> Any:
-    """The first of the next chunk of points, which no other thread gets."""
+    """Claim the next chunk of points, which no other thread then gets. Returns its first point."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         counter = context.make_array(signature.args[0])(context, builder, args[0]).data

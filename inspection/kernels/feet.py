@@ -56,12 +56,12 @@ def flatten(points_mm: Array) -> Array:
 
 
 def empty_feet(m: int) -> Feet:
-    """Separate arrays: the allocator reuses blocks of this size without zeroing them, one large block it would zero."""
+    """Feet of m points, not filled in. The arrays are separate: the allocator reuses blocks of such a size, but would zero a large one."""
     return Feet(np.empty(m), np.empty((m, 2)), np.empty(m), np.empty((m, 2)), np.empty(m), np.empty(m), np.empty(m, dtype=np.uint8))
 
 
 def share_out(work: Callable[[NDArray[np.int64]], None], m: int, threads: int | None) -> None:
-    """Let one or more threads claim chunks of m points until none are left; None chooses by their number."""
+    """Let one or more threads claim chunks of m points until none are left. None chooses the number of threads by that of the points."""
     claimed = np.zeros(1, dtype=np.int64)
     if threads is None:
         threads = (os.cpu_count() or 1) if m >= _SHARED else 1
@@ -77,7 +77,7 @@ def share_out(work: Callable[[NDArray[np.int64]], None], m: int, threads: int | 
 
 @kernel
 def store_foot(foot: Any, feet: Any, i: int) -> None:
-    """Results of one point."""
+    """Enter the results of one point as row i."""
     feet.parameter[i], feet.distance_mm[i] = foot[FOOT_U], foot[FOOT_DISTANCE]
     feet.curvature[i], feet.station_mm[i] = foot[FOOT_CURVATURE], foot[FOOT_STATION]
     feet.foot_mm[i, 0], feet.foot_mm[i, 1] = foot[FOOT_X], foot[FOOT_Y]
@@ -87,7 +87,7 @@ def store_foot(foot: Any, feet: Any, i: int) -> None:
 
 @kernel
 def keep_closer(foot: Any, feet: Any, point: int) -> None:
-    """Keep the closest foot of a point, whatever their order: of equally close ones that of the smaller parameter, and so on."""
+    """Enter a foot where it is closer than the one so far. Of equally close feet the same one is kept, in whatever order they come."""
     order = abs(foot[FOOT_DISTANCE]) - abs(feet.distance_mm[point])
     if order == 0.0:
         order = foot[FOOT_U] - feet.parameter[point]

@@ -48,12 +48,12 @@ class GrowingSums:
 
     @property
     def count(self) -> float:
-        """Points taken in."""
+        """Number of points taken in."""
         return float(self._sums[COUNT])
 
     @property
     def mean_square(self) -> float:
-        """Of the deviations, mm^2."""
+        """Mean square of the deviations, mm^2."""
         return float(self._sums[SQUARE] / max(self.count, 1.0))
 
     @property

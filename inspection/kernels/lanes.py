@@ -50,7 +50,7 @@ _STEP = 3e-9  # largest last step, in pieces, after which the square of the erro
 
 @inlined_kernel
 def locate(values: Any, slots: Any, here: Any, blocks: Any, cells: Any, x0: float, y0: float, per_mm: float, j: int) -> None:
-    """What the cell of point j holds."""
+    """Look up what the cell of point j holds."""
     x, y = here[2 * j], here[2 * j + 1]
     fx, fy = (x - x0) * per_mm, (y - y0) * per_mm
     inside = (fx >= 0.0) & (fx < _ACROSS) & (fy >= 0.0) & (fy < _ACROSS)
@@ -72,7 +72,7 @@ def locate(values: Any, slots: Any, here: Any, blocks: Any, cells: Any, x0: floa
 
 @inlined_kernel
 def load_pieces(values: Any, slots: Any, pieces: Any, lanes: int) -> None:
-    """The rows of all lanes' pieces, as columns; lanes that fill up the last eight take the first piece."""
+    """Load the rows of all lanes' pieces as columns. The lanes that fill up the last eight take the first piece."""
     for j in range(lanes, (lanes + 7) & ~7):
         slots[LANE_ROW + j] = 0
     for j in range(0, lanes, 8):
@@ -83,7 +83,7 @@ def load_pieces(values: Any, slots: Any, pieces: Any, lanes: int) -> None:
 
 @inlined_kernel
 def start_in_middle(values: Any, j: int) -> None:
-    """One Halley step from the middle of the piece, where the derivatives are the coefficients."""
+    """Make one Halley step from the middle of the piece, where the derivatives are the coefficients."""
     rx, ry = values[_X0 + j] - values[LANE_X + j], values[_Y0 + j] - values[LANE_Y + j]
     x1, x2, x3 = values[_X1 + j], values[_X2 + j], values[_X3 + j]
     y1, y2, y3 = values[_Y1 + j], values[_Y2 + j], values[_Y3 + j]
@@ -92,7 +92,7 @@ def start_in_middle(values: Any, j: int) -> None:
 
 @inlined_kernel
 def improve(values: Any, j: int, t: float) -> float:
-    """One Halley step from t."""
+    """The parameter after one Halley step from t."""
     rx, ry, vx, vy, hx, hy, kx, ky = _expand(values, j, t)
     return t + _halley_step(rx, ry, vx, vy, hx, hy, kx, ky)
 
@@ -130,7 +130,7 @@ def _halley_step(rx: float, ry: float, vx: float, vy: float, hx: float, hy: floa
 
 @inlined_kernel
 def solve(values: Any, slots: Any, j: int, t: float) -> None:
-    """A Newton step from t and the results; solved where the step is small and t belongs to the piece."""
+    """Make a Newton step from t and enter the results. A lane is solved where the step is small and t belongs to the piece."""
     rx, ry, vx, vy, half_x, half_y, _, _ = _expand(values, j, t)
     hx, hy = 2.0 * half_x, 2.0 * half_y
     g1 = fma(rx, hx, fma(ry, hy, fma(vx, vx, vy * vy)))
@@ -153,7 +153,7 @@ def solve(values: Any, slots: Any, j: int, t: float) -> None:
 
 @inlined_kernel
 def measure(values: Any, j: int, first: float, last: float, length: float) -> None:
-    """Parameter and arc length from the start of the curve; round-off at the seam leads out of neither range."""
+    """Enter the parameter and the arc length from the start of the curve, held in their ranges against round-off at the seam."""
     t = values[LANE_T + j]
     s = fma(values[_S7 + j], t, values[_S6 + j])
     s = fma(s, t, values[_S5 + j])
@@ -167,7 +167,7 @@ def measure(values: Any, j: int, first: float, last: float, length: float) -> No
 
 @inlined_kernel
 def store_block(values: Any, feet: Any, block: int, k: int) -> None:
-    """Results of all points of a block, solved or not."""
+    """Enter the results of all points of a block, solved or not."""
     end = block + k
     u, e, curvature, station = feet.parameter[block:end], feet.distance_mm[block:end], feet.curvature[block:end], feet.station_mm[block:end]
     foot, gradient = feet.foot_mm.reshape(-1)[2 * block : 2 * end], feet.gradient.reshape(-1)[2 * block : 2 * end]

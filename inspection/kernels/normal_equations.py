@@ -14,7 +14,7 @@ _SWEEPS = 12  # of Jacobi rotations; four or five suffice
 
 @kernel
 def newton_step(sums: Any, reach: float) -> tuple[float, float, float, float]:
-    """Shift and rotation to the least (weighted) mean square of the second-order model, and how far they move the farthest point.
+    """The shift (x, y) and rotation to the least mean square of the second-order model, and how far they move the farthest point.
 
     Full second derivative where it is positive definite, its Gauss-Newton part otherwise; motions that the points do not
     determine (a circle's rotation) are left alone.
@@ -37,7 +37,7 @@ def newton_step(sums: Any, reach: float) -> tuple[float, float, float, float]:
 
 @kernel
 def fill_covariance(sums: Any, reach: float, scatter: float, covariance: Any) -> None:
-    """Inverse of the normal matrix times the scatter; the reach as standard deviation of what is not determined."""
+    """Fill in the inverse of the normal matrix times the scatter. What is not determined gets the reach as its standard deviation."""
     matrix, values, vectors = np.empty((3, 3)), np.empty(3), np.empty((3, 3))
     _fill_normal_matrix(sums, 0.0, reach, matrix)
     _decompose(matrix, values, vectors)
@@ -54,7 +54,10 @@ def fill_covariance(sums: Any, reach: float, scatter: float, covariance: Any) ->
 
 @kernel
 def _fill_normal_matrix(sums: Any, bending: float, reach: float, matrix: Any) -> None:
-    """Normal matrix (3, 3), its rotation counted in mm at the farthest point; with or without the second derivative of e."""
+    """Fill in the normal matrix (3, 3), with the rotation counted in mm at the farthest point.
+
+    bending : 1.0 to add e times its second derivative, or 0.0
+    """
     place = 0
     for i in range(3):
         for j in range(i, 3):
@@ -66,9 +69,9 @@ def _fill_normal_matrix(sums: Any, bending: float, reach: float, matrix: Any) ->
 
 @kernel
 def _decompose(matrix: Any, values: Any, vectors: Any) -> None:
-    """Eigenvalues (3,) and eigenvectors, in columns, of a symmetric matrix, which is used up: Jacobi's rotations.
+    """Find the eigenvalues (3,) and eigenvectors, in columns, of a symmetric matrix by Jacobi's rotations. The matrix is used up.
 
-    Written out, because libraries for matrices differ in the last bits from processor to processor.
+    The method is written out because libraries for matrices differ in the last bits from processor to processor.
     """
     for i in range(3):
         for j in range(3):

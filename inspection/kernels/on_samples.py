@@ -89,7 +89,7 @@ def project_on_samples(points_mm: Array, grid: CurveTables, table: SampleTables,
 
 @kernel
 def project_points_on_samples(points: Any, tables: Any, feet: Any, claimed: Any) -> None:
-    """Projections of the points, chunk by chunk as claimed; feet hold the exact ones and take the new ones in their place."""
+    """Project the points chunk by chunk as they are claimed. Feet hold the exact results and take the new ones in their place."""
     samples, links, boxes, starts, domain, method = tables
     stack, foot = np.empty(STACK, dtype=np.int64), np.empty(FOOT_WIDTH)
     first = claim_chunk(claimed)
@@ -153,7 +153,7 @@ def _is_faced(ahead: float, site: int, links: Any) -> bool:
 
 @kernel
 def _take_sample(x: float, y: float, site: int, samples: Any, links: Any, foot: Any) -> None:
-    """The sample itself as the foot, signed by the sum of the normals that meet there."""
+    """Take the sample itself as the foot, its distance signed by the sum of the normals that meet there."""
     row, twin = SAMPLE_WIDTH * site, links[LINK_WIDTH * site + TWIN_SAMPLE]
     other = SAMPLE_WIDTH * (twin if twin >= 0 else site)
     nx, ny = samples[row + NORMAL_X] + samples[other + NORMAL_X], samples[row + NORMAL_Y] + samples[other + NORMAL_Y]
@@ -260,7 +260,7 @@ def _on_chords(x: float, y: float, site: int, samples: Any, links: Any) -> tuple
 
 @inlined_kernel
 def _complete(x: float, y: float, site: int, left: float, gx: float, gy: float, samples: Any, domain: Any, foot: Any) -> None:
-    """Complete a projection; the foot's arc length from the sample is that along the osculating circle."""
+    """Fill in the foot of a projection. Its arc length from the sample is that along the osculating circle."""
     row = SAMPLE_WIDTH * site
     foot_x, foot_y = x - left * gx, y - left * gy
     ahead, off = _in_frame(foot_x, foot_y, site, samples)

@@ -66,7 +66,7 @@ class PoseEstimate(NamedTuple):
 
 
 class OutlierLimit(NamedTuple):
-    """From where on a point is an outlier.
+    """The deviation from which on a point is an outlier.
 
     mads       : farther than so many median absolute deviations
     least_mm   : and farther than this, however small the deviations of the others are
@@ -92,14 +92,14 @@ class PoseFit:
         self._memory = (np.empty(2 * m), np.ones(m), np.empty(m), empty_feet(m))
 
     def settle(self, pose: tuple[float, float, float], most_steps: int) -> PoseEstimate:
-        """From a pose to the least mean square of the deviations, by at most so many steps."""
+        """Go from a pose to the least mean square of the deviations, by at most so many steps."""
         state, covariance = np.array([*pose, 0.0, 0.0, 0.0]), np.empty((3, 3))
         steps, settled = _settle_pose(self._problem, self._samples, self._memory, state, covariance, most_steps)
         angle, x, y, mean_square, _, _ = state.tolist()
         return PoseEstimate((angle, x, y), steps, settled, mean_square, state[4:], covariance)
 
     def find_outliers(self, pose: tuple[float, float, float], limit: OutlierLimit, most_steps: int) -> NDArray[np.bool_]:
-        """Points (m,) beyond the limit once the fit by Tukey's weights has settled."""
+        """Mark the points (m,) that are beyond the limit once the fit by Tukey's weights has settled."""
         found = np.zeros(len(self.weights), dtype=np.bool_)
         _find_outliers(self._problem, self._samples, self._memory, pose, limit, most_steps, found)
         return found
@@ -107,7 +107,7 @@ class PoseFit:
 
 @kernel
 def _settle_pose(problem: Any, samples: Any, memory: Any, state: Any, covariance: Any, most_steps: int) -> tuple[int, bool]:
-    """Full Newton steps where the second derivative allows, each halved until the mean square falls."""
+    """Make Newton steps, each halved until the mean square falls. Returns their number and whether the pose has settled."""
     points, weights, _, _, outward, tip = problem
     moved, takes_part, new_part, feet = memory
     span, pose, here, trial = _span(points), (state[0], state[1], state[2]), np.empty(SUMS), np.empty(SUMS)
@@ -148,7 +148,7 @@ def _leave_out_hovering(weights: Any, before: Any, after: Any) -> None:
 
 @kernel
 def _report(sums: Any, pose: Any, span: Any, state: Any, covariance: Any) -> None:
-    """The pose, the mean square of the deviations, the centre of the points, and the covariance."""
+    """Fill in the state (6,): the pose, the mean square of the deviations, the centre of the points; and the covariance."""
     state[0], state[1], state[2] = pose
     state[3] = sums[SQUARE] / sums[COUNT] if sums[COUNT] > 0.0 else np.inf
     state[4], state[5] = _centre(pose, span)
@@ -157,7 +157,7 @@ def _report(sums: Any, pose: Any, span: Any, state: Any, covariance: Any) -> Non
 
 @kernel
 def _find_outliers(problem: Any, samples: Any, memory: Any, pose: Any, wanted: Any, most_steps: int, found: Any) -> None:
-    """Weighted steps; the weights follow from the deviations at every pose."""
+    """Make weighted steps, the weights following from the deviations at every pose, and mark the points beyond the limit."""
     points, weights, _, _, outward, tip = problem
     moved, takes_part, off, feet = memory
     span, sums, m = _span(points), np.empty(SUMS), len(weights)
@@ -215,7 +215,7 @@ def _move_pose(pose: Any, span: Any, step: Any, share: float) -> tuple[float, fl
 
 @kernel
 def _evaluate(problem: Any, samples: Any, pose: Any, span: Any, moved: Any, before: Any, takes_part: Any, feet: Any, sums: Any) -> None:
-    """Points at a pose: moved there, their feet, and the sums over them.
+    """Move the points to a pose, project them, and add up the sums over them.
 
     samples : tables and number of a method that looks at samples only, or None for the exact feet
     """
@@ -235,7 +235,7 @@ def _evaluate(problem: Any, samples: Any, pose: Any, span: Any, moved: Any, befo
 def _add_up(
     weights: Any, before: Any, takes_part: Any, outward: float, tip: float, pose: Any, span: Any, moved: Any, feet: Any, sums: Any
 ) -> None:
-    """The sums, in columns of their own for every place in a block, so that the loop vectorises, and always in the same order."""
+    """Add up the sums, always in the same order: first for each place in a block, so that the loop vectorises, then in halves."""
     lanes = array_at(stack_reals(), REALS)
     for i in range(SUMS * BLOCK):
         lanes[i] = 0.0
@@ -274,7 +274,10 @@ def _add_point(
     y0: float,
     j: int,
 ) -> None:
-    """Tangent distance plus curvature: e(p) = e + J p + p' H p / 2, with the curvature of the distance field across its gradient."""
+    """Add a point to the sums: tangent distance plus curvature, e(p) = e + J p + p' H p / 2.
+
+    H is the curvature of the distance field across its gradient.
+    """
     field = outward * distance[j]
     e = field - tip
     gx, gy = outward * gradient[2 * j], outward * gradient[2 * j + 1]

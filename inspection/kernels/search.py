@@ -61,7 +61,7 @@ _FINEST = 26  # halvings of a piece, after which an interval is a point
 
 @kernel
 def search_curve(x: float, y: float, reals: Any, integers: Any, foot: Any, stack: Any) -> None:
-    """Closest point of the whole curve by branch and bound over its pieces, into foot (FOOT_WIDTH,)."""
+    """Find the closest point of the whole curve by branch and bound over its pieces, and write it into foot (FOOT_WIDTH,)."""
     if not (np.isfinite(x) and np.isfinite(y)):
         foot[:] = np.nan
         foot[FOOT_VERTEX] = INSIDE
@@ -198,7 +198,7 @@ def _monotone_root(pieces: Any, row: int, x: float, y: float, low: float, high: 
 
 @kernel
 def _finish_foot(x: float, y: float, piece: int, t: float, reals: Any, integers: Any, foot: Any) -> None:
-    """Results for the foot at t of a piece, or for the vertex at its end."""
+    """Fill in the results for the foot at t of a piece, or for the vertex at its end."""
     pieces, vertices, links = reals[integers[PIECES_AT] :], reals[integers[VERTICES_AT] :], integers[integers[LINKS_AT] :]
     row = PIECE_WIDTH * piece
     rx, ry, vx, vy, hx, hy, _, _ = derivatives_at(pieces, row, x, y, t)
@@ -225,7 +225,7 @@ def _finish_foot(x: float, y: float, piece: int, t: float, reals: Any, integers:
 
 @kernel
 def finish_vertex(x: float, y: float, vertices: Any, row: int, grain: float, foot: Any) -> None:
-    """Results for a vertex as the foot: the distance is signed by the side of its pseudo-normal on which the place lies."""
+    """Fill in the results for a vertex as the foot. The distance is signed by the side of its pseudo-normal on which the place lies."""
     dx, dy = x - vertices[row + VERTEX_X], y - vertices[row + VERTEX_Y]
     nx, ny = vertices[row + VERTEX_NORMAL_X], vertices[row + VERTEX_NORMAL_Y]
     distance = np.sqrt(dx * dx + dy * dy)
