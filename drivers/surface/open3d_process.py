@@ -260,7 +260,7 @@ def serve() -> None:
     pipe_in, pipe_out = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what libraries print must not get among the answers
     try:
-        open3d = _load()
+        open3d = load_open3d()
     except Exception as error:
         installed = importlib.util.find_spec("open3d") is not None
         _send(pipe_out, {"error": str(error), "installed": installed, "missing": _missing_libraries()}, [])
@@ -272,7 +272,7 @@ def serve() -> None:
         _send(pipe_out, answer, results)
 
 
-def _load() -> ModuleType:
+def load_open3d() -> ModuleType:
     """Import Open3D, with the libusb of the package index loaded first: pip installs none that the loader would find."""
     if sys.platform == "linux" and importlib.util.find_spec("libusb_package") is not None:
         import libusb_package  # noqa: PLC0415 - only the child loads it

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.surface.cut import NumpyCutter, cut_surface, height_range_mm
-from drivers.surface.open3d_process import Open3DProcess, _load
+from drivers.surface.open3d_process import Open3DProcess, load_open3d
 from drivers.surface.stl_file import RECORD, read_stl
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -51,7 +51,7 @@ def blade(path: Path, around: int, along: int, seed: int = 1) -> Path:
 
 def role_open3d(path: Path, normal: NDArray[np.float64], heights: list[float]) -> dict[str, object]:
     """Open3D alone: its reader, one slice_plane for all planes. Nothing is chained."""
-    open3d = _load()
+    open3d = load_open3d()
     start = time.perf_counter()
     mesh = open3d.t.io.read_triangle_mesh(str(path))
     loaded = time.perf_counter()

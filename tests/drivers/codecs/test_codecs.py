@@ -3,18 +3,12 @@ import pytest
 from drivers.codecs import decoder, decoders
 from drivers.codecs.ascii_frames import AsciiDecoder
 from drivers.codecs.riftek_frames import RiftekDecoder
-from simulators import known_devices
 
 
 def test_every_format_is_found_by_its_name() -> None:
     assert set(decoders()) >= {"ascii", "binary", "optoncdt", "riftek", "riftek-ascii"}
     assert isinstance(decoder("ascii"), AsciiDecoder)
     assert isinstance(decoder("riftek", range_mm=50.0, rate_hz=1000.0), RiftekDecoder)
-
-
-def test_every_simulated_device_is_found_by_its_name() -> None:
-    streams = {"serial", "binary", "binary-block", "optoncdt", "riftek", "riftek-ascii"}
-    assert set(known_devices()) >= streams | {"riftek-modbus", "modbus-ring", "modbus-fifo", "gocator"}
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,9 @@
 """Open3D in its own process: found or not found, alive or gone, and its files good or bad."""
 
+import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -69,15 +71,24 @@ def test_a_process_that_ends_at_once_is_a_status_and_an_error_not_a_hang() -> No
             process.cut(CUBE)
 
 
-def test_a_process_that_was_killed_is_started_again(open3d: Open3DProcess) -> None:
+def test_a_process_that_was_killed_is_started_again(open3d: Open3DProcess, monkeypatch: pytest.MonkeyPatch) -> None:
+    children: list[subprocess.Popen[bytes]] = []
+
+    def start(*arguments: Any, **options: Any) -> subprocess.Popen[bytes]:
+        children.append(popen(*arguments, **options))
+        return children[-1]
+
+    popen = subprocess.Popen
+    monkeypatch.setattr(subprocess, "Popen", start)
     with Open3DProcess() as process:
         name = process.name
         above = CUBE - [0, 0, 5.0]
         segments = process.cut(above[above[:, :, 2].min(axis=1) < 0])
-        process._child.kill()
-        process._child.wait()
+        children[0].kill()
+        children[0].wait()
         assert np.array_equal(process.cut(above[above[:, :, 2].min(axis=1) < 0]), segments)
         assert process.name == name
+        assert len(children) == 2
 
 
 def test_a_library_that_cannot_be_loaded_is_told_with_its_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
