@@ -4,6 +4,7 @@ The walk: compile what the inspection needs, open the record, hand the device's 
 result to the record. Nothing is printed, shown or written but the record; whoever wants to follow the run gives sinks.
 """
 
+import logging
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -15,11 +16,14 @@ from typing import Any
 from cmmlink.devices import Connected
 from cmmlink.events import RunStarted, Sink
 from cmmlink.from_plan import inspection_of, run_started
+from cmmlink.log import log_event
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan import Plan
 from cmmlink.record import Recorder, RecordReference, RunInputs, open_to_record
 from cmmlink.result_json import identity_json, result_json
 from inspection import NominalProfile, rehearse
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,6 +79,9 @@ def carry_out(
         if records is not None:
             store = stack.enter_context(open_to_record(records, now))
             recorder = stack.enter_context(Recorder(store, RunInputs.of(plan), clock=clock, now=now))
-        listeners: list[Sink] = [*([recorder] if recorder else []), *sinks]
+        listeners: list[Sink] = [*([recorder] if recorder else []), *sinks, log_event]
         outcome = run_inspection(device.source, live, listeners, started, buffer_points=plan.buffer_points, clock=clock, stop=stop)
-    return FinishedRun(profile, started, outcome, recorder.evidence if recorder else None)
+    evidence = recorder.evidence if recorder else None
+    if evidence is not None:
+        _log.info("recorded in %s as run %s, chain %s, plan %s", records, evidence.run, evidence.chain_sha256, evidence.plan_sha256)
+    return FinishedRun(profile, started, outcome, evidence)

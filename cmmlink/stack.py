@@ -4,6 +4,7 @@ Surface -> slices -> a contour source each -> the pipeline -> verdicts. The outl
 where that is open, all open pieces together. What lies beside it is counted and told, never judged in silence.
 """
 
+import logging
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
@@ -36,6 +37,8 @@ from drivers.surface import (
     read_stl,
 )
 from inspection import NominalProfile, RegistrationError, SectionPlane, Verdict
+
+_log = logging.getLogger(__name__)
 
 _FEW_SECTIONS = 50  # up to here Open3D costs less than half a second; numpy gives the same points, a stack of 200 twice as fast
 _MOST_SECTIONS = 100_000
@@ -147,7 +150,9 @@ def inspect_stack(
                 break
     if all(section.run.result is None for section in sections) and sections[0].run.refusal is not None:
         raise sections[0].run.refusal
-    return StackOutcome(mesh, tuple(sections), len(heights), tuple(notes))
+    outcome = StackOutcome(mesh, tuple(sections), len(heights), tuple(notes))
+    _log.info("%s: %s, %d of %d sections. %s", surface_words(plan), outcome.verdict.word, len(sections), len(heights), "; ".join(notes))
+    return outcome
 
 
 class _Open3D:

@@ -9,7 +9,7 @@ from inspection.curve import NurbsCurve
 from inspection.deviations import Deviations, deviations, profile_error_mm
 from inspection.errors import InspectionError, NominalError, RegistrationError
 from inspection.fine import register, register_fine
-from inspection.kernels import while_compiling
+from inspection.kernels import compiled_code_folder, while_compiling
 from inspection.live import LiveInspection, LiveUpdate, State, rehearse
 from inspection.methods import Method
 from inspection.minimum_zone import MinimumZone, fit_minimum_zone
@@ -45,6 +45,7 @@ __all__ = [
     "Stretch",
     "ToleranceZone",
     "Verdict",
+    "compiled_code_folder",
     "coverage",
     "deviations",
     "discretize",

@@ -4,6 +4,7 @@
 """
 
 import io
+import logging
 import os
 import sys
 import traceback
@@ -19,9 +20,12 @@ from cmmlink.commands.records import export, replay, runs, show, verify
 from cmmlink.commands.setup import check, doctor, list_ports, nominal, simulate
 from cmmlink.commands.surfaces import ManyHeights, ct
 from cmmlink.errors import PlanError, RunError, StoreError
+from cmmlink.log import keep_log, log_command, log_folder
 from cmmlink.version import __version__
 from drivers import DeviceError, MeshError, PointFileError
 from inspection import InspectionError, while_compiling
+
+_log = logging.getLogger(__name__)
 
 app = typer.Typer(
     add_completion=False,
@@ -66,6 +70,16 @@ def cmmlink(
 def main() -> None:
     """Run the command line; every error a user can cause ends as one message and an exit code."""
     _prepare_streams()
+    with keep_log(log_folder()):
+        log_command(sys.argv[1:])
+        code = _run_command()
+        _log.info("exit status %s", code or 0)
+    sys.exit(code or 0)
+
+
+def _run_command() -> int | str | None:
+    """Run the command of the command line; its exit status."""
+    code: int | str | None
     try:
         with while_compiling(_say_that_it_compiles):
             code = app(prog_name="cmmlink", standalone_mode=False)
@@ -88,7 +102,7 @@ def main() -> None:
     except Exception as error:  # likewise a defect must not end with 1
         traceback.print_exc()
         code = fail(f"a defect of cmmlink, please report it: {error}", UNUSABLE)
-    sys.exit(code or 0)
+    return code
 
 
 def _prepare_streams() -> None:

@@ -1,5 +1,6 @@
 """What a command's exit status says, and the one line on standard error that goes with a failure."""
 
+import logging
 import sys
 
 from inspection import Verdict
@@ -9,7 +10,11 @@ UNUSABLE, DEVICE_FAILED, NO_RECORD = 2, 4, 5
 STOPPED = 130  # Ctrl-C outside a run, as shells and typer have it
 
 
+_log = logging.getLogger(__name__)
+
+
 def fail(message: str, code: int) -> int:
-    """Write a message to standard error; returns the code."""
+    """Write a message to standard error, and with the error that is being handled to the log; returns the code."""
+    _log.error("%s", message, exc_info=sys.exc_info()[0] is not None)
     sys.stderr.write(f"cmmlink: {message}\n")
     return code

@@ -3,6 +3,7 @@
 import os
 import platform
 import textwrap
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,15 +11,15 @@ import typer
 
 from cmmlink.commands.exit_codes import UNUSABLE
 from cmmlink.commands.open3d_doctor import look_after_open3d
-from cmmlink.commands.options import Closed, Json, PlanFile
-from cmmlink.commands.output import print_json
+from cmmlink.commands.options import Closed, Json, PlanFile, Records, records_folder
+from cmmlink.commands.output import now, print_json
+from cmmlink.commands.support_bundle import pack_bundle
 from cmmlink.demo import plan_file as demo_plan_file
 from cmmlink.devices import serial_ports, source_of, words_of
 from cmmlink.errors import PlanError
 from cmmlink.from_plan import check_plan, name_place, profile_of
 from cmmlink.nominal_files import NominalFile, load_nominal, material_side
 from cmmlink.plan import load_plan
-from cmmlink.record import default_folder
 from cmmlink.version import __version__
 from drivers import LinkError
 from inspection import rehearse
@@ -72,17 +73,37 @@ def check(plan_file: PlanFile) -> int:
     return 0
 
 
-def doctor() -> int:
+def doctor(
+    bundle: Annotated[
+        Path | None, typer.Option("--bundle", metavar="FILE", help="Pack log, versions and the newest run into this zip file, to be sent.")
+    ] = None,
+    records: Records = None,
+) -> int:
     """Look at what cmmlink needs of this computer, and mend or name what is missing."""
-    typer.echo(f"cmmlink {__version__} on Python {platform.python_version()}, {platform.system()} {platform.machine()}")
+    said: list[str] = []
+
+    def say(text: str) -> None:
+        said.append(text)
+        typer.echo(text)
+
+    try:
+        return _look_after_all(say, records)
+    finally:
+        if bundle is not None:  # also where something is so wrong that the look breaks off
+            for line in pack_bundle(bundle, said, records_folder(records), now):
+                typer.echo(line)
+
+
+def _look_after_all(say: Callable[[str], None], records: Path | None) -> int:
+    say(f"cmmlink {__version__} on Python {platform.python_version()}, {platform.system()} {platform.machine()}")
     rehearse(profile_of(load_plan(demo_plan_file())))
-    typer.echo("inspection: compiled and working")
-    folder = default_folder()
+    say("inspection: compiled and working")
+    folder = records_folder(records)
     nearest = next(path for path in (folder, *folder.parents) if path.exists())
     writable = os.access(nearest, os.W_OK)
-    typer.echo(f"records: {folder}" + ("" if writable else f" cannot be written: choose another folder with --records ({nearest})"))
-    typer.echo(f"serial ports: {', '.join(name for name, _ in serial_ports()) or 'none found'}")
-    whole = look_after_open3d(typer.echo)
+    say(f"records: {folder}" + ("" if writable else f" cannot be written: choose another folder with --records ({nearest})"))
+    say(f"serial ports: {', '.join(name for name, _ in serial_ports()) or 'none found'}")
+    whole = look_after_open3d(say)
     return 0 if whole and writable else UNUSABLE
 
 

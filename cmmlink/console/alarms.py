@@ -1,5 +1,6 @@
 """What went wrong and who has seen it: alarms of a station, each counted up instead of repeated."""
 
+import logging
 import threading
 from collections.abc import Callable
 from dataclasses import replace
@@ -9,6 +10,8 @@ from itertools import islice
 from cmmlink.console.protocol import AlarmList, AlarmRow, Severity
 from cmmlink.events import Arrived, Event, Judged, RunFinished, RunStarted
 from drivers import Damaged, LinkDown, LinkUp, Lost, Rejected
+
+_log = logging.getLogger(__name__)
 
 _MOST_KEPT = 200  # the oldest acknowledged ones go first
 _MOST_SHOWN = 50
@@ -58,6 +61,7 @@ class Alarms:
                 self._alarms[known] = replace(alarm, count=alarm.count + count, active=active, acknowledged=seen)
             else:
                 self._number += 1
+                _log.log(logging.ERROR if severity == "fault" else logging.WARNING, "alarm %d: %s: %s", self._number, what, detail)
                 self._of_this_run[(what, detail)] = self._number
                 since = self._now().strftime("%H:%M:%S")
                 self._alarms[self._number] = AlarmRow(self._number, severity, what, detail, count, since, active, False)

@@ -1,5 +1,6 @@
 """What a run or a replay of the station does in its own thread. Whatever goes wrong becomes an alarm, never silence."""
 
+import logging
 from collections.abc import Callable
 
 from cmmlink.console.alarms import Alarms
@@ -11,6 +12,8 @@ from cmmlink.events import Event, Sink
 from cmmlink.run import carry_out
 from cmmlink.run_view import RunView
 from drivers import DeviceError
+
+_log = logging.getLogger(__name__)
 
 
 def raise_alarms(job: Job, view: RunView, alarms: Alarms, work: Callable[[], None]) -> None:
@@ -28,6 +31,7 @@ def raise_alarms(job: Job, view: RunView, alarms: Alarms, work: Callable[[], Non
 
 
 def _break_off(job: Job, view: RunView, alarms: Alarms, what: str, error: Exception) -> None:
+    _log.error("%s: %s", what, error, exc_info=error)
     job.failure = error
     view.fail(f"{what}: {error}")
     alarms.raise_alarm("fault", what, str(error))

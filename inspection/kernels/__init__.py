@@ -8,7 +8,7 @@ What the rest of the project may call stands here; the files behind it are this 
 """
 
 from inspection.kernels.blocks import CurveTables, project
-from inspection.kernels.compiling import while_compiling
+from inspection.kernels.compiling import compiled_code_folder, while_compiling
 from inspection.kernels.feet import Feet
 from inspection.kernels.growing import GrowingSums
 from inspection.kernels.layout import SAMPLE_METHODS
@@ -28,6 +28,7 @@ __all__ = [
     "PoseFit",
     "RowArrays",
     "SampleTables",
+    "compiled_code_folder",
     "judge_rows",
     "project",
     "project_on_samples",

@@ -53,6 +53,11 @@ def _code_kept_in_stamped_folder() -> Iterator[None]:
         config.CACHE_DIR = chosen
 
 
+def compiled_code_folder() -> Path | None:
+    """Where compiled code is kept from one process to the next; None where it is not, and every process compiles anew."""
+    return _folder(_stamp(), config.CACHE_DIR) if _stamp() else None
+
+
 @cache
 def _stamp() -> str:
     return stamp_of(Path(__file__).parent)
