@@ -115,7 +115,7 @@ class Injector:
             self._without_value[index] = self._strikes("sentinel", index)
         return self._without_value[index]
 
-    def stored_at(self, index: int) -> list[int]:
+    def points_stored_at(self, index: int) -> list[int]:
         """Return which points, by their numbers, are stored when this one is taken: none, it, or it twice, or it and one held back."""
         stored = self.pass_on(index, index.to_bytes(8, "big"))
         return [int.from_bytes(stored[at : at + 8], "big") for at in range(0, len(stored), 8)]

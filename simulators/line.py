@@ -19,7 +19,7 @@ class Line(Protocol):
 
     address: str
 
-    def connected(self) -> bool:
+    def is_connected(self) -> bool:
         """Take a new client if one is waiting, and tell whether there is one."""
 
     def send(self, data: bytes) -> bool:
@@ -57,7 +57,7 @@ class TcpLine:
         self._host_port = (host, int(self._server.getsockname()[1]))
         self.address = f"{host}:{self._host_port[1]}"
 
-    def connected(self) -> bool:
+    def is_connected(self) -> bool:
         """Take a new client if one is waiting, and tell whether there is one."""
         if self._client is None and self._server.fileno() >= 0 and select.select([self._server], [], [], 0)[0]:
             self._client = self._server.accept()[0]
@@ -127,7 +127,7 @@ class PtyLine:
         self._master: int | None = None
         self.plug()
 
-    def connected(self) -> bool:
+    def is_connected(self) -> bool:
         """Tell whether a client holds the other end."""
         if sys.platform == "win32" or self._master is None:
             return False
@@ -138,18 +138,18 @@ class PtyLine:
     def send(self, data: bytes) -> bool:
         """Send all, waiting while the client is slow; return False if the client is gone."""
         view = memoryview(data)
-        while view and self._master is not None and self.connected():
+        while view and self._master is not None and self.is_connected():
             if not select.select([], [self._master], [], POLL_S)[1]:
                 continue
             try:
                 view = view[os.write(self._master, view) :]
             except BlockingIOError:
                 continue
-        return self.connected()
+        return self.is_connected()
 
     def receive(self, wait_s: float) -> bytes:
         """Return what the client sent, at the latest after `wait_s`."""
-        if self._master is None or not self.connected():
+        if self._master is None or not self.is_connected():
             time.sleep(wait_s)
             return b""
         if not select.select([self._master], [], [], wait_s)[0]:

@@ -60,7 +60,7 @@ class RegisterDevice:
         """Let the points up to `taken` happen."""
         self.taken = taken
 
-    def appearing(self, function: int, address: int, count: int) -> int:
+    def points_appearing(self, function: int, address: int, count: int) -> int:
         """Return how many points appear at this access when the scan is not paced: as many as the client will fetch."""
         return 1
 
@@ -68,7 +68,7 @@ class RegisterDevice:
         """Return the registers; reading may change the device."""
         raise NotImplementedError
 
-    def fifo(self, address: int) -> Words:
+    def take_fifo(self, address: int) -> Words:
         """Return and forget up to 31 registers."""
         raise NotImplementedError
 
@@ -164,7 +164,7 @@ class _Service:
 
     async def _fifo(self, address: int) -> list[int]:
         await self._let_time_pass(READ_FIFO, address, 0)
-        return [int(register) for register in self._device.fifo(address)]
+        return [int(register) for register in self._device.take_fifo(address)]
 
     async def _let_time_pass(self, function: int, address: int, count: int) -> None:
         if self._away_s is not None:
@@ -178,7 +178,7 @@ class _Service:
             await asyncio.sleep(slow_s)
         self._device.heartbeat = (self._device.heartbeat + 1) % 65536
         if time.monotonic() >= self._stalled_until_s:
-            self._advance(self._device.appearing(function, address, count))
+            self._advance(self._device.points_appearing(function, address, count))
 
     def _advance(self, appearing: int) -> None:
         assert self._began_s is not None

@@ -113,7 +113,7 @@ class _Scan:
                 self._unplugged = False
             self._listen(TICK_S if self._paced else 0.0)
         self._send(self._injector.release())
-        self._wait_until(self._line.connected)
+        self._wait_until(self._line.is_connected)
         self._send(self._device.closing(count))
 
     def _begin(self) -> float:
@@ -132,7 +132,7 @@ class _Scan:
 
     def take_leave(self) -> None:
         """Keep the line up until the client has gone, so that the last bytes are not lost with it."""
-        self._wait_until(lambda: not self._line.connected())
+        self._wait_until(lambda: not self._line.is_connected())
 
     def _wait_until(self, met: Callable[[], bool]) -> None:
         end_s = time.monotonic() + FAREWELL_S
@@ -156,7 +156,7 @@ class _Scan:
 
     def _send(self, data: bytes) -> None:
         if data:
-            self._line.connected()
+            self._line.is_connected()
             self._line.send(self._injector.damage(data))
 
     def _trouble(self, index: int) -> float:
@@ -197,7 +197,7 @@ class _Scan:
     def _wait_for_client(self) -> None:
         begin_s = math.inf
         while not self._device.told_to_begin() and time.monotonic() < begin_s:
-            if not self._line.connected():
+            if not self._line.is_connected():
                 begin_s = math.inf
             elif begin_s == math.inf:
                 begin_s = time.monotonic() + IMPATIENCE_S

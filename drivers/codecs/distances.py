@@ -54,19 +54,20 @@ class Distances:
         """
         if self.closed:
             return
-        self.out.append_loss(lost, self._gap)
+        if lost:
+            self.out.append_loss(lost, self._gap)
         if distance_mm is not None:
-            step_mm = 0.0 if self._before_mm is None else abs(distance_mm - self._before_mm)
-            if not refusal and step_mm > self._largest_step_mm:
+            before_mm, self._before_mm = self._before_mm, distance_mm
+            if not refusal and before_mm is not None and abs(distance_mm - before_mm) > self._largest_step_mm:
                 refusal = JUMP
-            self._before_mm = distance_mm
         if refusal:
             self.out.append(Rejected(1, refusal))
         else:
             self._numbers.append(number)
             self._readings.append(reading)
             self._distances_mm.append(distance_mm if distance_mm is not None else 0.0)
-        self.expected = max(self.expected, number + 1)
+        if number >= self.expected:  # a late one moves nothing
+            self.expected = number + 1
         if self._count is not None and self.expected >= self._count:
             self.out.append(ScanClosed(None))
             self.closed = True
@@ -75,7 +76,7 @@ class Distances:
         """Return how many distances, at most `most`, `take_many` may take: those that do not end the scan."""
         return most if self._count is None else min(most, int(self._count) - 1 - self.expected)
 
-    def steady(self, distance_mm: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def are_steady(self, distance_mm: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Tell of each of (m,) consecutive distances whether it does not jump from the one before it."""
         before_mm = distance_mm[0] if self._before_mm is None else self._before_mm
         return np.asarray(np.abs(np.diff(distance_mm, prepend=before_mm)) <= self._largest_step_mm)

@@ -141,7 +141,7 @@ class OptoncdtDecoder:
             return 0
         blocks = self._block_of(values.T)
         distance_mm = self._distance_mm(np.asarray(blocks.distance, dtype=np.float64))
-        good = self._are_next(blocks) & blocks.is_in_range() & self._distances.steady(distance_mm)
+        good = self._are_next(blocks) & blocks.is_in_range() & self._distances.are_steady(distance_mm)
         count = len(good) if good.all() else int(good.argmin())
         if count:
             self._distances.take_many(np.asarray(blocks.ticks)[:count], distance_mm[:count])

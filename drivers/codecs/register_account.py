@@ -101,7 +101,7 @@ class RegisterAccount:
     def hand_over(self, values: Columns, numbers: NDArray[np.int64]) -> None:
         """Hand over the points that are no repetitions and that the device does not mark invalid."""
         usable = numbers >= 0
-        usable[usable] = ~self._invalid({name: column[usable] for name, column in values.items()}, int(usable.sum()))
+        usable[usable] = ~self._find_invalid({name: column[usable] for name, column in values.items()}, int(usable.sum()))
         if usable.any():
             self._out.append(PointBatch(numbers[usable], self._seconds(values, usable), self._points_mm(values, usable)))
         if self._count is not None and self._first is not None and self._counter.expected - self._first >= self._count:
@@ -132,7 +132,7 @@ class RegisterAccount:
         self._out.append_loss(place.lost)
         return place.sequence
 
-    def _invalid(self, values: Columns, count: int) -> NDArray[np.bool_]:
+    def _find_invalid(self, values: Columns, count: int) -> NDArray[np.bool_]:
         """Tell which of `count` points the device marks invalid, and count them by their reasons."""
         invalid = np.zeros(count, dtype=np.bool_)
         for name, column in values.items():

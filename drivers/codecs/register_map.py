@@ -246,7 +246,7 @@ class Entries:
     values: dict[str, NDArray[np.generic]]
     sound: NDArray[np.bool_]
 
-    def first(self, count: int) -> "Entries":
+    def head(self, count: int) -> "Entries":
         """Return the first `count` entries."""
         return Entries({name: column[:count] for name, column in self.values.items()}, self.sound[:count])
 

@@ -135,9 +135,9 @@ class Ring(Pattern):
 
     def take_points(self, read: Entries) -> None:
         """Take the points up to a damaged one, which is read again."""
-        place, taken = self._read_so_far, self._worth_taking(read.sound)
+        place, taken = self._read_so_far, self._count_worth_taking(read.sound)
         self._read_so_far += taken
-        part = read.first(taken)
+        part = read.head(taken)
         self._account.hear_overflow("points", part)
         self._count_damage(read.sound)
         values = {name: column[part.sound] for name, column in part.values.items()}
@@ -154,7 +154,7 @@ class Ring(Pattern):
         count = min(self._written - self._read_so_far, block.entries - place, room)
         return read_request(self._function, block.at + place * block.size, count * block.size)
 
-    def _worth_taking(self, sound: NDArray[np.bool_]) -> int:
+    def _count_worth_taking(self, sound: NDArray[np.bool_]) -> int:
         """Return how many points to take: up to a damaged one, which is read again, but not for ever."""
         self._rereads = 0 if sound.all() else self._rereads + 1
         if 0 < self._rereads < PATIENCE:

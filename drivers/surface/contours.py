@@ -71,10 +71,10 @@ def chain_sections(
     edges = ends if moved.all() else ends[moved]
     degree = np.bincount(edges.ravel(), minlength=len(nodes_mm))
     if np.any(degree > 2):  # what comes twice shows as a branch, or as two nodes and nothing else (left out in _order)
-        edges = _distinct(edges, len(nodes_mm))
+        edges = _drop_repeats(edges, len(nodes_mm))
         degree = np.bincount(edges.ravel(), minlength=len(nodes_mm))
     if np.any(degree == 1):
-        edges = _distinct(_join_ends(nodes_mm, plane_of, edges, weld_mm), len(nodes_mm))
+        edges = _drop_repeats(_join_ends(nodes_mm, plane_of, edges, weld_mm), len(nodes_mm))
         degree = np.bincount(edges.ravel(), minlength=len(nodes_mm))
     branches = np.flatnonzero(degree > 2)
     pieces = _order(_split_branches(_Graph(nodes_mm, plane_of, edges), degree), planes, shortest_mm)
@@ -119,7 +119,7 @@ def _weld(
     return nodes_mm, sections[first], node.reshape(-1, 2)
 
 
-def _distinct(ends: NDArray[np.intp], nodes: int) -> NDArray[np.intp]:
+def _drop_repeats(ends: NDArray[np.intp], nodes: int) -> NDArray[np.intp]:
     """Take every node pair once, (e, 2)."""
     key = np.unique(ends.min(axis=1) * nodes + ends.max(axis=1))
     return np.column_stack(np.divmod(key, max(nodes, 1)))

@@ -32,13 +32,13 @@ class Gocator(RegisterDevice):
         """Queue the messages up to `taken`."""
         dropped = self.injector.strike("overflow", taken)
         for index in range(self.taken, taken):
-            self._queue += self.injector.stored_at(index)
+            self._queue += self.injector.points_stored_at(index)
         if dropped or len(self._queue) > QUEUE:
             self.overflow = 1
             self._queue = self._queue[: max(0, min(QUEUE, len(self._queue) - int(dropped or 0)))]
         self.taken = taken
 
-    def appearing(self, function: int, address: int, count: int) -> int:
+    def points_appearing(self, function: int, address: int, count: int) -> int:
         """Let one message appear for each one taken."""
         return int(address <= STAMP_AT < address + count)
 

@@ -37,7 +37,7 @@ class RingDevice(RegisterDevice):
         """Write the points up to `taken`, but those the device drops."""
         dropped = self.injector.strike("overflow", taken)
         for index in range(self.taken, taken):
-            for number in self.injector.stored_at(index):
+            for number in self.injector.points_stored_at(index):
                 self.ring[len(self.stored) % ENTRIES] = self.entries[number]
                 self.stored.append(number)
         if dropped:
@@ -45,7 +45,7 @@ class RingDevice(RegisterDevice):
             del self.stored[-int(dropped) :]
         self.taken = taken
 
-    def appearing(self, function: int, address: int, count: int) -> int:
+    def points_appearing(self, function: int, address: int, count: int) -> int:
         """Let points appear when the status is read, not while the ring is."""
         return 40 if address == 0 else 0
 
@@ -91,11 +91,11 @@ class FifoDevice(RingDevice):
         super().__init__(scan, injector, swapped)
         self._handed_over = 0
 
-    def appearing(self, function: int, address: int, count: int) -> int:
+    def points_appearing(self, function: int, address: int, count: int) -> int:
         """Let as many points appear as one request hands over."""
         return FIFO_MOST // 10 if function == READ_FIFO else 0
 
-    def fifo(self, address: int) -> Words:
+    def take_fifo(self, address: int) -> Words:
         """Hand over the oldest points; those that found no room are lost."""
         if address != FIFO_AT:
             return np.zeros(0, dtype=np.uint16)

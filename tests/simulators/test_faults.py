@@ -10,7 +10,7 @@ DATA = bytes(range(256)) * 400
 
 def frames(injector: Injector, count: int) -> list[int]:
     """The numbers in the order in which they go out."""
-    sent = [number for index in range(count) for number in injector.stored_at(index)]
+    sent = [number for index in range(count) for number in injector.points_stored_at(index)]
     held = injector.release()
     return [*sent, int.from_bytes(held, "big")] if held else sent
 

@@ -48,9 +48,9 @@ def line(request: pytest.FixtureRequest) -> Iterator[Line]:
 def until(line: Line, connected: bool) -> None:
     """Look, as the engine does between two points, until the line has noticed."""
     end_s = time.monotonic() + 10.0
-    while line.connected() != connected and time.monotonic() < end_s:
+    while line.is_connected() != connected and time.monotonic() < end_s:
         line.receive(0.01)
-    assert line.connected() == connected
+    assert line.is_connected() == connected
 
 
 def test_bytes_go_both_ways(line: Line) -> None:

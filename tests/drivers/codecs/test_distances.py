@@ -56,7 +56,7 @@ def test_many_at_once_are_the_same_as_one_by_one(many: bool) -> None:
     scan = distances(count=150, largest_step_mm=0.25)
     at = 0
     while at < len(distance_mm):
-        good = scan.steady(distance_mm[at:]) if many else np.zeros(1, dtype=bool)
+        good = scan.are_steady(distance_mm[at:]) if many else np.zeros(1, dtype=bool)
         run = scan.room(len(good) if good.all() else int(good.argmin())) if not scan.closed else 0
         if run:
             scan.take_many(readings[at : at + run], distance_mm[at : at + run])

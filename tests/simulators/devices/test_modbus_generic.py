@@ -61,16 +61,16 @@ def test_faults_of_registers_show_in_the_registers() -> None:
 def test_the_queue_hands_its_oldest_points_over_once() -> None:
     device = FifoDevice(walk(), Injector([], seed=1), swapped=False)
     device.take(3)
-    handed = device.fifo(100).tolist()
+    handed = device.take_fifo(100).tolist()
     assert len(handed) == 30
     assert handed[:10] == sealed(ENTRY_0)
-    assert device.fifo(100).tolist() == []
-    assert device.fifo(7).tolist() == []
+    assert device.take_fifo(100).tolist() == []
+    assert device.take_fifo(7).tolist() == []
 
 
 @pytest.mark.parametrize(("waiting", "first"), [(FIFO_DEPTH, 0), (FIFO_DEPTH + 5, 5)])
 def test_points_that_found_no_room_in_the_queue_are_lost_and_told(waiting: int, first: int) -> None:
     device = FifoDevice(walk(np.zeros((400, 3))), Injector([], seed=1), swapped=False)
     device.take(waiting)
-    assert device.fifo(100)[0] == first
+    assert device.take_fifo(100)[0] == first
     assert device.read(3, 5, 1).tolist() == [int(first > 0)]
