@@ -11,9 +11,11 @@ from drivers.codecs.register_map import RegisterMap, register_map
 from drivers.errors import DeviceError, DeviceRefused, LinkError, MeshError, PointFileError, ProtocolError
 from drivers.files.point_file import PointFile, PointFileSource, convert_to_mm, points_of, read_points
 from drivers.files.text_table import Columns, parse_columns, read_text
+from drivers.links.address import device_address
 from drivers.links.capture import Capture
 from drivers.maps import shipped_map, shipped_maps
 from drivers.source import (
+    HARMLESS_REASONS,
     Arrival,
     Damaged,
     Decoder,
@@ -30,6 +32,7 @@ from drivers.source import (
 )
 
 __all__ = [
+    "HARMLESS_REASONS",
     "Arrival",
     "Capture",
     "Columns",
@@ -58,6 +61,7 @@ __all__ = [
     "convert_to_mm",
     "decoder",
     "decoders",
+    "device_address",
     "parse_columns",
     "points_of",
     "read_points",

@@ -10,16 +10,27 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import yaml
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from cmmlink.buffer import CAPACITY_POINTS
 from cmmlink.errors import PlanError, YamlError
 from cmmlink.plan.yaml_model import Positive, Settings, line_of, read_model
-from drivers import PointFileError, read_text, shipped_maps
+from drivers import PointFileError, device_address, read_text, shipped_maps
 from inspection import FitName, Material, Method, ToleranceZone
 
 Vector = tuple[float, float, float]
 Text = Annotated[str, Field(min_length=1)]
+
+
+def _address(text: str) -> str:
+    try:
+        device_address(text)
+    except ValueError:
+        raise ValueError("host:port, or the name of a serial port of this computer, like COM3 or /dev/ttyUSB0") from None
+    return text
+
+
+Address = Annotated[Text, AfterValidator(_address)]
 
 _SILENCE = "how long a device may send nothing before it counts as failed"
 _RECONNECT = "how long a lost link is tried again while the run goes on"
@@ -105,7 +116,7 @@ class SerialDevice(Settings):
     """A device that streams over a serial port or a TCP socket, in one of the formats of drivers, with that format's options."""
 
     type: Literal["serial"] = Field(description="a stream over a serial port or a TCP socket")
-    address: Text = Field(description="a port name like COM3 or /dev/ttyUSB0, or host:port")
+    address: Address = Field(description="a port name like COM3 or /dev/ttyUSB0, or host:port")
     baud_rate: int = Field(default=115200, gt=0, description="the speed of a serial port in bits per second")
     silence_s: Positive = Field(default=5.0, description=_SILENCE)
     reconnect_s: float = Field(default=0.0, ge=0, description=_RECONNECT)
@@ -121,7 +132,7 @@ class ModbusDevice(Settings):
     """A device whose points are read from registers, over TCP (host:port) or RTU (a port name), as its map describes."""
 
     type: Literal["modbus"] = Field(description="registers over TCP or RTU")
-    address: Text = Field(description="an address host:port, or the port name of an RTU line")
+    address: Address = Field(description="an address host:port, or the port name of an RTU line")
     map: Text | dict[str, Any] = Field(description="a register map: a yaml file, or the name of a shipped one like generic-ring or gocator")
     device_id: int = Field(default=1, ge=0, le=255, description="the unit identifier of the device on its line")
     points: Annotated[int, Field(ge=1)] | None = Field(
@@ -263,7 +274,11 @@ class Plan(Settings):
         return yaml.safe_dump(self.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
 
     def with_address(self, address: str) -> "Plan":
-        """Give the same plan with its device at another address."""
+        """Give the same plan with its device at another address. Raises PlanError for an address that is none."""
+        try:
+            device_address(address)
+        except ValueError as error:
+            raise PlanError(str(error)) from None
         return self.model_copy(update={"device": self.device.model_copy(update={"address": address})})
 
 

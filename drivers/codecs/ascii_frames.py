@@ -26,7 +26,7 @@ import numpy as np
 from drivers.codecs.outbox import Outbox
 from drivers.codecs.sequence import SequenceCounter, WrappingClock
 from drivers.errors import ProtocolError
-from drivers.source import Arrival, Damaged, Heartbeat, PointBatch, Rejected, ScanClosed, ScanOpened
+from drivers.source import AFTER_THE_END, FRAME_REPEATED, Arrival, Damaged, Heartbeat, PointBatch, Rejected, ScanClosed, ScanOpened
 
 MM_PER_UNIT = {"mm": 1.0, "um": 1e-3, "cm": 10.0, "m": 1000.0, "inch": 25.4}
 LONGEST_LINE = 256  # bytes before the line feed; anything longer is garbage
@@ -128,11 +128,11 @@ class AsciiDecoder:
     def _take_point(self, found: re.Match[bytes]) -> None:
         sequence, raw_us, x, y, z, flags = found.groups()
         if self._closed:
-            self._out.append(Rejected(1, "sent after the end of the scan"))
+            self._out.append(Rejected(1, AFTER_THE_END))
             return
         place = self._counter.place(int(sequence))
         if place.repeated:
-            self._out.append(Rejected(1, "frame repeated"))
+            self._out.append(Rejected(1, FRAME_REPEATED))
             return
         self._out.append_loss(place.lost)
         if int(flags) & INVALID:

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from drivers.codecs.outbox import Outbox
 from drivers.codecs.sequence import SequenceCounter, WrappingClock
-from drivers.source import Arrival, Damaged, Heartbeat, PointBatch, Rejected, ScanClosed, ScanOpened
+from drivers.source import AFTER_THE_END, FRAME_REPEATED, Arrival, Damaged, Heartbeat, PointBatch, Rejected, ScanClosed, ScanOpened
 
 FRAME = np.dtype([("sync", "<u2"), ("type", "u1"), ("flags", "u1"), ("seq", "<u2"), ("t_us", "<u4"), ("xyz", "<i4", 3), ("crc", "<u2")])
 HEAD = np.dtype([("sync", "<u2"), ("n", "<u2"), ("seq", "<u4"), ("t_us", "<u8"), ("crc", "<u2")])
@@ -150,12 +150,12 @@ class BinaryDecoder:
     def _account_for(self, sequence: int, flags: int) -> bool:
         """Account for one frame; tell whether it is a point to hand on."""
         if self._closed:
-            self._out.append(Rejected(1, "sent after the end of the scan"))
+            self._out.append(Rejected(1, AFTER_THE_END))
             return False
         place = self._counter.place(sequence, near=sequence)
         self._placed = place.sequence
         if place.repeated:
-            self._out.append(Rejected(1, "frame repeated"))
+            self._out.append(Rejected(1, FRAME_REPEATED))
             return False
         self._out.append_loss(place.lost)
         if flags & INVALID:

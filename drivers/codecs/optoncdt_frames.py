@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from drivers.codecs.distances import Distances
 from drivers.codecs.sequence import SequenceCounter, WrappingClock
 from drivers.errors import DeviceRefused, ProtocolError
-from drivers.source import Arrival, Damaged, Rejected, ScanOpened
+from drivers.source import BEFORE_THE_OUTPUTS, VALUE_REPEATED, Arrival, Damaged, Rejected, ScanOpened
 
 ERRORS = {
     262075: "too much data for the baud rate",
@@ -216,7 +216,7 @@ class OptoncdtDecoder:
     def _take_word(self, low: int, middle: int, high: int) -> None:
         value = (low & 63) | (middle & 63) << 6 | (high & 63) << 12
         if self._outputs is None:
-            self._out.append(Rejected(0 if high & 0x40 else 1, "came before the sensor told its outputs"))
+            self._out.append(Rejected(0 if high & 0x40 else 1, BEFORE_THE_OUTPUTS))
             return
         if not high & 0x40 and self._words:
             self._out.append(Damaged(3 * len(self._words), "block with values missing"))
@@ -258,7 +258,7 @@ class OptoncdtDecoder:
             self._first = counter
             self._counter = SequenceCounter(COUNTER_RANGE, self._first)
         place = self._counter.place(counter)
-        refusal = "value repeated" if place.repeated else self._refusal(block)
+        refusal = VALUE_REPEATED if place.repeated else self._refusal(block)
         distance_mm = None if refusal else self._distance_mm(float(value))
         self._distances.take(place.sequence - self._first, ticks, distance_mm, lost=place.lost, refusal=refusal)
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from drivers.codecs.outbox import Outbox
 from drivers.codecs.register_map import Entries, RegisterField, RegisterMap, equals_pattern
 from drivers.codecs.sequence import SequenceCounter, WrappingClock
-from drivers.source import Heartbeat, PointBatch, Rejected, ScanClosed
+from drivers.source import POINT_REPEATED, Heartbeat, PointBatch, Rejected, ScanClosed
 
 PATIENCE = 3  # answers in a row that contradict what was read before, until the device is believed to have begun anew
 WIDEST = 62  # bits of a counter that are unwrapped
@@ -127,7 +127,7 @@ class RegisterAccount:
             self._counter.expected = self._first
         place = self._counter.place(counter)
         if place.repeated:
-            self._out.append(Rejected(1, "point repeated"))
+            self._out.append(Rejected(1, POINT_REPEATED))
             return -1
         self._out.append_loss(place.lost)
         return place.sequence

@@ -23,6 +23,7 @@ from pymodbus.pdu.file_message import ReadFifoQueueResponse
 from drivers.codecs.register_decoder import RegisterDecoder
 from drivers.codecs.register_pdus import READ_FIFO
 from drivers.errors import LinkError
+from drivers.links.address import HostPort, device_address, require_port
 from drivers.links.link_settings import LinkSettings
 from drivers.links.reconnect import keep_up
 from drivers.source import Arrival, Damaged, ScanClosed, WireBytes
@@ -57,8 +58,10 @@ class ModbusScanner:
     ) -> None:
         """`timeout_s` must exceed the slowest answer; `poll_s` is the pause when nothing new was there.
 
+        Raises ValueError for an address that is none.
         A device that answers, but with no new point and no moving heartbeat, is as silent as one that does not.
         """
+        self._place = device_address(address)
         self._address = address
         self._decoder = decoder
         self._settings = settings
@@ -129,13 +132,14 @@ class ModbusScanner:
     def _open(self) -> ModbusBaseSyncClient:
         if not (log := logging.getLogger("pymodbus")).handlers:
             log.addHandler(logging.NullHandler())  # what it logs reaches the operator as an error of ours, not as stray lines
-        host, colon, port = self._address.rpartition(":")
+        place = self._place
         client: ModbusBaseSyncClient
-        if colon and port.isdigit() and "/" not in self._address:
-            client = ModbusTcpClient(host, port=int(port), timeout=self._timeout_s, retries=0)
+        if isinstance(place, HostPort):
+            client = ModbusTcpClient(place.host.strip("[]"), port=place.port, timeout=self._timeout_s, retries=0)
         else:
+            require_port(place)
             client = ModbusSerialClient(
-                self._address, timeout=self._timeout_s, retries=0, baudrate=self._settings.baud_rate, parity=self._settings.parity
+                place, timeout=self._timeout_s, retries=0, baudrate=self._settings.baud_rate, parity=self._settings.parity
             )
         client.register(FifoAnswer)
         if not client.connect():

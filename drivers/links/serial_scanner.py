@@ -13,6 +13,7 @@ from contextlib import closing
 import serial
 
 from drivers.errors import DeviceError, LinkError, ProtocolError
+from drivers.links.address import HostPort, device_address, require_port
 from drivers.links.link_settings import LinkSettings
 from drivers.links.reconnect import keep_up
 from drivers.source import Arrival, Damaged, Decoder, ScanClosed, WireBytes
@@ -30,7 +31,7 @@ def ports() -> list[tuple[str, str]]:
 
 
 class SerialScanner:
-    """Points of one scan from a serial address: a port name, `host:port` or any address pyserial knows."""
+    """Points of one scan from a serial address: the name of a port of this computer, or `host:port`."""
 
     def __init__(
         self,
@@ -40,7 +41,9 @@ class SerialScanner:
         *,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._address = serial_address(address)
+        """Raises ValueError for an address that is none."""
+        self._place = device_address(address)
+        self._address = address
         self._decoder = decoder
         self._settings = settings
         self._clock = clock
@@ -87,9 +90,14 @@ class SerialScanner:
 
     def _open(self) -> serial.Serial:
         options = {"exclusive": True} if os.name == "posix" else {}
+        if isinstance(self._place, HostPort):
+            name = f"socket://{self._place.host}:{self._place.port}"
+        else:
+            name = self._place
+            require_port(name)
         try:
             return serial.serial_for_url(
-                self._address, baudrate=self._settings.baud_rate, parity=self._settings.parity, timeout=POLL_S, write_timeout=1.0, **options
+                name, baudrate=self._settings.baud_rate, parity=self._settings.parity, timeout=POLL_S, write_timeout=1.0, **options
             )
         except (serial.SerialException, OSError, ValueError) as error:
             hint = "is it plugged in, free, and named right? `cmmlink ports` lists the ports"
@@ -98,7 +106,7 @@ class SerialScanner:
     def _read(self, port: serial.Serial) -> bytes:
         """Return what is there, at the latest after POLL_S."""
         try:
-            if "://" not in self._address:
+            if not isinstance(self._place, HostPort):
                 return bytes(port.read(max(1, port.in_waiting)))
             data = port.read(1)  # a socket does not tell how much is there: wait for the first byte, then take the rest
             if data:
@@ -134,11 +142,3 @@ class _Watch:
         if not all(damaged):
             self._last_sound_s = now_s
         return "garbled" if any(damaged) and now_s - self._last_sound_s > self._patience_s else ""
-
-
-def serial_address(text: str) -> str:
-    """Return pyserial's address for `host:port`, and everything else as it is."""
-    host, colon, port = text.rpartition(":")
-    if colon and host and "/" not in text and port.isdigit():
-        return f"socket://{text}"
-    return text

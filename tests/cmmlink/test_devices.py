@@ -62,5 +62,9 @@ def test_a_device_that_cannot_be_is_a_wrong_plan() -> None:
         source_of(plan_with(POSITION | {"format": "morse"}))
     with pytest.raises(PlanError, match=r"device: .*no-such-map"):
         source_of(plan_with(REGISTERS | {"map": "no-such-map"}))
+    with pytest.raises(PlanError, match=r"address 'spy://x\?file=y' is neither host:port nor"):
+        plan_with(POSITION).with_address("spy://x?file=y")
+    with pytest.raises(ValueError, match="host:port, or the name of a serial port"):
+        plan_with(POSITION | {"address": "spy://x?file=y"})
     with pytest.raises(PointFileError, match=r"none\.csv: no such file"):
         source_of(plan_with({"type": "file", "file": "none.csv"}))

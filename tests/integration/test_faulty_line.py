@@ -92,7 +92,7 @@ def test_no_fault_of_the_line_makes_a_wrong_point_or_a_wrong_count(faults: tuple
 def test_a_device_that_dies_half_way_gives_exit_code_4_and_no_proof(tmp_path: Path) -> None:
     with scanning(tmp_path, "die@600") as device:
         ended = cmmlink("run", planned(tmp_path, device), "--headless", "--json")
-    assert ended.failed(4).startswith(f"socket://{device.address}: the link was lost")
+    assert ended.failed(4).startswith(f"{device.address}: the link was lost")
     facts = ended.json()
     assert (facts["verdict"], facts["complete"]) == ("uncertain", False)
     assert 0 < facts["received"] == facts["judged"] <= 600

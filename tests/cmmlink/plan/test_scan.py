@@ -87,9 +87,9 @@ def test_plan_cannot_be_changed_but_for_an_address_in_a_copy(tmp_path: Path) -> 
     plan = load_plan(written(tmp_path, SHORT))
     with pytest.raises(ValidationError, match="frozen"):
         plan.buffer_points = 1
-    moved = plan.with_address("socket://127.0.0.1:9")
+    moved = plan.with_address("127.0.0.1:9")
     assert isinstance(moved.device, SerialDevice)
-    assert moved.device.address == "socket://127.0.0.1:9"
+    assert moved.device.address == "127.0.0.1:9"
     assert moved.with_address("COM3") == plan
 
 

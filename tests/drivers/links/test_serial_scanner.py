@@ -8,7 +8,7 @@ import serial
 from drivers.codecs.ascii_frames import AsciiDecoder
 from drivers.errors import DeviceError, LinkError, ProtocolError
 from drivers.links.link_settings import LinkSettings
-from drivers.links.serial_scanner import SerialScanner, serial_address
+from drivers.links.serial_scanner import SerialScanner
 from drivers.source import Arrival, Damaged, WireBytes
 
 
@@ -93,21 +93,6 @@ def test_silence_is_a_lost_link(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_nothing_but_garbage_is_a_wrong_protocol(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(ProtocolError, match="not one valid frame; check baud rate"):
         list(run(monkeypatch, Port([b"\x00\xff\n"] * 100)))
-
-
-@pytest.mark.parametrize(
-    ("given", "meant"),
-    [
-        ("127.0.0.1:4001", "socket://127.0.0.1:4001"),
-        ("scanner.local:23", "socket://scanner.local:23"),
-        ("socket://a:1", "socket://a:1"),
-        ("COM3", "COM3"),
-        ("/dev/ttyUSB0", "/dev/ttyUSB0"),
-        ("/dev/serial/by-path/pci-0:1", "/dev/serial/by-path/pci-0:1"),
-    ],
-)
-def test_addresses(given: str, meant: str) -> None:
-    assert serial_address(given) == meant
 
 
 def test_every_error_is_a_device_error() -> None:
