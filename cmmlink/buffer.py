@@ -10,10 +10,10 @@ CAPACITY_POINTS = 500_000  # what a run may hold back when its plan does not say
 
 
 class Buffer(Generic[Item]):
-    """First in, first out, between one giving and one taking thread.
+    """A queue from one producing thread to one consuming thread, first in, first out.
 
     capacity : what may wait, in the units of `size` (points)
-    waiting, peak, stalls : what waits now, at most so far, and how often the giver had to wait
+    waiting, peak, stalls : how much waits now, how much waited at most so far, and how often the producer had to wait
     """
 
     def __init__(self, capacity: int) -> None:
@@ -26,7 +26,10 @@ class Buffer(Generic[Item]):
         self._closed = False
 
     def give(self, item: Item, size: int = 0) -> bool:
-        """Hand over; wait while the buffer is full (an item larger than the whole buffer passes alone). False once closed."""
+        """Hand an item over, after waiting while the buffer is full. Returns False once the buffer is closed.
+
+        An item larger than the whole buffer passes when nothing else waits.
+        """
         with self._changed:
             if self._full(size):
                 self.stalls += 1
@@ -40,7 +43,7 @@ class Buffer(Generic[Item]):
             return True
 
     def take(self, timeout_s: float) -> list[Item]:
-        """All that waits, in order; empty when nothing came in time."""
+        """Take everything that waits, in order. The list is empty when nothing came in time."""
         with self._changed:
             self._changed.wait_for(lambda: bool(self._items), timeout_s)
             taken = [item for _, item in self._items]

@@ -64,7 +64,7 @@ def _register_decoder(device: ModbusDevice) -> RegisterDecoder:
 
 
 def _source_with_axis(device: SerialDevice | ModbusDevice) -> ScanSource:
-    """The source of a device; where the plan has an axis, its distances are made points on it."""
+    """The source of a device. Where the plan has an axis, the source turns distances into points along it."""
     source, axis = _link(device), device.axis
     if axis is None:
         return source

@@ -16,7 +16,7 @@ Ending = Literal["complete", "aborted", "interrupted"]
 
 @dataclass(frozen=True, slots=True)
 class Counts:
-    """The four numbers of a run, and what stands behind them. received = judged + rejected + pending, pending 0 at the end.
+    """The numbers of a run so far. received = judged + rejected + pending, and at the end of the run pending is 0.
 
     received : points that came through the link whole
     judged   : points with a verdict

@@ -20,7 +20,7 @@ _STRAIGHT_MM = 1e-7  # below this deviation the direction from foot to point is 
 
 
 class PointsVersion(NamedTuple):
-    """How far a reader has seen: a version within a generation; a new generation says that everything before is void."""
+    """How much a reader has seen: a version within a generation. When the generation changes, everything seen before is void."""
 
     generation: int
     version: int
@@ -56,7 +56,7 @@ class Extremes:
         self._worst: Array | None = None
 
     def add(self, station_mm: Array, deviation_mm: Array, foot_mm: Array, actual_mm: Array, verdicts: NDArray[np.int8]) -> None:
-        """Take in m points; those without a deviation are passed over."""
+        """Add m points. Points without a deviation are skipped."""
         known = np.flatnonzero(np.isfinite(deviation_mm))
         if not len(known):
             return
@@ -70,7 +70,7 @@ class Extremes:
         for side, ends, sign in ((0, first, 1.0), (1, last, -1.0)):
             rows = known[order[ends]]
             held = self._extremes[touched, side, DEVIATION]
-            better = ~(sign * deviation_mm[rows] >= sign * held)  # an empty bin holds NaN and takes whatever comes
+            better = ~(sign * deviation_mm[rows] >= sign * held)  # an empty bin holds NaN, and any point is better
             points = _points_in_columns(rows[better], station_mm, deviation_mm, foot_mm, actual_mm, verdicts)
             changes.append((side, touched[better], points))
         self._take_over(changes)
@@ -88,7 +88,7 @@ class Extremes:
 
     @property
     def newest(self) -> PointsVersion:
-        """What a reader has seen that has seen everything. Waits for nobody."""
+        """The version of a reader that has seen everything up to now. Never blocks."""
         return PointsVersion(self.generation, self._version)
 
     def changed_since(self, seen: PointsVersion) -> ChangedBins:

@@ -1,4 +1,4 @@
-"""What a plan describes and needs no device for: its nominal profile and its inspection. Errors name file, line and key."""
+"""Builds what a plan describes, except its device: the nominal profile and the inspection. Errors name file, line and key."""
 
 import math
 from collections.abc import Iterator

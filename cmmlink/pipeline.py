@@ -17,7 +17,7 @@ from drivers import Arrival, Damaged, DeviceError, Lost, PointBatch, Rejected, S
 from inspection import InspectionError, InspectionResult, LiveInspection, Rejection
 
 _LOOK_S = 0.05  # how often the run looks whether it was asked to stop
-_MOST_AT_ONCE = 4096  # points judged in one go when many wait, so that the sinks hear of them
+_MOST_AT_ONCE = 4096  # points judged at once when many wait; more would keep the sinks waiting for news
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ def run_inspection(
     clock: Callable[[], float],
     stop: threading.Event,
 ) -> RunOutcome:
-    """Carry out one run to its end, telling every sink every event. Setting `stop` aborts it."""
+    """Carry out one run to its end and publish every event to every sink. Setting `stop` aborts the run."""
     buffer: Buffer[tuple[float, Arrival]] = Buffer(buffer_points)
     failures: list[DeviceError] = []
     acquired = threading.Event()
@@ -134,7 +134,7 @@ def _judge_all(
 ) -> None:
     """Take what arrives and judge it until acquisition has ended and the buffer is empty."""
     while True:
-        ended = acquired.is_set()  # looked at before the buffer: nothing is handed over after it was set
+        ended = acquired.is_set()  # read before the buffer is emptied: after it is set, nothing more is handed over
         taken = buffer.take(0.0 if ended else _LOOK_S)
         if stop.is_set():
             source.stop()
@@ -168,7 +168,7 @@ def _judge(
 
 
 def _reasons_without_pose(live: LiveInspection) -> dict[str, int]:
-    """Why points have no verdict where there is no registration; beyond which end a point lies, nobody knows then."""
+    """Reasons when no registration was found. Without a pose BEYOND_END means nothing, so those points count as "not registered"."""
     reasons = {reason: count for reason, count in live.rejected_by_reason.items() if reason != Rejection.BEYOND_END.words}
     left = live.received - sum(reasons.values())
     return reasons | ({"not registered": left} if left else {})

@@ -9,7 +9,7 @@ from inspection import InspectionResult, Registration, Verdict
 
 
 def result_json(result: InspectionResult | None, counts: Counts) -> dict[str, Any]:
-    """Keys as the command line promises; a run without a result has its counts, verdict uncertain and nulls."""
+    """The result with the keys that the command line promises. Without a result: the counts, the verdict uncertain, and nulls."""
     head = {"received": counts.received, "judged": counts.judged, "rejected": counts.rejected, "lost": counts.lost}
     tail = {"rejected_by_reason": dict(counts.rejected_by_reason), "damaged_bytes": counts.damaged_bytes}
     if result is None:
@@ -67,7 +67,7 @@ _NOTHING: Mapping[str, Any] = {
 
 
 def number(value: float) -> float | None:
-    """A number as JSON can hold it: null for what is not finite."""
+    """A number as JSON can hold it: None when it is not finite."""
     return float(value) if math.isfinite(value) else None
 
 

@@ -154,14 +154,14 @@ class RunView:
         return self._published.state.phase == "finished"
 
     def state(self) -> RunState:
-        """The newest state. Waits for nobody; only the rate and the sign of life depend on when it is asked for."""
+        """The newest state. Never blocks. Only the rate and `streaming` depend on the moment of the call."""
         published, now_s = self._published, self._clock()
         streaming = published.state.streaming and now_s - self._alive_s < _RATE_OVER_S
         return replace(published.state, streaming=streaming, rate_per_s=_rate_per_s(published, now_s))
 
     @property
     def newest_points(self) -> PointsVersion:
-        """What a reader of the points has seen that has seen everything. Waits for nobody."""
+        """The version of a reader that has seen all points up to now. Never blocks."""
         return self._extremes.newest
 
     def points_since(self, seen: PointsVersion) -> tuple[ChangedBins, datetime | None]:
@@ -181,7 +181,7 @@ class RunView:
         link: LinkPhase = "down" if isinstance(arrival, LinkDown) else "closed" if isinstance(arrival, ScanClosed) else "up"
         begins = link != "down" and self._phase in ("preparing", "starting")
         if link == self._link and not begins and not isinstance(arrival, (ScanOpened, LinkUp)):
-            return  # most arrivals change nothing that is shown
+            return  # most arrivals do not change what is shown
         with self._lock:
             self._link = link
             if isinstance(arrival, (LinkDown, LinkUp)):

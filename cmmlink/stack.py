@@ -1,7 +1,7 @@
 """Sections of a CT surface, inspected one after the other by the path that every scan takes.
 
 Surface -> slices -> a contour source each -> the pipeline -> verdicts. The outline of a section is its longest outer contour;
-where that is open, all open pieces together. What lies beside it is counted and told, never judged in silence.
+where that is open, all open pieces together. Contours beside it are counted and reported, never judged.
 """
 
 import logging
@@ -43,13 +43,13 @@ _log = logging.getLogger(__name__)
 _FEW_SECTIONS = 50  # up to here Open3D costs less than half a second; numpy gives the same points, a stack of 200 twice as fast
 _MOST_SECTIONS = 100_000
 _SAME_HEIGHT_MM = 1e-9
-_LENGTHS_APART = 1.5  # the roughness of a noisy surface adds a tenth at most
-_LEAST_POINTS = 400  # on a profile's length; where a surface is coarser, points on its facets are judged, not its corners alone
+_LENGTHS_APART = 1.5  # a noisy surface lengthens an outline by a tenth at most
+_LEAST_POINTS = 400  # over the length of a profile; on a coarser surface, points on the facets are judged as well as the corners
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SectionOutcome:
-    """One section: where it was cut, what it was held against, what came of it, and what was not as it should be."""
+    """One section: where it was cut, its nominal, the outcome of its run, and the warnings."""
 
     slice: SurfaceSection
     judged: tuple[Contour, ...]
@@ -83,7 +83,7 @@ class SectionOutcome:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StackOutcome:
-    """The sections of a surface that were inspected, of `asked` ones; `notes` are what holds for all of them."""
+    """The inspected sections of a surface. `asked` is how many the plan asks for; `notes` apply to all of them."""
 
     mesh: SurfaceMesh
     sections: tuple[SectionOutcome, ...]
@@ -129,7 +129,10 @@ def inspect_stack(
     on_start: Callable[[int], None] = lambda sections: None,
     on_section: Callable[[SectionOutcome], None] = lambda section: None,
 ) -> StackOutcome:
-    """Cut and inspect every section of the plan; `on_start` hears how many, `on_section` each as it is done. `stop` ends after one.
+    """Cut and inspect every section of the plan. Setting `stop` ends the inspection after the section at hand.
+
+    on_start   : called with the number of sections, before the first one
+    on_section : called with each section that is done
 
     Raises PlanError, NominalError and MeshError for what cannot be used, RegistrationError when no section fits its nominal.
     """
@@ -156,7 +159,7 @@ def inspect_stack(
 
 
 class _Open3D:
-    """The process with Open3D, started when it is first wanted and ended with the stack it is entered in."""
+    """The process with Open3D. It is started on first use, and ended together with the ExitStack."""
 
     def __init__(self, stack: ExitStack) -> None:
         self._stack = stack
@@ -257,13 +260,13 @@ def _cutter(plan: CtPlan, sections: int, open3d: Callable[[], Open3DProcess], no
         return open3d()
     if wanted == "open3d":
         raise PlanError(f"{status.sentence()}; or cut with numpy, which gives the same points")
-    if status.installed:  # where it is not, numpy is what was chosen
+    if status.installed:  # where it is not installed, numpy was the user's choice
         notes.append(f"cut by numpy. {status.sentence()}")
     return NumpyCutter()
 
 
 def _inspect(plan: CtPlan, cut: SurfaceSection, profiles: _Profiles, clock: Callable[[], float], stop: threading.Event) -> SectionOutcome:
-    """One section through the pipeline; an outline that cannot be this profile is refused before anything is fitted."""
+    """Send one section through the pipeline. An outline that cannot be this profile is refused before anything is fitted."""
     path, profile = profiles.at(cut.asked_mm)
     outline = _outline(cut)
     spacing_mm = profile.length_mm / _LEAST_POINTS
@@ -292,7 +295,7 @@ def _run(
 
 
 def _other_part(cut: SurfaceSection, outline: tuple[Contour, ...], profile: NominalProfile) -> RegistrationError | None:
-    """Why a closed outline cannot be the section of a nominal that goes round: the lengths are too far apart."""
+    """The reason when a closed outline cannot be a section of its nominal: their lengths differ too much. None otherwise."""
     if not (outline and outline[0].closed and goes_round(profile.curve)):
         return None
     share = outline[0].length_mm / profile.length_mm

@@ -8,6 +8,7 @@ from typing import get_args
 
 from pydantic import BaseModel
 
+import cmmlink
 import drivers
 import inspection
 import simulators
@@ -130,7 +131,7 @@ TABLES: tuple[tuple[str, Mapping[str, str]], ...] = (
 def front_doors() -> str:
     """The names of each package's front door, each with the first sentence of its docstring."""
     parts = []
-    for package in (inspection, drivers, simulators):
+    for package in (inspection, drivers, simulators, cmmlink):
         rows = [f"| `{name}` | {_first_line(getattr(package, name))} |" for name in package.__all__]
         parts.append(
             "\n".join([f"## `{package.__name__}`", "", _first_line(package), "", "| name | what it is |", "| --- | --- |", *rows, ""])

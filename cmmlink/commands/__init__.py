@@ -78,7 +78,7 @@ def main() -> None:
 
 
 def _run_command() -> int | str | None:
-    """Run the command of the command line; its exit status."""
+    """Run the command that the arguments name. Returns its exit status."""
     code: int | str | None
     try:
         with while_compiling(_say_that_it_compiles):
@@ -97,9 +97,9 @@ def _run_command() -> int | str | None:
     except OSError as error:
         code = fail(str(error) if error.filename else f"the answer could not be written: {error}", UNUSABLE)
         _silence_stdout()
-    except SystemExit as ended:  # typer ends with 1 when nobody reads on, which would say that a part does not conform
+    except SystemExit as ended:  # typer ends with 1 when standard output was closed, but 1 means nonconform here
         code = UNUSABLE if ended.code == 1 else ended.code
-    except Exception as error:  # likewise a defect must not end with 1
+    except Exception as error:  # Python would end with 1, which means nonconform here
         traceback.print_exc()
         code = fail(f"a defect of cmmlink, please report it: {error}", UNUSABLE)
     return code

@@ -34,7 +34,7 @@ from cmmlink.words import VERDICT_WORDS
 if TYPE_CHECKING:
     from cmmlink.console.server import ConsoleServer
 
-_PAGE_OPENS_S = 20.0  # a run waits so long for the page that is to show it
+_PAGE_OPENS_S = 20.0  # how long a run waits for the page that is to show it
 _LOOK_S = 0.2
 _LONGEST_PLAN = 200_000
 
@@ -94,7 +94,7 @@ def run_on_page(plan_file: Path, connect: Connect, output: Output) -> int:
 
 
 def inspect_surface(file: Path, stop: threading.Event, on_start: Callable[[int], None], on_section: Callable[[Section], None]) -> str:
-    """Inspect the surface of a CT plan for the console; says in one sentence what came of it."""
+    """Inspect the surface of a CT plan for the console. Returns the outcome as a sentence."""
     plan = load_ct_plan(file)
     prepare(plan.out)
     stack = inspect_stack(
@@ -120,7 +120,7 @@ def _past_runs(folder: Path | None) -> PastRuns:
 
 
 def _write_for(out: Path | None = None) -> Callable[[Plan, FinishedRun], None]:
-    """What writes the results of every run on a page into a folder, or into that of its plan."""
+    """Return the function that writes the results of each run: into `out`, or else into the folder that its plan names."""
 
     def write(plan: Plan, run: FinishedRun) -> None:
         folder = out or plan.out

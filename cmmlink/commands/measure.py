@@ -101,7 +101,7 @@ def run(
 
 
 def _run(plan: Plan, profile: NominalProfile, connect: Connect, output: Output) -> int:
-    """Carry out a plan with a record and, where somebody looks at the terminal, with a live table; report what came of it."""
+    """Carry out a plan, record it, and report the outcome; a live table is shown when the output goes to a terminal."""
     quiet = output.headless or output.as_json or not sys.stderr.isatty()
     view = RunView(RunContext.of(plan, profile, now(), number="", plan_name=""), time.monotonic, now)
     table = nullcontext() if quiet else LiveTable(Console(stderr=True), view)

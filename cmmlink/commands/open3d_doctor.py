@@ -1,4 +1,4 @@
-"""Looks whether Open3D can be loaded, mends what can be mended, and says the rest. Run by make after installing, and by `doctor`."""
+"""Checks whether Open3D can be loaded, installs what is missing where it can, and says what else to do. Run by make and by `doctor`."""
 
 import os
 import subprocess

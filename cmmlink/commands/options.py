@@ -36,7 +36,7 @@ def records_folder(records: Path | None) -> Path:
 def plan_from_options(model: type[Model], settings: Mapping[str, object], option_of: Mapping[str, str]) -> Model:
     """Validate a plan that is made of options. Raises PlanError, which names the option that is wrong.
 
-    option_of : option for a key of the plan, or for the keys below it
+    option_of : maps a key of the plan, or a group of keys, to the option that sets it
     """
     try:
         return model.model_validate(settings)

@@ -62,7 +62,7 @@ def _nominal_json(understood: NominalFile) -> dict[str, Any]:
 
 
 def check(plan_file: PlanFile) -> int:
-    """Check a plan and what it names, not the device."""
+    """Check a plan and the files that it names. The device is not contacted."""
     plan = load_plan(plan_file)
     profile = check_plan(plan, plan_file)
     with name_place(plan_file, "device"):
@@ -89,7 +89,7 @@ def doctor(
     try:
         return _look_after_all(say, records)
     finally:
-        if bundle is not None:  # also where something is so wrong that the look breaks off
+        if bundle is not None:  # packed even when a check above raises
             for line in pack_bundle(bundle, said, records_folder(records), now):
                 typer.echo(line)
 

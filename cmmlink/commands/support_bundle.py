@@ -1,4 +1,4 @@
-"""What helps those who look into a problem from afar, packed into one zip file: see `pack_bundle`."""
+"""One zip file with everything that helps to find the cause of a problem from afar."""
 
 import json
 import locale

@@ -167,7 +167,7 @@ def _options_given(context: typer.Context) -> list[str]:
 
 
 class _SectionBar:
-    """A progress bar with the remaining time, one step a section, for as many rounds as there are things to do with each."""
+    """A progress bar with the remaining time. One round goes once through all sections; several rounds can follow one another."""
 
     def __init__(self, console: Console, visible: bool) -> None:
         words, count = TextColumn("{task.description}"), MofNCompleteColumn()
@@ -189,7 +189,7 @@ class _SectionBar:
 
 
 def _print_stack(console: Console, stack: StackOutcome) -> None:
-    """Print the verdict, a line for each section, and what was not as it should be."""
+    """Print the verdict, a line for each section, and the warnings."""
     counts = stack.result_json()
     cutters = ", ".join(sorted({section.slice.cutter for section in stack.sections}))
     missing = "" if stack.complete else f" of {stack.asked}"

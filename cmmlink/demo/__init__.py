@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from inspection import NurbsCurve
 
-_CHORD_ERROR_MM = 1e-5  # of the polyline to the curve: far below what any deviation is read to
+_CHORD_ERROR_MM = 1e-5  # between polyline and curve: far below the last digit of any deviation that is shown
 
 
 def plan_file() -> Path:
@@ -18,7 +18,7 @@ def plan_file() -> Path:
 def part_path(curve: NurbsCurve, points: int = 20_000) -> NDArray[np.float64]:
     """Points (k, 2) in mm along the curve, k at least `points`: even in arc length, denser where it bends sharply.
 
-    The part as nominal; form error, defect and probe are the simulated device's. A closed curve's last point repeats its first.
+    The path has no form error, defect or probe radius: the simulated device adds them. A closed curve's last point repeats its first.
     """
     if points < 2:
         raise ValueError(f"a path has at least two points, not {points}")

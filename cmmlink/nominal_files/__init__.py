@@ -20,7 +20,7 @@ from cmmlink.errors import YamlError
 from drivers import PointFileError, read_text
 from inspection import NominalError, NurbsCurve
 
-_ALMOST_CLOSED = 0.05  # a gap below this fraction of the length still tells inside from outside: a blunt trailing edge
+_ALMOST_CLOSED = 0.05  # of the length: the widest gap, as of a blunt trailing edge, at which a curve still has an inside
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +76,7 @@ def known_suffixes() -> list[str]:
 
 
 def goes_round(curve: NurbsCurve) -> bool:
-    """True where the ends meet, or leave only a gap as of a blunt trailing edge: inside and outside can be told apart."""
+    """True when the ends meet or leave a gap no wider than a blunt trailing edge. Such a curve has an inside and an outside."""
     start, end = curve.point(np.array(curve.domain))
     return curve.closed or float(np.hypot(*(end - start))) <= _ALMOST_CLOSED * curve.length_mm
 

@@ -75,7 +75,7 @@ def _require_size(points: NDArray[np.float64]) -> None:
 
 
 def _require_spans(knots: NDArray[np.float64]) -> None:
-    """Refuse knots that differ by round-off only: meant as one, they would be spans of no length."""
+    """Refuse knots that differ only by round-off: they were meant to be equal, and the span between them has no real length."""
     spans = np.diff(knots)
     short = (spans > 0) & (spans < _SHORTEST_SPAN * max(1.0, float(np.ptp(knots))))
     if short.any():

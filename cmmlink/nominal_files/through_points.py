@@ -44,7 +44,7 @@ def through_points(points_mm: Array, lines: Lines, closed: bool | None, source_f
 
 
 def _close(points: Array, repeats: bool) -> tuple[NurbsCurve, str]:
-    """Close the curve through different points (m, 2), and say what was made of its seam."""
+    """Close the curve through distinct points (m, 2). Returns the curve and a note on how the seam was joined."""
     turn, sharp = _sharp_turns(points)
     if repeats and sharp[0]:
         curve = NurbsCurve.interpolate(points, _DEGREE, closed=True, corner_at_seam=True)
@@ -89,7 +89,7 @@ def _notes_on_corners(points: Array, lines: Lines) -> list[str]:
 
 
 def _require_distinct(points: Array, lines: Lines) -> None:
-    """Refuse fewer than two points, points in a heap, and neighbours in one place."""
+    """Refuse fewer than two points, points that all coincide, and neighbours that coincide."""
     if len(points) < 2:
         raise NominalError(f"{len(points)} point; expected at least {_DEGREE + 1} for a cubic curve")
     size = _size(points)

@@ -24,7 +24,7 @@ Lines = NDArray[np.int64]
 Block = tuple[Array, Lines]  # points (m, 2) and the lines they stand on
 
 _SEPARATOR = 999.0
-_CHORD_UNITS = 2.0  # an airfoil this small, read as mm, was surely meant in chords
+_CHORD_UNITS = 2.0  # an airfoil this small in mm was almost certainly given in chords
 _JUMP = 0.8  # of the chord: a step from edge to edge, where one side ends and the next begins
 
 
@@ -81,7 +81,7 @@ def _without_counts(table: Array, lines: Lines, notes: list[str]) -> tuple[Array
 
 
 def _are_counts(table: Array, lines: Lines) -> bool:
-    """Whether the first row counts the rest: whole numbers with the right sum, apart from the points by a blank line or by far."""
+    """Whether the first row holds the two counts: whole numbers with the right sum, set apart by a blank line or by distance."""
     row = table[0]
     whole = np.all(np.isfinite(row)) and np.all(row == np.round(row)) and np.all(row >= 2) and row.sum() == _points(table[1:])
     return bool(whole) and bool(lines[1] - lines[0] > 1 or _far_from(row, table[1:]))

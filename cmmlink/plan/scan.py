@@ -88,7 +88,7 @@ class Tolerance(Settings):
 
 
 class Axis(Settings):
-    """What makes points of the distances of a one-dimensional sensor: a constant feed, or a second device that tells the position."""
+    """How the distances of a one-dimensional sensor become points: by a constant feed, or by a second device that measures the position."""
 
     origin_mm: Vector = Field(default=(0.0, 0.0, 0.0), description="where a distance of zero lies while the axis stands at zero")
     distance_direction: Vector = Field(default=(0.0, 1.0, 0.0), description="the direction in which distances grow, of length 1")
@@ -301,7 +301,7 @@ def place_of(path: Path, key: str) -> str:
 
 
 def with_own_maps(device: Device, replaced: Callable[[Path], str | dict[str, Any]]) -> Device:
-    """Give the same device with the register maps of the user's own replaced: its own, and those of what its axis follows."""
+    """Return the device with the user's own register maps replaced, also in the device that its axis follows."""
     if isinstance(device, FileDevice):
         return device
     update: dict[str, Any] = {}

@@ -46,7 +46,7 @@ _MANY_BRACKETS = re.compile(rf"[\[{{](?:[^\[\]{{}}]*[\[{{]){{{_DEEPEST}}}")
 
 
 class Settings(BaseModel):
-    """A group of keys: immutable, no further keys, finite numbers, text without blanks around it."""
+    """Base of all groups of keys: immutable, unknown keys refused, numbers finite, blanks around text removed."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, str_strip_whitespace=True)
 
@@ -57,7 +57,7 @@ def read_model(text: str, model: type[Model]) -> Model:
     try:
         return model.model_validate(document.value)
     except ValidationError as failure:
-        # A misspelt key first: the same slip makes another key missing.
+        # Name a misspelt key first: the same mistake makes the right key missing.
         errors = sorted(failure.errors(), key=lambda error: error["type"] not in ("extra_forbidden", "unknown_name"))
         problems = [_explain(error, document, model) for error in errors]
     line, message = problems[0]
@@ -66,7 +66,7 @@ def read_model(text: str, model: type[Model]) -> Model:
 
 
 def line_of(text: str, key: str) -> int:
-    """Line of a dotted key in a text that was read before; of what it stands in, where it is not written out."""
+    """Line of a dotted key in a text that was read before; where the key is not written, the line of the group that it belongs to."""
     lines = _read(text).lines
     path: Path = tuple(key.split("."))
     while path and path not in lines:
@@ -133,7 +133,7 @@ def _node(event: yaml.Event, events: Iterator[yaml.Event], path: Path, document:
             items.append(_node(event, events, (*path, len(items)), document))
         return items
     assert isinstance(event, yaml.ScalarEvent)
-    return None if not event.style and event.value in _NULL else event.value  # a style is a kind of quotes
+    return None if not event.style and event.value in _NULL else event.value  # the style is None for text without quotes
 
 
 def _mapping(events: Iterator[yaml.Event], path: Path, document: _Document) -> dict[str, Any]:

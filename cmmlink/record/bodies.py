@@ -1,4 +1,4 @@
-"""The bodies of records: what a run says, as bytes and back. Little-endian on every machine, no gaps, all values exact.
+"""The bodies of records: the data of a run to bytes and back. Little-endian on every machine, without padding, all values exact.
 
 - wire: n as uint32, n arrival times (float64), n sizes (uint32), the bytes of all reads
 - points, 40 bytes each: all sequence numbers (int64), all device times (float64), all x y z (float64)
@@ -27,7 +27,7 @@ _ARRIVALS = {kind.__name__: kind for kind in get_args(Arrival)}
 
 @dataclass(frozen=True, slots=True)
 class PlacedArrival:
-    """An arrival other than bytes and points, and where it stands: after so many reads and so many points of the run."""
+    """An arrival other than bytes and points, with its place in the run: the numbers of reads and of points before it."""
 
     time_s: float
     reads: int
@@ -65,7 +65,7 @@ def unpack_reads(body: bytes) -> list[WireBytes]:
 
 
 def pack_points(batches: Sequence[PointBatch], most: int) -> Iterator[tuple[int, bytes]]:
-    """Pack consecutive points into bodies of at most so many; gives the number of points with each."""
+    """Pack consecutive points into bodies of at most `most` points. Yields each body with its number of points."""
     sequence = np.concatenate([batch.sequence for batch in batches])
     time_s = np.concatenate([batch.time_s for batch in batches])
     points = np.concatenate([batch.points_mm for batch in batches])
@@ -114,7 +114,7 @@ def _placed_arrival(entry: dict[str, Any]) -> PlacedArrival:
 
 
 def pack_judged(result: JudgedRows) -> Iterator[tuple[int, bytes]]:
-    """Pack the rows of a result into bodies; gives the number of rows with each."""
+    """Pack the rows of a result into bodies. Yields each body with its number of rows."""
     floats = (result.actual_mm, result.foot_mm, result.station_mm, result.deviation_mm)
     for first in range(0, result.received, _JUDGED_ROWS):
         rows = slice(first, first + _JUDGED_ROWS)

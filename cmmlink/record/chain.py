@@ -12,12 +12,12 @@ from zlib import crc32
 
 Kind = Literal["run", "plan", "nominal", "wire", "points", "events", "registration", "deviations", "result", "end"]
 
-GENESIS = bytes(32)  # what the first record follows
+GENESIS = bytes(32)  # in place of the hash before the first record
 
 
 @dataclass(frozen=True, slots=True)
 class Draft:
-    """What is to be recorded. `count` says how many things the body holds (reads, points, events); 1 for a document."""
+    """A record before it is written. `count` is the number of reads, points or events in the body; 1 for a document."""
 
     run: str
     kind: Kind
@@ -27,7 +27,7 @@ class Draft:
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """What stands in the file. `time_s` is the time of writing, in seconds since 1970 UTC; numbers run from 1 without a gap."""
+    """A record as it stands in the file. `time_s` is when it was written, in seconds since 1970 UTC; numbers run from 1 without a gap."""
 
     number: int
     run: str
@@ -76,7 +76,7 @@ def first_alteration(records: Iterable[Record], number: int, previous: bytes) ->
 
 
 def is_damaged(record: Record) -> bool:
-    """Tell whether a body is not what its CRC says; quick, but no proof against intent."""
+    """True when a body does not match its CRC. Quick, but no protection against intent."""
     return not isinstance(record.body, bytes) or record.crc32 != crc32(record.body)  # tampering may have left text
 
 

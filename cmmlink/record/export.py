@@ -28,7 +28,7 @@ WIRE_COLUMNS = {
 
 
 def export_run(store: Store, run: str, folder: Path) -> list[Path]:
-    """Write a run to a folder and return the files written; raises PlanError where that cannot be.
+    """Write a run to a folder. Returns the files written; raises PlanError when the folder cannot be written.
 
     run.json: all but the points; events.json; points.csv and points.npy (m, 5): sequence, time_s, x, y, z in mm;
     wire.bin, the bytes as they arrived, and wire.csv, when; plan.yaml; the nominal's file; of a run with a result

@@ -1,4 +1,4 @@
-"""What the records of a station tell: the list of runs, one run in full, and whether anything was altered.
+"""Reads the records of a station: the list of runs, one run in full, and whether anything was altered.
 
 A run whose end is missing is closed as interrupted by whoever opens the records next, unless it is being recorded just now.
 """
@@ -65,7 +65,7 @@ def open_to_read(folder: Path, now: Callable[[], datetime], *, close_interrupted
         try:
             with open_to_record(folder, now):
                 pass
-        except StoreError:  # it is being recorded just now, or the medium is write-protected: the run stays open
+        except StoreError:  # the run is being recorded just now, or the medium is write-protected: leave the run open
             pass
     with Store(folder, writing=False, epoch_s=lambda: now().timestamp()) as store:
         yield store
@@ -83,7 +83,7 @@ def list_runs(folder: Path, now: Callable[[], datetime]) -> list[dict[str, Any]]
 
 
 def find_run(store: Store, name: str) -> str:
-    """Give the id of the run that is called so: an id, the beginning of one, or `last`. Raises RunError."""
+    """The id of the run that `name` means: an id, the beginning of one, or `last`. Raises RunError."""
     runs = [str(begin.run) for begin, _ in store.begins_and_ends()]
     found = runs[-1:] if name == "last" else [run for run in runs if run == name] or [run for run in runs if run.startswith(name)]
     if len(found) == 1:
@@ -119,18 +119,18 @@ def points_of(store: Store, run: str) -> Iterator[PointBatch]:
 
 
 def arrivals_of(store: Store, run: str) -> Iterator[PlacedArrival]:
-    """Every other arrival, in order."""
+    """Every arrival other than bytes and points, in order."""
     for record in store.records(run, "events"):
         yield from unpack_arrivals(record.body)
 
 
 def registrations_of(store: Store, run: str) -> list[dict[str, Any]]:
-    """Give the registration's history."""
+    """The history of the registration: a document for each pose that was noted."""
     return [pose for record in store.records(run, "registration") for pose in unpack_document(record.body)]
 
 
 def describe(store: Store, run: str) -> dict[str, Any]:
-    """Give all there is to know of a run but its points, as plain values."""
+    """Everything about a run except its points, as plain values."""
     recorded = recorded_run(store, run)
     end = recorded.end or {"state": "running", "message": "", "received": None, "verdict": None}
     moments = list(arrivals_of(store, run))
@@ -154,7 +154,7 @@ def describe(store: Store, run: str) -> dict[str, Any]:
 
 
 def event_document(moment: PlacedArrival) -> dict[str, Any]:
-    """Spell an arrival with its place as plain values."""
+    """An arrival with its place, as plain values."""
     place = {"event": type(moment.arrival).__name__, "time_s": moment.time_s, "after_points": moment.points}
     return place | dataclasses.asdict(moment.arrival)
 
@@ -167,7 +167,10 @@ def check_chain(store: Store, run: str | None) -> dict[str, Any]:
 
 
 def _is_telling(arrival: Arrival) -> bool:
-    return type(arrival).__name__ not in ("Damaged", "Heartbeat")  # there may be thousands; they are counted, and exported
+    return type(arrival).__name__ not in (
+        "Damaged",
+        "Heartbeat",
+    )  # there may be thousands: they are only counted here
 
 
 def _entry(begin: Record, end: Record | None) -> dict[str, Any]:

@@ -29,13 +29,13 @@ from inspection import JudgedRows
 COMMIT_S = 0.1
 CHUNK_POINTS = 1000
 QUEUE_BYTES = 64 << 20
-_SMALL_BYTES = 128  # what an event without bytes or points counts for in the queue
-_POSE_S = 0.1  # the pose of a registration that still moves is noted this often at most
+_SMALL_BYTES = 128  # size in the queue of an event without bytes or points
+_POSE_S = 0.1  # the shortest time between two notes of a pose that still moves
 
 
 @dataclass(frozen=True, slots=True)
 class RunInputs:
-    """What a run rests on, kept with it whole: the effective plan as YAML, the nominal's file, and the software."""
+    """Everything that a run depends on and that its record keeps: the effective plan as YAML, the nominal's file, the software versions."""
 
     plan: str
     nominal_name: str
@@ -44,9 +44,9 @@ class RunInputs:
 
     @classmethod
     def of(cls, plan: Plan) -> "RunInputs":
-        """What a plan rests on at this moment. Register maps of the user's own become part of the plan. Raises PlanError.
+        """The inputs of a plan as they are at this moment. The user's own register maps become part of the plan. Raises PlanError.
 
-        A map is kept as it was understood, every default filled in: how its file spells it may read otherwise another day.
+        A map is kept as it was understood, with every default filled in, because a later version may read the same file differently.
         """
         try:
             device = with_own_maps(plan.device, lambda own: map_of(own).model_dump(mode="json"))
@@ -58,7 +58,7 @@ class RunInputs:
 
 @dataclass(frozen=True, slots=True)
 class RecordReference:
-    """What ties a result file to its record."""
+    """Ties a result file to its record: the run and the hashes."""
 
     run: str
     chain_sha256: str
@@ -69,7 +69,7 @@ class RecordReference:
 
 @dataclass(frozen=True, slots=True)
 class Acknowledged:
-    """What of a run is on the disk by now."""
+    """How much of a run is on the disk by now."""
 
     wire_bytes: int
     points: int
@@ -167,7 +167,7 @@ class Recorder:
             raise self._no_record()
 
     def _note_pose(self, event: Judged) -> None:
-        """Note where the registration stands when its state changes, and now and then while it moves."""
+        """Note the pose when the state of the registration changes, and every tenth of a second while it moves."""
         update, (state, noted_s) = event.update, self._last_pose
         if update.registration is None or (update.state == state and event.time_s < noted_s + _POSE_S):
             return
@@ -208,7 +208,7 @@ class Recorder:
         return end_draft(self.run, state, message, self._now(), result, sha256)
 
     def _stop_writing(self) -> None:
-        """Let the writer commit all that waits, and end."""
+        """Make the writer commit everything that waits, and wait until it has ended."""
         if self._writer is not None:
             self._closing.set()
             self._writer.join()
@@ -278,7 +278,7 @@ class _Packing:
 
 
 def end_draft(run: str, state: str, message: str, now: datetime, result: Mapping[str, Any], sha256: str = "") -> Draft:
-    """Give the record that closes a run: its state, what was received, and the verdict if there is one."""
+    """The record that closes a run: its state, the number of points received, and the verdict if there is one."""
     document = {
         "state": state,
         "message": message,

@@ -1,4 +1,4 @@
-"""A recorded run once more through the same driver and the same pipeline.
+"""Sends a recorded run through the same driver and the same pipeline again.
 
 With nothing changed the result is the recorded one, bit for bit; with another tolerance or method it is a new evaluation,
 which says what was changed and what came out differently.
@@ -39,10 +39,10 @@ class Change:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Replay:
-    """What a replay gave.
+    """The outcome of a replay.
 
     changed   : settings and software that are not those of the recorded run
-    differs   : what of the result is not as recorded
+    differs   : values of the result that are not as recorded
     identical : to the last bit of every deviation; None where the recorded run has no result to compare with
     """
 
@@ -67,7 +67,7 @@ def replay_run(
 ) -> Replay:
     """Evaluate a recorded run again. `decoder_of` gives the decoder of a plan's device, None for one without wire bytes.
 
-    `sinks` hear what goes on; setting `stop` breaks off.
+    `sinks` take the events; setting `stop` aborts the replay.
 
     Raises StoreError where the record is altered or cannot be read, PlanError where the changed plan cannot be used.
     """
@@ -92,7 +92,7 @@ def replay_run(
 
 
 def recorded_plan(recorded: RecordedRun) -> Plan:
-    """Give the effective plan of a recorded run. Raises StoreError."""
+    """The effective plan of a recorded run. Raises StoreError when this version cannot read it."""
     try:
         return read_model(recorded.plan, Plan)
     except YamlError as error:
@@ -134,7 +134,7 @@ def _failure(recorded: RecordedRun) -> str:
 
 
 def _arrivals(store: Store, recorded: RecordedRun, decoder: Decoder | None, stop: threading.Event) -> Iterator[Arrival]:
-    """Recorded arrivals in their order: reads and what befell the link, or points and everything else."""
+    """Recorded arrivals in their order: reads and link events where there is a decoder, else points and all other arrivals."""
     moments = arrivals_of(store, recorded.run)
     if decoder is not None:
         links = (moment for moment in moments if isinstance(moment.arrival, LinkDown | LinkUp))
@@ -142,13 +142,13 @@ def _arrivals(store: Store, recorded: RecordedRun, decoder: Decoder | None, stop
     else:
         yield from _merge_points(points_of(store, recorded.run), moments)
     if recorded.end is not None and recorded.end["state"] == "aborted":
-        stop.set()  # where the operator did
+        stop.set()  # at the point where the operator aborted the recorded run
 
 
 def _merge(
     items: Iterator[Arrival], size: Callable[[Arrival], int], moments: Iterator[PlacedArrival], place: Callable[[PlacedArrival], int]
 ) -> Iterator[Arrival]:
-    """Merge counted arrivals with others that stand after so many of them."""
+    """Merge counted arrivals with others, each of which has its place after a number of them."""
     done, moment = 0, next(moments, None)
     for item in items:
         while moment is not None and place(moment) <= done:
@@ -162,7 +162,7 @@ def _merge(
 
 
 def _merge_points(batches: Iterator[PointBatch], moments: Iterator[PlacedArrival]) -> Iterator[Arrival]:
-    """Merge points with the rest; what stands between two points of one record cuts it there."""
+    """Merge points with other arrivals. An arrival between two points of one record splits that record."""
     done, moment = 0, next(moments, None)
     for batch in batches:
         begin = 0

@@ -1,4 +1,4 @@
-"""One writer at a station: a lock that holds between processes on every system and ends with its process, however that ends.
+"""Allows one writer at a station: a lock between processes that works on every system and ends with its process, however that ends.
 
 The lock is SQLite's own on a small file beside the records; a process that finds it taken can still read who holds it.
 """
@@ -30,7 +30,7 @@ class StationLock:
             raise StoreError(f"{path.parent}: no record can be kept here: {error}; choose another folder with --records DIR") from None
 
     def release(self) -> None:
-        """Let the next process in."""
+        """Give the lock back, so that another process can take it."""
         self._connection.close()
 
     def _take(self) -> None:

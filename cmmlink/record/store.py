@@ -1,6 +1,6 @@
 """The records of a station: one SQLite file to which hash-chained records are only ever added.
 
-What `append` returned from is on the disk (write-ahead log, synchronous FULL). Runs follow one another: the records of
+When `append` returns, its records are on the disk (write-ahead log, synchronous FULL). Runs follow one another: the records of
 a run stand together, from `run` to `end`; a run whose `end` is missing was interrupted, or is going on.
 """
 
@@ -66,7 +66,7 @@ class Store:
             raise
 
     def close(self) -> None:
-        """Close the file and let the next process in."""
+        """Close the file and release the lock."""
         self._connection.close()
         self._unlock()
 
@@ -145,7 +145,7 @@ class Store:
         return first, following - 1 if following else self._where(None)[1], before[0] if before else GENESIS
 
     def _unsound_file(self, number: int) -> Alteration | None:
-        """What the chain does not reach: records beyond its end, and the file around them."""
+        """Damage that the chain cannot show: records beyond its end, and damage of the file itself."""
         (beyond,) = self._connection.execute("SELECT max(number) FROM record").fetchone()
         if (beyond or 0) > number:
             return Alteration(number + 1, "", "", "was added without being counted")
@@ -175,10 +175,10 @@ class Store:
     def _migrate(self, version: int, migrations: Sequence[str], writing: bool) -> None:
         lock = None if writing else StationLock(self.path.parent / "station.lock")
         try:
-            if self._found_empty and lock is not None and not self.path.stat().st_size:  # nobody is making it just now
+            if self._found_empty and lock is not None and not self.path.stat().st_size:  # no other process is creating it at this moment
                 raise StoreError(f"{self.path}: the file is empty: what was recorded in it is gone. Move it away to begin a new one")
             for target, script in enumerate(migrations[version:], start=version + 1):
-                # One transaction each: after a kill the file is of the old version or of the new one.
+                # One transaction each, so that after a kill the file has either the old version or the new one.
                 mark = f"PRAGMA application_id = {APPLICATION_ID}; PRAGMA user_version = {target};"
                 self._connection.executescript(f"BEGIN IMMEDIATE; {script}; {mark} COMMIT;")
         finally:

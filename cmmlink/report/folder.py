@@ -14,7 +14,7 @@ from inspection import InspectionResult, NominalProfile
 
 
 def prepare(folder: Path | None) -> None:
-    """Make the folder and see that it takes files, before anything is measured in vain. Raises PlanError."""
+    """Create the folder and check that it can be written, before anything is measured. Raises PlanError."""
     if folder is None:
         return
     with _or_refuse(folder):
@@ -26,12 +26,12 @@ def prepare(folder: Path | None) -> None:
 def write_results(
     folder: Path, document: dict[str, Any], result: InspectionResult | None, profile: NominalProfile, title: str
 ) -> list[str]:
-    """Write result.json, and where something was judged deviations.csv and profile.png; their names. Raises PlanError."""
+    """Write result.json and, when points were judged, deviations.csv and profile.png. Returns their names; raises PlanError."""
     with _or_refuse(folder):
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "result.json").write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
         for name in ("deviations.csv", "profile.png"):
-            (folder / name).unlink(missing_ok=True)  # an earlier run's must not stand beside this one's result
+            (folder / name).unlink(missing_ok=True)  # files of an earlier run must not stay beside this result
         if result is None or not result.judged:
             return ["result.json"]
         from cmmlink.report.picture import write_picture  # noqa: PLC0415 - matplotlib takes half a second that other commands need not pay
@@ -42,7 +42,7 @@ def write_results(
 
 
 def write_run(folder: Path, run: FinishedRun) -> list[str]:
-    """Write the files of a finished run; their names. Raises PlanError."""
+    """Write the files of a finished run. Returns their names; raises PlanError."""
     return write_results(folder, run.result_json(), run.outcome.result, run.profile, run.title)
 
 

@@ -94,7 +94,7 @@ def _draw_strip(axes: Axes, result: InspectionResult, nominal: NominalProfile) -
     if index is not None:
         text = f"worst {result.deviation_mm[index]:+.4f} mm at station {result.station_mm[index]:.2f} mm"
         place, outside = (result.station_mm[index], result.deviation_mm[index]), 8 if result.deviation_mm[index] >= 0 else -16
-        axes.annotate(text, place, (0, outside), textcoords="offset points", ha="center")  # not on the points beside it
+        axes.annotate(text, place, (0, outside), textcoords="offset points", ha="center")  # clear of the neighbouring points
     axes.margins(y=0.2)
     axes.set(xlim=(0, nominal.length_mm), xlabel="station (mm)", ylabel="deviation (mm)")
     basis = f"coverage {result.coverage:.1%}   fit {result.fit}   method {result.method}   out of tolerance {result.out_of_tolerance}"
@@ -109,7 +109,7 @@ def _mark_worst(axes: Axes, result: InspectionResult, factor: float) -> None:
 
 
 def _rows_to_draw(result: InspectionResult) -> NDArray[np.int64]:
-    """Judged points thinned to what can be told apart, those out of tolerance and the worst always among them."""
+    """Rows (k,) of the points to draw: thinned, but with every point out of tolerance and the worst one."""
     judged = np.flatnonzero(np.isfinite(result.deviation_mm))
     kept = judged[:: max(1, len(judged) // _MOST_WHISKERS)]
     out = np.flatnonzero(result.verdicts == Verdict.NONCONFORM)

@@ -70,7 +70,7 @@ def write_stack(
 
 
 def _clear(folder: Path) -> None:
-    """Take away what an earlier run wrote here: it must not stand beside this one's result."""
+    """Delete what an earlier run wrote here: it must not stay beside this result."""
     earlier = [folder / name for name in ("result.json", "sections.csv", "stack.png")]
     own = [path for path in folder.glob("section-*_*mm") if path.is_dir()]
     for path in [*earlier, *(path / name for path in own for name in _SECTION_FILES)]:

@@ -23,7 +23,7 @@ _EMPTY = "#d4d7da"
 
 
 def write_stack_picture(stack: StackOutcome, zone: ToleranceZone, title: str, path: Path) -> None:
-    """Draw the map to a PNG file; where the nominals differ in length, over the share of the length."""
+    """Draw the map to a PNG file. Where the nominals differ in length, the abscissa is the share of the length."""
     sections = sorted(stack.sections, key=lambda section: section.slice.height_mm)
     lengths = np.array([section.profile.length_mm for section in sections])
     common = bool(np.ptp(lengths) <= 0.001 * lengths[0])
@@ -56,7 +56,7 @@ def _row(section: SectionOutcome) -> Array:
     judged = np.flatnonzero(np.isfinite(result.deviation_mm))
     judged = judged[np.argsort(np.abs(result.deviation_mm[judged] - result.zone.middle_mm))]
     column = np.clip((result.station_mm[judged] / section.profile.length_mm * _COLUMNS).astype(int), 0, _COLUMNS - 1)
-    row[column] = result.deviation_mm[judged]  # of several the last is kept: the farthest
+    row[column] = result.deviation_mm[judged]  # where several share a column, the last one is kept, which is the farthest
     return row
 
 

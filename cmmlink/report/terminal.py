@@ -18,7 +18,7 @@ from inspection import InspectionResult, Rejection, Verdict
 
 STYLES = {Verdict.CONFORM: "bold green", Verdict.UNCERTAIN: "bold yellow", Verdict.NONCONFORM: "bold red"}
 _REPAINTS_PER_S = 8
-_WHOLE = 0.95  # of the nominal's length: below it the summary says that the rest is unknown
+_WHOLE = 0.95  # coverage below which the summary says that nothing is known of the rest
 _MOST_STRETCHES = 10
 
 
