@@ -1,7 +1,7 @@
 """Write the pages of docs that come from the models: `python docs/generate.py`; a test compares them with what stands there."""
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Set
 from dataclasses import replace
 from pathlib import Path
 from typing import get_args
@@ -145,6 +145,8 @@ def _first_line(thing: object) -> str:
         return "One of " + ", ".join(f"`{getattr(choice, '__name__', choice)}`" for choice in get_args(thing)) + "."
     if isinstance(thing, Mapping):
         return "By their names: " + ", ".join(f"`{key}`" for key in thing) + "."
+    if isinstance(thing, Set):
+        return "Any of " + ", ".join(f"`{member}`" for member in sorted(thing)) + "."
     if not (inspect.ismodule(thing) or callable(thing)):
         return f"The value `{thing}`."
     return (inspect.getdoc(thing) or "").split("\n\n")[0].replace("\n", " ").replace("|", "\\|")
