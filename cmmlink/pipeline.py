@@ -7,14 +7,14 @@ verdict on what was received; a sink that raises ends it too, and its error is p
 import threading
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from cmmlink.buffer import Buffer
 from cmmlink.events import Arrived, Counts, Ending, Event, Judged, RunFinished, RunStarted, Sink
 from drivers import Arrival, Damaged, DeviceError, Lost, PointBatch, Rejected, ScanSource
-from inspection import InspectionError, InspectionResult, LiveInspection, Rejection
+from inspection import InspectionError, InspectionResult, LiveInspection, Rejection, Verdict
 
 _LOOK_S = 0.05  # how often the run looks whether it was asked to stop
 _MOST_AT_ONCE = 4096  # points judged at once when many wait; more would keep the sinks waiting for news
@@ -29,6 +29,11 @@ class RunOutcome:
     counts: Counts
     failure: DeviceError | None
     refusal: InspectionError | None
+
+    @property
+    def measured(self) -> bool:
+        """Whether anything came of the run: of a device that never opened, or never gave a point, nothing is kept as a result."""
+        return self.counts.received > 0
 
 
 @dataclass(slots=True)
@@ -175,10 +180,12 @@ def _reasons_without_pose(live: LiveInspection) -> dict[str, int]:
 
 
 def _finish(live: LiveInspection, ending: Ending) -> tuple[InspectionResult | None, InspectionError | None]:
+    """The result of a run. What the operator aborted proves nothing, whatever was out by then: the part may have slipped."""
     try:
-        return live.finish(complete=ending == "complete"), None
+        result = live.finish(complete=ending == "complete")
     except InspectionError as error:
         return None, error
+    return (replace(result, verdict=Verdict.UNCERTAIN) if ending == "aborted" else result), None
 
 
 def _publish(sinks: Sequence[Sink], event: Event) -> None:

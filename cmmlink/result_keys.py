@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from cmmlink.events import Ending
 from cmmlink.words import VerdictName
 
 State = Literal["complete", "interrupted", "aborted", "running", "damaged"]
@@ -83,8 +84,9 @@ class Inspected(_Json):
 
 
 class Measured(Inspected):
-    """The result of `inspect`: also what was measured, by whom and with what."""
+    """The result of `inspect`: also how the run ended, what was measured, by whom and with what."""
 
+    ending: Ending = Field(description="how the run ended; aborted (by the operator, then the verdict is uncertain), or cut short")
     part: str = Field(description="the name of the part")
     serial_number: str | None = Field(description="the serial number of the part")
     operator: str | None = Field(description="who measured")
@@ -113,6 +115,7 @@ class Change(_Json):
 class Replayed(Inspected):
     """The result of `replay`: also how it compares with the recorded one."""
 
+    ending: Ending = Field(description="how the recorded run ended")
     replay_of: str = Field(description="the id of the recorded run")
     chain_sha256: str = Field(description="the hash of the run's last record")
     identical: bool | None = Field(description="whether the result is the recorded one to the last bit; null where none was recorded")

@@ -44,7 +44,8 @@ class FinishedRun:
     def result_json(self) -> dict[str, Any]:
         """The run as `--json` and result.json hold it."""
         evidence = asdict(self.evidence) if self.evidence else {}
-        return result_json(self.outcome.result, self.outcome.counts) | identity_json(self.started) | evidence
+        found = result_json(self.outcome.result, self.outcome.counts)
+        return found | {"ending": self.outcome.ending} | identity_json(self.started) | evidence
 
 
 def carry_out(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from cmmlink.events import Ending
-from cmmlink.words import VerdictName, VerdictWords
+from cmmlink.words import Shape, VerdictName
 
 Phase = Literal["preparing", "starting", "measuring", "ending", "finished"]
 LinkPhase = Literal["connecting", "up", "down", "closed"]
@@ -33,9 +33,10 @@ class WorstPoint:
 
 @dataclass(frozen=True, slots=True)
 class VerdictState:
-    """The verdict in words, whether it is final, and one line that says why it is so."""
+    """The verdict, or how the run ended, in words; its sign; whether it is final; and one line that says why it is so."""
 
-    word: VerdictWords
+    word: str
+    shape: Shape
     final: bool
     why: str
 

@@ -20,7 +20,7 @@ from cmmlink.extremes import DEVIATION, FOOT_X, NORMAL_X, STATION, VERDICT, Chan
 from cmmlink.plan import Plan
 from cmmlink.result_json import number, result_json
 from cmmlink.run_state import LinkPhase, Phase, RegistrationState, RunState, VerdictState, WorstPoint, ZoneLimits
-from cmmlink.words import VERDICT_NAMES, VERDICT_WORDS
+from cmmlink.words import NOT_MEASURED, VERDICT_NAMES, Headline, headline_of
 from drivers import Heartbeat, LinkDown, LinkUp, PointBatch, ScanClosed, ScanOpened
 from inspection import JudgedRows, LiveUpdate, NominalProfile, ToleranceZone, Verdict, coverage
 
@@ -289,32 +289,49 @@ class RunView:
 
     def _registration(self) -> RegistrationState:
         found = self._ended.result["registration"] if self._ended else None
-        if found is not None:
+        if found is not None and self._ended is not None and self._ended.ending == "complete":
             return RegistrationState("settled", 0.0, len(found.get("other_poses", [])))
+        if found is not None:
+            return RegistrationState("provisional", None, len(found.get("other_poses", [])))  # more points would have moved it
         if self._update is None:
             return RegistrationState("seeking", None, 0)
         return RegistrationState(self._update.state, number(self._update.can_move_mm), 0)
 
     def _verdict(self) -> VerdictState:
+        ended = self._ended
+        if self._failure and self._counts.received:
+            return _state_of(headline_of(Verdict.UNCERTAIN), True, "the run broke off")
         if self._failure:
-            return VerdictState(VERDICT_WORDS[Verdict.UNCERTAIN], True, "the run broke off")
-        if self._ended is not None:
-            verdict = Verdict[self._ended.result["verdict"].upper()]
-            return VerdictState(VERDICT_WORDS[verdict], True, _reason_of(self._ended, verdict, self.context.coverage_min))
-        return self._verdict_so_far()
+            return _state_of(NOT_MEASURED, True, self._failure)
+        if ended is None:
+            return self._verdict_so_far()
+        found = Verdict[ended.result["verdict"].upper()] if ended.result["registration"] else None
+        early = ended.ending != "complete" and ended.result["received"] > 0
+        headline = headline_of(found, ended.ending, self._share(ended)) if early else headline_of(found)
+        return _state_of(headline, not early, _reason_of(ended, found, self.context.coverage_min))
+
+    def _share(self, ended: Ended) -> float | None:
+        """How much was measured, from 0 to 1: of the profile, or of the points announced where no part was found."""
+        if ended.result["registration"]:
+            return float(ended.result["coverage"])
+        return min(1.0, self._counts.received / self._expected) if self._expected else None
 
     def _verdict_so_far(self) -> VerdictState:
-        unproven = VERDICT_WORDS[Verdict.UNCERTAIN]
+        unproven = headline_of(Verdict.UNCERTAIN)
         if self._phase == "preparing":
-            return VerdictState(unproven, False, "preparing the inspection")
+            return _state_of(unproven, False, "preparing the inspection")
         provisional = self._update is None or self._update.state != "settled"
         if self._out:
             why = f"{_points(self._out)} out so far" + (", provisional" if provisional else "")
-            return VerdictState(VERDICT_WORDS[Verdict.NONCONFORM], False, why)
+            return _state_of(headline_of(Verdict.NONCONFORM), False, why)
         if not self._counts.judged:
             seeking = self._update is not None and self._update.state == "seeking"
-            return VerdictState(unproven, False, "seeking the part" if seeking else "waiting for points")
-        return VerdictState(unproven, False, f"{self._coverage:.0%} measured, none out so far")
+            return _state_of(unproven, False, "seeking the part" if seeking else "waiting for points")
+        return _state_of(unproven, False, f"{self._coverage:.0%} measured, none out so far")
+
+
+def _state_of(headline: Headline, final: bool, why: str) -> VerdictState:
+    return VerdictState(headline.words, headline.shape, final, why)
 
 
 def _rate_per_s(published: _Published, now_s: float) -> float:
@@ -333,20 +350,21 @@ def _worst_point(worst: NDArray[np.float64] | None) -> WorstPoint | None:
     return WorstPoint(float(worst[STATION]), float(worst[DEVIATION]), float(x), float(y), verdict)
 
 
-def _reason_of(ended: Ended, verdict: Verdict, coverage_min: float) -> str:
-    """One line under the final verdict."""
+def _reason_of(ended: Ended, verdict: Verdict | None, coverage_min: float) -> str:
+    """One line under the headline."""
     result = ended.result
-    if result["registration"] is None:
-        if ended.ending == "interrupted" and result["received"]:
-            return "cut short; Replay judges what was received"
-        return "no part found" if result["received"] else "no point was received"
+    if not result["received"]:
+        return ended.message or "no point was received"
+    if verdict is None:
+        return "cut short; Replay judges what was received" if ended.ending == "interrupted" else "no part found"
+    if ended.ending != "complete":
+        so_far = f"{_points(result['out_of_tolerance'])} out" if result["out_of_tolerance"] else "none out"
+        return f"no verdict: the scan was {'aborted' if ended.ending == 'aborted' else 'cut short'}; {so_far} until then"
     if verdict is Verdict.NONCONFORM:
         places = f", {len(result['stretches'])} places" if len(result["stretches"]) > 1 else ""
         return f"{_points(result['out_of_tolerance'])} out of tolerance{places}"
     if verdict is Verdict.CONFORM:
         return f"all {_points(result['judged'])} within tolerance"
-    if ended.ending != "complete":
-        return "the scan was aborted" if ended.ending == "aborted" else "the scan was cut short"
     if not result["judged"]:
         return "no point could be judged"
     if result["coverage"] < coverage_min:

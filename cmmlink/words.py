@@ -1,12 +1,15 @@
 """The words of the verdict: as results spell them, and as people read them on the page, in the terminal and on pictures."""
 
+import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Literal
 
 from inspection import Verdict
 
 VerdictName = Literal["conform", "uncertain", "nonconform"]
 VerdictWords = Literal["CONFORM", "NOT PROVEN", "NOT CONFORM"]
+Shape = Literal["conform", "not-proven", "not-conform", "ended-early", "none"]
 
 VERDICT_NAMES: Mapping[Verdict, VerdictName] = {
     Verdict.CONFORM: "conform",
@@ -18,3 +21,35 @@ VERDICT_WORDS: Mapping[Verdict, VerdictWords] = {
     Verdict.UNCERTAIN: "NOT PROVEN",
     Verdict.NONCONFORM: "NOT CONFORM",
 }
+_SHAPES: Mapping[Verdict, Shape] = {
+    Verdict.CONFORM: "conform",
+    Verdict.UNCERTAIN: "not-proven",
+    Verdict.NONCONFORM: "not-conform",
+}
+_ENDINGS = {"aborted": "ABORTED", "interrupted": "CUT SHORT", "running": "RUNNING", "damaged": "RECORD DAMAGED"}
+
+
+@dataclass(frozen=True, slots=True)
+class Headline:
+    """What stands above a run in capitals, and the sign and colour it is shown with."""
+
+    words: str
+    shape: Shape
+
+
+NOT_MEASURED = Headline("NOT MEASURED", "none")
+
+
+def headline_of(verdict: Verdict | None, ending: str = "complete", share: float | None = None) -> Headline:
+    """The one headline of a run, for the page, the picture, the terminal and the history.
+
+    verdict : None where nothing could be measured
+    ending  : complete, aborted or interrupted; of a run on record also running or damaged
+    share   : how much of the profile, or of the points announced, was measured, from 0 to 1; None where that is not known
+
+    The verdict on a part stands there only where its scan came to its end: what was aborted never poses as settled.
+    """
+    if ending in _ENDINGS:
+        at = "" if not share else f" AT {math.floor(100 * share)} %"  # rounded down: 99.9 % is not the whole
+        return Headline(_ENDINGS[ending] + at, "ended-early")
+    return NOT_MEASURED if verdict is None else Headline(VERDICT_WORDS[verdict], _SHAPES[verdict])

@@ -124,7 +124,7 @@ def _write_for(out: Path | None = None) -> Callable[[Plan, FinishedRun], None]:
 
     def write(plan: Plan, run: FinishedRun) -> None:
         folder = out or plan.out
-        if folder is not None:
+        if folder is not None and run.outcome.measured:
             write_run(folder, run)
 
     return write

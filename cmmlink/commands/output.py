@@ -62,13 +62,13 @@ def report_outcome(run: FinishedRun, output: Output) -> int:
         sys.stderr.write(f"cmmlink: {message}\n")
     written: Sequence[str] = ()
     try:
-        if output.out is not None:
+        if output.out is not None and outcome.measured:
             written = write_run(output.out, run)
     finally:
         if output.as_json:
             print_json(run.result_json())
         else:
-            print_summary(terminal(), outcome.result, outcome.counts, f"{run.title}, {run.started.device}")
+            print_summary(terminal(), outcome.result, outcome.counts, f"{run.title}, {run.started.device}", outcome.ending)
     if written and not output.as_json:
         typer.echo(f"results in {output.out}: {', '.join(written)}")
     if evidence is not None and not output.as_json:

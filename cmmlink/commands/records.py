@@ -25,7 +25,7 @@ def runs(records: Records = None, as_json: Json = False) -> int:
         return 0
     for entry in found:
         part = " ".join(filter(None, [entry["part"], entry["serial_number"]]))
-        verdict = entry["verdict"] or "-"
+        verdict = (entry["verdict"] or "-") if entry["state"] == "complete" else "-"
         received = "-" if entry["received"] is None else entry["received"]
         typer.echo(
             f"{entry['run']}  {(entry['started'] or '-')[:19]:<19}  {entry['state']:<11}  {verdict:<10}  {received:>9} points  {part}"
@@ -84,6 +84,7 @@ def replay(
         recorded = recorded_run(store, find_run(store, name))
         again = replay_run(store, recorded, decoder_of, tolerance=tolerance, method=method)
     document = again.result_json | {"replay_of": recorded.run, "chain_sha256": recorded.chain_sha256, "identical": again.identical}
+    document["ending"] = again.outcome.ending
     document |= {"changed": [asdict(change) for change in again.changed], "differs": [asdict(change) for change in again.differs]}
     if out is not None:
         write_results(out, document, again.outcome.result, again.profile, f"{recorded.header['part']}, run {recorded.run} replayed")
@@ -98,7 +99,7 @@ def replay(
 
 def _print_replay(again: Replay, run_id: str) -> None:
     heading = f"run {run_id}, evaluated again"
-    print_summary(terminal(), again.outcome.result, again.outcome.counts, heading)
+    print_summary(terminal(), again.outcome.result, again.outcome.counts, heading, again.outcome.ending)
     for title, changes in (("changed", again.changed), ("differs", again.differs)):
         for change in changes:
             typer.echo(f"{title}: {change.key} {change.recorded} -> {change.replayed}")

@@ -29,8 +29,9 @@ from cmmlink.record import (
 from cmmlink.record import export_run as export_files
 from cmmlink.result_json import result_json
 from cmmlink.run_view import Ended, RunContext
+from cmmlink.words import headline_of
 from drivers import Decoder
-from inspection import NominalProfile
+from inspection import NominalProfile, Verdict
 
 _MOST_LISTED = 500
 
@@ -121,6 +122,8 @@ def _result_of(store: Store, run: str) -> dict[str, Any]:
 
 def _row_of(entry: dict[str, Any], result: dict[str, Any]) -> RunRow:
     worst, zone = result.get("worst") or {}, result.get("tolerance") or {}
+    verdict = Verdict[entry["verdict"].upper()] if entry["verdict"] and result.get("registration") else None
+    headline = headline_of(verdict, entry["state"], result.get("coverage"))
     return RunRow(
         entry["run"],
         entry["started"] or "",
@@ -129,6 +132,9 @@ def _row_of(entry: dict[str, Any], result: dict[str, Any]) -> RunRow:
         entry["state"],
         entry["received"] or 0,
         entry["verdict"],
+        headline.words,
+        headline.shape,
+        entry["state"] == "complete" and verdict is not None,
         worst.get("deviation_mm"),
         worst.get("station_mm"),
         zone.get("lower_mm"),

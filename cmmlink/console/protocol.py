@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields
 from typing import Any, Literal
 
 from cmmlink.run_state import RunState
-from cmmlink.words import VERDICT_NAMES, VERDICT_WORDS, VerdictName
+from cmmlink.words import VERDICT_NAMES, VERDICT_WORDS, Shape, VerdictName
 
 WRONG_TOKEN = 4401  # the station closes a page's socket with this code when the token is wrong
 TOO_MANY_PAGES = 1013
@@ -143,7 +143,10 @@ class ShownRun:
 
 @dataclass(frozen=True, slots=True)
 class RunRow:
-    """One line of the station's history. `worst_mm` is the deviation farthest from the middle of the zone."""
+    """One line of the station's history. `worst_mm` is the deviation farthest from the middle of the zone.
+
+    word, shape : the verdict, or how early the run ended, and its sign; `counted`: the scan came to its end with a verdict
+    """
 
     run: str
     began: str
@@ -152,6 +155,9 @@ class RunRow:
     state: str
     received: int
     verdict: VerdictName | None
+    word: str
+    shape: Shape
+    counted: bool
     worst_mm: float | None
     worst_station_mm: float | None
     lower_mm: float | None

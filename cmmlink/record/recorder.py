@@ -23,7 +23,7 @@ from cmmlink.record.chain import Draft, Kind
 from cmmlink.record.store import Store
 from cmmlink.result_json import number, result_json
 from cmmlink.version import __version__
-from drivers import PointBatch, Rejected, WireBytes
+from drivers import LinkDown, PointBatch, Rejected, WireBytes
 from inspection import JudgedRows
 
 COMMIT_S = 0.1
@@ -113,6 +113,8 @@ class Recorder:
         """`clock` is the run's; `now` gives date and time of day; the writer's thread calls `acknowledge` after every commit."""
         self.run = ""
         self.evidence: RecordReference | None = None
+        self._started: RunStarted | None = None
+        self._began = now()
         self._store, self._inputs, self._clock, self._now = store, inputs, clock, now
         self._commit_s, self._acknowledge = commit_s, acknowledge
         self._queue: Buffer[Arrived | _Pose] = Buffer(queue_bytes)
@@ -125,12 +127,14 @@ class Recorder:
     def __call__(self, event: Event) -> None:
         """Take an event of the run. Raises StoreError when the record cannot be kept."""
         if isinstance(event, Arrived):
+            if self._writer is None and not isinstance(event.arrival, LinkDown):  # the device is there: this is a run
+                self._begin()
             self._hand(event, _size(event))
         elif isinstance(event, Judged):
             self._note_pose(event)
         elif isinstance(event, RunStarted):
-            self._begin(event)
-        else:
+            self._started, self._began = event, self._now()
+        elif self.run:
             self._end(event)
 
     def __enter__(self) -> "Recorder":
@@ -144,8 +148,10 @@ class Recorder:
         if self._failure is None:
             self._store.append([self._end_draft("interrupted", f"the program failed: {error!r}", self._pack.counts())])
 
-    def _begin(self, started: RunStarted) -> None:
-        began, inputs = self._now(), self._inputs
+    def _begin(self) -> None:
+        """Add the run to the records. A device that never opened gives no run: nothing was measured."""
+        assert self._started is not None, "a run begins with RunStarted"
+        began, started, inputs = self._began, self._started, self._inputs
         self.run = f"{began:%Y%m%d-%H%M%S}-{len(self._store.begins_and_ends()) + 1:04d}"
         plan = inputs.plan.encode()
         header = {
@@ -284,7 +290,7 @@ def end_draft(run: str, state: str, message: str, now: datetime, result: Mapping
         "message": message,
         "ended": now.isoformat(timespec="milliseconds"),
         "received": result.get("received", 0),
-        "verdict": result.get("verdict"),
+        "verdict": result.get("verdict") if result.get("received") else None,
         "result_sha256": sha256,
     }
     return Draft(run, "end", pack_document(document))

@@ -37,7 +37,7 @@ def write_results(
         from cmmlink.report.picture import write_picture  # noqa: PLC0415 - matplotlib takes half a second that other commands need not pay
 
         write_deviations(result, folder / "deviations.csv")
-        write_picture(result, profile, title, folder / "profile.png")
+        write_picture(result, profile, title, folder / "profile.png", document.get("ending", "complete"))
     return ["result.json", "deviations.csv", "profile.png"]
 
 

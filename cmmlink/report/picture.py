@@ -14,7 +14,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from cmmlink.words import VERDICT_WORDS
+from cmmlink.words import headline_of
 from inspection import InspectionResult, NominalProfile, Verdict
 
 Array = NDArray[np.float64]
@@ -43,14 +43,19 @@ _LOOKS = (
 )
 
 
-def write_picture(result: InspectionResult, nominal: NominalProfile, title: str, path: Path) -> None:
-    """Draw the profile and the strip of deviations to a PNG file."""
+def write_picture(result: InspectionResult, nominal: NominalProfile, title: str, path: Path, ending: str = "complete") -> None:
+    """Draw the profile and the strip of deviations to a PNG file; `ending` is how the run ended."""
     figure = Figure(figsize=(12, 8), dpi=110, layout="constrained")
     profile, strip = figure.subplots(2, 1, height_ratios=[3, 2])
     _draw_profile(profile, result, nominal)
     _draw_strip(strip, result, nominal)
-    figure.suptitle(f"{title}    {VERDICT_WORDS[result.verdict]}", fontsize=15, fontweight="bold")
+    figure.suptitle(headline_on_picture(result, title, ending), fontsize=15, fontweight="bold")
     figure.savefig(path)
+
+
+def headline_on_picture(result: InspectionResult, title: str, ending: str) -> str:
+    """What stands above the picture: the part, and the verdict or how early the run ended."""
+    return f"{title}    {headline_of(result.verdict, ending, result.coverage).words}"
 
 
 def magnification(result: InspectionResult, nominal: NominalProfile) -> float:

@@ -61,7 +61,8 @@ def write_stack(
             if result is not None and result.judged:
                 write_deviations(result, own / "deviations.csv")
                 if pictures:
-                    write_picture(result, section.profile, f"{title}, height {section.slice.height_mm:g} mm", own / "profile.png")
+                    heading = f"{title}, height {section.slice.height_mm:g} mm"
+                    write_picture(result, section.profile, heading, own / "profile.png", section.run.ending)
             on_section()
         if pictures:
             write_stack_picture(stack, zone, title, folder / "stack.png")

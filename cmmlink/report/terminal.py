@@ -1,7 +1,7 @@
 """The live table of a run and its summary, in the terminal."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from rich.console import Console, Group
@@ -10,13 +10,20 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn
 from rich.table import Table
 
-from cmmlink.events import Counts
+from cmmlink.events import Counts, Ending
 from cmmlink.run_state import RunState
 from cmmlink.run_view import RunView
-from cmmlink.words import VERDICT_WORDS
+from cmmlink.words import Shape, headline_of
 from inspection import InspectionResult, Rejection, Verdict
 
 STYLES = {Verdict.CONFORM: "bold green", Verdict.UNCERTAIN: "bold yellow", Verdict.NONCONFORM: "bold red"}
+_STYLE_OF: Mapping[Shape, str] = {
+    "conform": STYLES[Verdict.CONFORM],
+    "not-proven": STYLES[Verdict.UNCERTAIN],
+    "not-conform": STYLES[Verdict.NONCONFORM],
+    "ended-early": STYLES[Verdict.UNCERTAIN],
+    "none": "bold",
+}
 _REPAINTS_PER_S = 8
 _WHOLE = 0.95  # coverage below which the summary says that nothing is known of the rest
 _MOST_STRETCHES = 10
@@ -51,7 +58,7 @@ class LiveTable:
 def _table_rows(state: RunState) -> dict[str, str]:
     worst, registration = state.worst, state.registration
     moving = "" if registration.can_move_mm is None else f", can move {registration.can_move_mm:.4f} mm"
-    style = next(STYLES[verdict] for verdict, word in VERDICT_WORDS.items() if word == state.verdict.word)
+    style = _STYLE_OF[state.verdict.shape]
     return {
         "part": escape(" ".join(filter(None, [state.part, state.serial_number]))),
         "device": escape(f"{'SIMULATED, ' if state.simulated else ''}{state.device}"),
@@ -60,14 +67,15 @@ def _table_rows(state: RunState) -> dict[str, str]:
         "rate": f"{state.rate_per_s:.0f} points/s",
         "registration": registration.state + (moving if registration.state == "provisional" else ""),
         "worst": "" if worst is None else f"{worst.deviation_mm:+.4f} mm at station {worst.station_mm:.1f} mm",
-        "verdict": f"[{style}]{state.verdict.word}[/]: {state.verdict.why}",
+        "verdict": f"[{style}]{state.verdict.word}[/]: {escape(state.verdict.why)}",
     }
 
 
-def print_summary(console: Console, result: InspectionResult | None, counts: Counts, heading: str) -> None:
-    """Print the verdict, the four numbers, and what the verdict on the profile rests on."""
-    verdict = Verdict.UNCERTAIN if result is None else result.verdict
-    console.print(f"[{STYLES[verdict]}]{VERDICT_WORDS[verdict]}[/]   {escape(heading)}".rstrip())
+def print_summary(console: Console, result: InspectionResult | None, counts: Counts, heading: str, ending: Ending = "complete") -> None:
+    """Print the verdict, or how early the run ended; the four numbers, and what the verdict on the profile rests on."""
+    verdict, share = (None, None) if result is None else (result.verdict, result.coverage)
+    headline = headline_of(verdict, ending if counts.received else "complete", share)
+    console.print(f"[{_STYLE_OF[headline.shape]}]{headline.words}[/]   {escape(heading)}".rstrip())
     for reason in _reservations(result):
         console.print(f"  {reason}", style="yellow")
     console.print(f"received {counts.received} = judged {counts.judged} + rejected {counts.rejected}; lost {counts.lost} points")

@@ -216,6 +216,16 @@ def test_a_stop_ends_an_endless_scan_and_judges_all_that_was_received(live: Live
     assert outcome.counts.received == outcome.counts.judged >= 200
 
 
+def test_an_aborted_scan_has_no_verdict_whatever_was_out(live: LiveInspection) -> None:
+    stop = threading.Event()
+    source = Listed(itertools.cycle(batches(oval_points(0.4), 20)))
+    outcome = carried_out(source, live, stopping_after(200, stop), buffer_points=40, stop=stop)
+    assert (outcome.ending, outcome.measured) == ("aborted", True)
+    assert outcome.result is not None
+    assert outcome.result.out_of_tolerance > 0
+    assert outcome.result.verdict == Verdict.UNCERTAIN
+
+
 def test_a_slow_consumer_holds_the_source_up_and_loses_nothing(live: LiveInspection) -> None:
     produced = 0
     further = threading.Condition()

@@ -9,7 +9,7 @@ import pytest
 
 from cmmlink.devices import Connected
 from cmmlink.errors import StoreError
-from cmmlink.events import Event, Judged, RunFinished, RunStarted, Sink
+from cmmlink.events import Arrived, Event, Judged, RunFinished, RunStarted, Sink
 from cmmlink.record.reader import list_runs, open_to_read, recorded_run
 from cmmlink.run import FinishedRun, carry_out
 from drivers import LinkError
@@ -57,7 +57,7 @@ def test_ready_is_said_before_the_device_is_asked_and_sinks_hear_after_the_recor
     heard: list[str] = []
 
     def sink(event: Event) -> None:
-        if isinstance(event, RunStarted):
+        if isinstance(event, Arrived):
             with open_to_read(tmp_path, today, close_interrupted=False) as store:
                 assert [begin.kind for begin, _ in store.begins_and_ends()] == ["run"]
         if isinstance(event, RunStarted | Judged | RunFinished):
@@ -86,3 +86,13 @@ def test_a_record_that_cannot_be_kept_is_no_run(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="choose another folder with --records"):
         run(Script(lambda: asked.append(True)), tmp_path / "file")
     assert asked == []
+
+
+def test_a_device_that_never_opened_gives_no_run_and_no_result(tmp_path: Path) -> None:
+    def absent() -> None:
+        raise LinkError("there is no such port")
+
+    finished = run(Script(absent), tmp_path)
+    assert not finished.outcome.measured
+    assert finished.evidence is None
+    assert list_runs(tmp_path, today) == []

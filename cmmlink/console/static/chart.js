@@ -2,12 +2,12 @@
 
 import { signed } from "./numbers.js";
 import { middleOf } from "./points.js";
-import { INK, Sheet, mark, ring } from "./sheet.js";
+import { INK, Sheet, cross, mark, ring } from "./sheet.js";
 
 /** @import { RunRow } from "./protocol.js" */
 /** @import { Pen } from "./sheet.js" */
-/** @typedef {{ worst_mm: number, lower_mm: number, upper_mm: number, verdict: RunRow["verdict"], label: string }} Entry */
-/** @typedef {Pick<RunRow, "worst_mm" | "lower_mm" | "upper_mm" | "verdict"> & { label: string }} Candidate */
+/** @typedef {{ worst_mm: number, lower_mm: number, upper_mm: number, verdict: RunRow["verdict"], counted: boolean, label: string }} Entry */
+/** @typedef {Pick<RunRow, "worst_mm" | "lower_mm" | "upper_mm" | "verdict" | "counted"> & { label: string }} Candidate */
 /** @typedef {{ px: (place: number) => number, py: (deviation: number) => number, left: number, bottom: number, width: number }} Scale */
 
 const FEWEST = 20;
@@ -26,13 +26,19 @@ export class Chart {
   }
 
   /**
-   * Show runs or sections in the order of drawing: the newest, or the highest, last. Those without a result are left out.
+   * Show runs or sections in the order of drawing: the newest, or the highest, last. A run without a verdict is a cross in the
+   * middle of its zone, or of the one before: it has a place in the order, and no value.
    * @param {Candidate[]} candidates
    */
   show(candidates) {
-    this.entries = candidates.flatMap(({ worst_mm, lower_mm, upper_mm, verdict, label }) => (
-      worst_mm === null || lower_mm === null || upper_mm === null ? [] : [{ worst_mm, lower_mm, upper_mm, verdict, label }]
-    ));
+    this.entries = [];
+    let zone = candidates.find(hasZone);
+    for (const candidate of candidates) {
+      zone = hasZone(candidate) ? candidate : zone;
+      if (!zone) continue;
+      const { verdict, label, worst_mm } = candidate, { lower_mm, upper_mm } = zone, counted = candidate.counted && worst_mm !== null;
+      this.entries.push({ worst_mm: counted ? worst_mm : middleOf(zone), lower_mm, upper_mm, verdict, counted, label });
+    }
     this.draw();
   }
 
@@ -42,7 +48,8 @@ export class Chart {
     if (!last) return this.drawNothing(pen);
     const scale = this.scale();
     this.drawLimits(pen, scale, last);
-    this.drawLine(pen, entries.map((entry, k) => [scale.px(k), scale.py(entry.worst_mm)]), INK.faint);
+    const places = entries.flatMap((entry, k) => (entry.counted ? [[scale.px(k), scale.py(entry.worst_mm)]] : []));
+    this.drawLine(pen, places, INK.faint);
     entries.forEach((entry, k) => this.drawPoint(pen, entry, scale.px(k), scale.py(entry.worst_mm)));
     ring(pen, scale.px(entries.length - 1), scale.py(last.worst_mm), this.size + 4, 1.5);
     if (this.isLarge) this.drawLabels(pen, scale);
@@ -114,6 +121,7 @@ export class Chart {
    * @param {number} y
    */
   drawPoint(pen, entry, x, y) {
+    if (!entry.counted) return cross(pen, x, y, this.size);
     if (entry.verdict === "nonconform") {
       const isOver = entry.worst_mm > middleOf(entry);
       mark(pen, isOver ? "over" : "under", x, y, this.size + 1);
@@ -139,3 +147,9 @@ export class Chart {
     });
   }
 }
+
+/**
+ * @param {Candidate} candidate
+ * @returns {candidate is Candidate & { lower_mm: number, upper_mm: number }}
+ */
+const hasZone = ({ lower_mm, upper_mm }) => lower_mm !== null && upper_mm !== null;

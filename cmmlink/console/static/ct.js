@@ -4,7 +4,9 @@ import { Chart } from "./chart.js";
 import { buttonOf, byId, fillBar, put } from "./dom.js";
 import { List } from "./list.js";
 import { count } from "./numbers.js";
+import { WORDS_OF_VERDICTS } from "./protocol.js";
 import { Table, cell, verdictCell, worstCells } from "./table.js";
+import { SHAPE_OF } from "./verdicts.js";
 
 /** @import { SurfaceState, SectionRow } from "./protocol.js" */
 
@@ -56,7 +58,7 @@ export class CtView {
     if (shown === this.shown) return;
     this.shown = shown;
     this.table.show(sections, Math.min(this.table.at, Math.max(sections.length - 1, 0)));
-    this.chart.show(sections.map((section) => ({ ...section, label: section.height_mm.toFixed(1) })));
+    this.chart.show(sections.map((section) => ({ ...section, counted: true, label: section.height_mm.toFixed(1) })));
   }
 }
 
@@ -73,5 +75,5 @@ function rowOf(section) {
   const numbers = [section.height_mm.toFixed(3), count(section.received)].map((words) => cell(words, "number"));
   const coverage = cell(`${(100 * section.coverage).toFixed(1)} %`, "number"), notes = cell(section.warnings.join("; "));
   notes.title = section.warnings.join("\n");
-  return [verdictCell(section.verdict), ...numbers, ...worstCells(section), coverage, notes];
+  return [verdictCell(WORDS_OF_VERDICTS[section.verdict], SHAPE_OF[section.verdict]), ...numbers, ...worstCells(section), coverage, notes];
 }

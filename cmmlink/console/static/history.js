@@ -35,13 +35,22 @@ export class History {
     this.table.show(runs);
     const last = runs.slice(0, SHOWN), entries = last.map((run) => ({ ...run, label: run.serial_number || run.run })).reverse();
     for (const chart of this.charts) chart.show(entries);
-    const bad = last.filter((run) => run.verdict === "nonconform").length;
-    put("chart-words", runs.length ? `${last.length} parts, ${bad} NOT CONFORM; newest at the right` : "");
+    put("chart-words", runs.length ? chartWords(last) : "");
   }
+}
+
+/**
+ * How many parts were judged; a run that did not come to its end is no part, and is said.
+ * @param {readonly RunRow[]} runs
+ */
+export function chartWords(runs) {
+  const parts = runs.filter((run) => run.counted), bad = parts.filter((run) => run.verdict === "nonconform").length;
+  const early = runs.length - parts.length, beside = early ? `; \u00d7 ${early} aborted or cut short, not counted` : "";
+  return `${parts.length} parts, ${bad} NOT CONFORM${beside}; newest at the right`;
 }
 
 /** @param {RunRow} run */
 function rowOf(run) {
   const words = [run.part, run.serial_number, run.began.replace("T", " ").slice(0, 19), run.state];
-  return [verdictCell(run.verdict), ...words.map((word) => cell(word)), cell(count(run.received), "number"), ...worstCells(run)];
+  return [verdictCell(run.word, run.shape), ...words.map((word) => cell(word)), cell(count(run.received), "number"), ...worstCells(run)];
 }

@@ -3,7 +3,7 @@
 import { buttonOf, byId, fillBar, put, putInto, showSymbol, styleOf, within } from "./dom.js";
 import { count, digitsFor, signed } from "./numbers.js";
 import { classOf, toleranceUse } from "./points.js";
-import { CODE_OF, shapeOf } from "./verdicts.js";
+import { CODE_OF } from "./verdicts.js";
 
 /** @import { Control, RegistrationState, RunState, StationState } from "./protocol.js" */
 /** @import { LinkState } from "./link.js" */
@@ -53,12 +53,13 @@ export function showRun({ run, station }) {
  */
 function showVerdict(run, station) {
   const { word, why } = run?.verdict ?? readiness(station), card = byId("verdict");
-  const shape = run ? shapeOf(run.verdict.word) : "none", phase = run && !run.verdict.final ? PHASES[run.phase] : "";
+  const shape = run?.verdict.shape ?? "none", phase = run && !run.verdict.final ? PHASES[run.phase] : "";
   document.body.dataset.verdict = shape;
   card.dataset.final = String(Boolean(run?.verdict.final));
   showSymbol(within(card, ".shape"), `shape-${shape}`);
   put("verdict-word", word);
   put("verdict-why", why);
+  byId("verdict-why").title = why; // a long one is cut
   put("provisional", phase);
   byId("provisional").hidden = !phase;
 }

@@ -117,9 +117,10 @@ export interface WorstPoint {
   readonly verdict: "conform" | "uncertain" | "nonconform";
 }
 
-/** The verdict in words, whether it is final, and one line that says why it is so. */
+/** The verdict, or how the run ended, in words; its sign; whether it is final; and one line that says why it is so. */
 export interface VerdictState {
-  readonly word: "CONFORM" | "NOT PROVEN" | "NOT CONFORM";
+  readonly word: string;
+  readonly shape: "conform" | "not-proven" | "not-conform" | "ended-early" | "none";
   readonly final: boolean;
   readonly why: string;
 }
@@ -181,7 +182,7 @@ export interface ShownRun {
   readonly type: "run";
 }
 
-/** One line of the station's history. `worst_mm` is the deviation farthest from the middle of the zone. */
+/** One line of the station's history. `worst_mm` is the deviation farthest from the middle of the zone. word, shape : the verdict, or how early the run ended, and its sign; `counted`: the scan came to its end with a verdict */
 export interface RunRow {
   readonly run: string;
   readonly began: string;
@@ -190,6 +191,9 @@ export interface RunRow {
   readonly state: string;
   readonly received: number;
   readonly verdict: "conform" | "uncertain" | "nonconform" | null;
+  readonly word: string;
+  readonly shape: "conform" | "not-proven" | "not-conform" | "ended-early" | "none";
+  readonly counted: boolean;
   readonly worst_mm: number | null;
   readonly worst_station_mm: number | null;
   readonly lower_mm: number | null;

@@ -98,6 +98,24 @@ export function mark(pen, kind, x, y, size) {
 }
 
 /**
+ * A cross in the place of a run that has no verdict.
+ * @param {Pen} pen
+ * @param {number} x
+ * @param {number} y
+ * @param {number} size
+ */
+export function cross(pen, x, y, size) {
+  pen.strokeStyle = INK.soft;
+  pen.lineWidth = 2;
+  pen.beginPath();
+  for (const side of [-1, 1]) {
+    pen.moveTo(x - size, y - side * size);
+    pen.lineTo(x + size, y + side * size);
+  }
+  pen.stroke();
+}
+
+/**
  * A ring around a point.
  * @param {Pen} pen
  * @param {number} x

@@ -2,8 +2,6 @@
 
 import { showSymbol, within } from "./dom.js";
 import { digitsFor, signed } from "./numbers.js";
-import { WORDS_OF_VERDICTS } from "./protocol.js";
-import { shapeOf } from "./verdicts.js";
 
 /** @import { RunRow } from "./protocol.js" */
 
@@ -78,14 +76,16 @@ export function cell(words, kind = "") {
   return element;
 }
 
-/** @param {RunRow["verdict"]} verdict */
-export function verdictCell(verdict) {
-  const word = verdict && WORDS_OF_VERDICTS[verdict], shape = word ? shapeOf(word) : "none";
+/**
+ * @param {string} word
+ * @param {RunRow["shape"]} shape
+ */
+export function verdictCell(word, shape) {
   const element = cell("", "verdict-cell");
   element.dataset.verdict = shape;
   element.innerHTML = '<svg class="shape" aria-hidden="true"><use/></svg>';
   showSymbol(element, `shape-${shape}`);
-  element.append(word ?? "no verdict");
+  element.append(word);
   return element;
 }
 

@@ -2,6 +2,8 @@
 
 import { CONFORM, NONCONFORM, UNCERTAIN, WORDS_OF_VERDICTS } from "./protocol.js";
 
+/** @import { RunRow } from "./protocol.js" */
+/** @typedef {RunRow["shape"]} Shape */
 /** @typedef {keyof typeof WORDS_OF_VERDICTS} VerdictName */
 
 /** @type {Readonly<Record<VerdictName, number>>} */
@@ -12,8 +14,5 @@ const WORDS = new Map(Object.entries(CODE_OF).map(([name, code]) => [code, WORDS
 /** @param {number} code */
 export const wordOf = (code) => WORDS.get(code) ?? "";
 
-/**
- * The name of a verdict's shape and colour.
- * @param {string} word
- */
-export const shapeOf = (word) => word.toLowerCase().replace(" ", "-");
+/** The name of a verdict's shape and colour. @type {Readonly<Record<VerdictName, Shape>>} */
+export const SHAPE_OF = { conform: "conform", uncertain: "not-proven", nonconform: "not-conform" };

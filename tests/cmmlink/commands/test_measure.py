@@ -50,8 +50,9 @@ def test_a_device_that_is_not_there_is_a_device_failure_and_proves_nothing(nomin
     assert re.match("no-such-port: cannot be opened: .*; is it plugged in, free, and named right", ended.failed(4))
     facts = ended.json()
     assert (facts["verdict"], facts["received"], facts["judged"], facts["complete"]) == ("uncertain", 0, 0, False)
-    words = cmmlink("run", plan)
-    assert words.out.splitlines()[:2] == ["NOT PROVEN   oval 0012, serial no-such-port", "  nothing was judged"]
+    words = cmmlink("run", plan, "--out", nominal.parent / "found")
+    assert words.out.splitlines()[:2] == ["NOT MEASURED   oval 0012, serial no-such-port", "  nothing was judged"]
+    assert list((nominal.parent / "found").iterdir()) == [], "no result of nothing"
 
 
 def test_check_says_what_would_be_run(nominal: Path) -> None:

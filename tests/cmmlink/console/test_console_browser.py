@@ -24,7 +24,7 @@ from cmmlink.record.chain import Draft, Record
 from cmmlink.record.store import Store
 from drivers.errors import LinkError
 from drivers.source import Damaged, LinkDown, LinkUp, Lost
-from inspection import InspectionResult, NominalProfile, RigidTransform, synthetic
+from inspection import InspectionResult, NominalProfile, RigidTransform, Verdict, synthetic
 from tests.drivers.surface.meshes import binary_stl, tube, write
 
 from .conftest import TOKEN, Bench, MakeBench
@@ -97,16 +97,23 @@ def finished(bench: Bench) -> InspectionResult:
     return job.finished.outcome.result
 
 
-def test_escape_aborts(bench: Bench) -> None:
+def test_what_was_aborted_never_stands_as_a_settled_verdict(bench: Bench, keep: Keep) -> None:
     page = bench.started()
-    bench.device.source.put(opened(2000), *batches(measured(bench.profile, 2000, seed=1), 50)[:20])
+    part = measured(bench.profile, 2000, seed=1, defect_mm=0.4)
+    bench.device.source.put(opened(2000), *batches(part, 50)[:20])
     expect(page.locator("#received")).to_have_text("1,000")
     page.keyboard.press("2")
     page.locator("#view-part").wait_for(state="visible")
     page.keyboard.press("Escape")
-    expect(page.locator("#verdict-why")).to_have_text("the scan was aborted")
-    expect(page.locator("#verdict-word")).to_have_text("NOT PROVEN")
+    expect(page.locator("#verdict-word")).to_have_text(re.compile(r"ABORTED AT (49|50) %"))
+    expect(page.locator("#verdict-why")).to_have_text(re.compile(r"no verdict: the scan was aborted; \d+ points out until then"))
+    expect(page.locator("body")).to_have_attribute("data-verdict", "ended-early")
+    expect(page.locator("#verdict")).to_have_attribute("data-final", "false")
+    expect(page.locator("#can-move")).not_to_contain_text("final")
+    page.keyboard.press("1")
+    keep(page, "aborted")
     assert bench.station.wait(20.0)
+    assert finished(bench).verdict is Verdict.UNCERTAIN
     assert bench.station.job is not None
     assert bench.station.job.finished is not None
     assert bench.station.job.finished.outcome.ending == "aborted"
@@ -153,11 +160,23 @@ def test_device_that_fails_ends_the_run_as_not_proven(bench: Bench, keep: Keep) 
     bench.device.source.put(
         opened(2000), *batches(measured(bench.profile, 2000, seed=1), 50)[:30], LinkError("COM3 does not answer any more")
     )
-    expect(page.locator("#verdict-word")).to_have_text("NOT PROVEN")
-    expect(page.locator("#verdict-why")).to_have_text("the scan was cut short")
+    expect(page.locator("#verdict-word")).to_have_text(re.compile(r"CUT SHORT AT 7\d %"))
+    expect(page.locator("#verdict-why")).to_have_text("no verdict: the scan was cut short; none out until then")
     expect(page.locator("#alarm-text")).to_have_text("Device failed: COM3 does not answer any more")
     expect(page.locator("#received")).to_have_text("1,500")
     keep(page, "device-failed")
+
+
+def test_a_device_that_never_opened_is_not_measured(make_bench: MakeBench, tmp_path: Path, keep: Keep) -> None:
+    records = PastRuns(tmp_path / "records", lambda _: None, monotonic, lambda: datetime.now().astimezone())
+    bench = make_bench(records)
+    page = bench.started()
+    bench.device.source.put(LinkError("COM3 cannot be opened"))
+    expect(page.locator("#verdict-word")).to_have_text("NOT MEASURED")
+    expect(page.locator("#verdict-why")).to_have_text("COM3 cannot be opened")
+    keep(page, "never-opened")
+    page.keyboard.press("3")
+    expect(page.locator("#no-runs")).to_be_visible()
 
 
 def test_no_part_found_is_said(bench: Bench, keep: Keep) -> None:
@@ -166,7 +185,7 @@ def test_no_part_found_is_said(bench: Bench, keep: Keep) -> None:
     noise = np.column_stack([rng.uniform(-300, 300, (600, 2)), np.zeros(600)])
     bench.device.source.put(opened(600), *batches(noise, 50), CLOSED)
     expect(page.locator("#verdict-why")).to_have_text("no part found")
-    expect(page.locator("#verdict-word")).to_have_text("NOT PROVEN")
+    expect(page.locator("#verdict-word")).to_have_text("NOT MEASURED")
     expect(page.locator("#alarm-text")).to_contain_text("No part found: the points do not fit the nominal")
     keep(page, "no-part-found")
 
@@ -302,7 +321,7 @@ def test_two_pages_see_the_same_run_and_one_controls_it(bench: Bench) -> None:
     expect(page.locator("#abort")).to_be_disabled()
     watcher.keyboard.press("Escape")
     for one in (page, watcher):
-        expect(one.locator("#verdict-why")).to_have_text("the scan was aborted")
+        expect(one.locator("#verdict-why")).to_contain_text("the scan was aborted")
 
 
 def test_page_says_that_it_is_stale_and_comes_back_after_a_restart(bench: Bench) -> None:

@@ -1,5 +1,6 @@
 """The picture of a profile: its band, its whiskers, and points drawn by their verdicts."""
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 
-from cmmlink.report.picture import magnification, write_picture
+from cmmlink.report.picture import headline_on_picture, magnification, write_picture
 from inspection import NominalProfile
 from tests.cmmlink.judged_oval import bumped, inspect_oval
 
@@ -46,3 +47,9 @@ def test_the_magnification_is_a_round_number_that_shows_the_band(profile: Nomina
     factor = magnification(inspect_oval(profile, 0.0), profile)
     assert factor in {step * power for step in (1, 2, 5) for power in (1, 10, 100)}
     assert 0.024 <= factor * 0.12 / np.hypot(20, 16) <= 0.06
+
+
+def test_the_picture_of_an_aborted_run_says_so(profile: NominalProfile) -> None:
+    result = inspect_oval(profile, bumped())
+    assert headline_on_picture(result, "oval", "complete").endswith("NOT CONFORM")
+    assert headline_on_picture(result, "oval", "aborted") == f"oval    ABORTED AT {math.floor(100 * result.coverage)} %"
