@@ -305,7 +305,7 @@ class RunView:
             return _state_of(NOT_MEASURED, True, self._failure)
         if ended is None:
             return self._verdict_so_far()
-        found = Verdict[ended.result["verdict"].upper()] if ended.result["registration"] else None
+        found = Verdict[ended.result["verdict"].upper()] if ended.result["registration"] and ended.result["received"] else None
         early = ended.ending != "complete" and ended.result["received"] > 0
         headline = headline_of(found, ended.ending, self._share(ended)) if early else headline_of(found)
         return _state_of(headline, not early, _reason_of(ended, found, self.context.coverage_min))

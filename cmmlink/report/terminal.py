@@ -73,7 +73,7 @@ def _table_rows(state: RunState) -> dict[str, str]:
 
 def print_summary(console: Console, result: InspectionResult | None, counts: Counts, heading: str, ending: Ending = "complete") -> None:
     """Print the verdict, or how early the run ended; the four numbers, and what the verdict on the profile rests on."""
-    verdict, share = (None, None) if result is None else (result.verdict, result.coverage)
+    verdict, share = (None, None) if result is None or not counts.received else (result.verdict, result.coverage)
     headline = headline_of(verdict, ending if counts.received else "complete", share)
     console.print(f"[{_STYLE_OF[headline.shape]}]{headline.words}[/]   {escape(heading)}".rstrip())
     for reason in _reservations(result):
