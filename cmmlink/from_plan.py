@@ -30,7 +30,8 @@ def name_place(plan_file: Path, key: str) -> Iterator[None]:
     try:
         yield
     except ValueError as error:
-        raise PlanError(f"{place_of(plan_file, key)}: {error}") from None
+        problem = str(error).removeprefix(f"{key}: ")  # what names its key already needs only the place
+        raise PlanError(f"{place_of(plan_file, key)}: {problem}") from None
 
 
 def profile_of(plan: Plan) -> NominalProfile:

@@ -90,7 +90,7 @@ def test_a_device_that_dies_half_way_ends_with_code_4_and_what_was_received(tmp_
 
 
 def test_a_replay_reads_registers_as_the_map_of_that_day_told(tmp_path: Path) -> None:
-    shipped = (ROOT / "drivers" / "codecs" / "maps" / "generic-ring.yaml").read_text(encoding="utf-8")
+    shipped = (ROOT / "drivers" / "maps" / "generic-ring.yaml").read_text(encoding="utf-8")
     own = tmp_path / "mine.yaml"
     own.write_text(shipped, encoding="utf-8")
     with scanned_oval(tmp_path, "--unpaced") as device:
@@ -105,7 +105,7 @@ def test_a_replay_reads_registers_as_the_map_of_that_day_told(tmp_path: Path) ->
 
 def test_a_map_without_a_suffix_lies_beside_the_plan_and_is_replayed_without_it(tmp_path: Path) -> None:
     own = tmp_path / "mymap"
-    own.write_text((ROOT / "drivers" / "codecs" / "maps" / "generic-ring.yaml").read_text(encoding="utf-8"), encoding="utf-8")
+    own.write_text((ROOT / "drivers" / "maps" / "generic-ring.yaml").read_text(encoding="utf-8"), encoding="utf-8")
     with scanned_oval(tmp_path, "--unpaced") as device:
         code, facts, errors = run(tmp_path, f"{{type: modbus, map: mymap, address: '{device.address}'}}", "--records", str(tmp_path))
     assert (code, facts["received"]) == (0, COUNT), errors
@@ -137,5 +137,6 @@ def test_a_map_with_a_mistake_is_named_with_its_file(tmp_path: Path) -> None:
     plan.write_text(PLAN.format(device="{type: modbus, map: mine.yaml, address: '127.0.0.1:1'}"), encoding="utf-8")
     done = command("check", str(plan))
     assert done.returncode == 2
-    assert "mine.yaml, line 2: pattern:" in done.stderr
+    mine = tmp_path / "mine.yaml"
+    assert f"plan.yaml: line 4: device: {mine}: line 2: pattern is 'newest'; expected 'latest', 'ring', 'queue' or 'fifo'" in done.stderr
     assert "Traceback" not in done.stderr
