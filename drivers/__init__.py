@@ -9,7 +9,9 @@ from drivers.codecs import decoder, decoders
 from drivers.codecs.register_decoder import RegisterDecoder
 from drivers.codecs.register_map import RegisterMap, register_map
 from drivers.errors import DeviceError, DeviceRefused, LinkError, MeshError, PointFileError, ProtocolError
+from drivers.files.column_choice import AxisName
 from drivers.files.point_file import PointFile, PointFileSource, convert_to_mm, points_of, read_points
+from drivers.files.stated_units import UnitName, mm_per
 from drivers.files.text_table import Columns, parse_columns, read_text
 from drivers.links.address import device_address
 from drivers.links.capture import Capture
@@ -34,6 +36,7 @@ from drivers.source import (
 __all__ = [
     "HARMLESS_REASONS",
     "Arrival",
+    "AxisName",
     "Capture",
     "Columns",
     "Damaged",
@@ -57,11 +60,13 @@ __all__ = [
     "ScanClosed",
     "ScanOpened",
     "ScanSource",
+    "UnitName",
     "WireBytes",
     "convert_to_mm",
     "decoder",
     "decoders",
     "device_address",
+    "mm_per",
     "parse_columns",
     "points_of",
     "read_points",

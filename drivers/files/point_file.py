@@ -1,10 +1,11 @@
 """Files of points in millimetres, and such a file as a source.
 
-A file is a text with two or more columns of numbers (csv, txt, asc, xyz; see text_table) or an npy array.
+A file is a text with two or more columns of numbers (csv, txt, asc, xyz; see text_table) or an npy array. Rows without numbers
+stay rows: their coordinates are NaN, so that the inspection rejects and counts them.
 """
 
 import tokenize
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
@@ -13,7 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.errors import PointFileError
-from drivers.files.text_table import AXIS_NAME, Array, Columns, axis_letters, count_of, parse_columns, read_bytes, read_text, shorten
+from drivers.files.column_choice import AxisName, axes_of, choose_axes, refuse_places
+from drivers.files.stated_units import MM_PER_UNIT, UNITS, UnitName, units_of_names
+from drivers.files.text_table import Array, Columns, count_of, parse_columns, read_bytes, read_text
 from drivers.source import Arrival, PointBatch, ScanClosed, ScanOpened
 
 # What numpy's reader of npy headers lets through on files that are none; RecursionError and MemoryError come from its literal_eval.
@@ -30,12 +33,11 @@ _NPY_ERRORS = (
     tokenize.TokenError,
 )
 _LARGEST_MM = 1e6  # a kilometre: beyond it the unit or the scale is wrong, and a float64 no longer resolves a tenth of a nanometre
-_MM_PER_UNIT = {"m": 1000.0, "cm": 10.0, "um": 0.001, "µm": 0.001, "in": 25.4, "inch": 25.4}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointFile:
-    """Measured points of a file: points_mm (m, 3), in the order of the file, and notes of what was assumed."""
+    """Measured points of a file: points_mm (m, 3), in the order of the file, NaN for rows without numbers; notes of what was assumed."""
 
     points_mm: Array
     notes: tuple[str, ...]
@@ -50,13 +52,21 @@ class PointFileSource:
     The file is read here, so that a bad one is refused (PointFileError) before a run begins.
     """
 
-    def __init__(self, path: Path, scale: float = 1.0, batch_points: int = 1024) -> None:
+    def __init__(
+        self,
+        path: Path,
+        scale: float = 1.0,
+        batch_points: int = 1024,
+        *,
+        unit: UnitName | None = None,
+        columns: Mapping[AxisName, int] | None = None,
+    ) -> None:
         if batch_points < 1:
             raise ValueError(f"a batch holds at least one point, not {batch_points}")
         self._name = path.name
         self._batch_points = batch_points
         self._stopped = Event()
-        self._file = read_points(path, scale)
+        self._file = read_points(path, scale, unit=unit, columns=columns)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -79,31 +89,94 @@ class PointFileSource:
         self._stopped.set()
 
 
-def read_points(path: Path, scale: float = 1.0) -> PointFile:
-    """Read measured points (m, 3) in mm from csv, txt, asc, xyz or npy; `scale` turns the file's unit into mm.
+def read_points(
+    path: Path, scale: float = 1.0, *, unit: UnitName | None = None, columns: Mapping[AxisName, int] | None = None
+) -> PointFile:
+    """Read measured points (m, 3) in mm from csv, txt, asc, xyz or npy. Two columns are x and y, at z = 0.
 
-    Two columns are x and y, at z = 0. Raises PointFileError: file, line, what was found, what is expected.
+    scale   : how many mm a unit of the file is
+    unit    : the same in words, above whatever the file states; not beside a scale
+    columns : which columns (from 1) are x, y and z, where the file itself does not tell
+
+    Raises PointFileError: file, line, what was found, what is expected.
     """
-    if path.suffix.lower() == ".npy":
-        return _read_npy(path, scale)
-    text = read_text(path)
+    npy = path.suffix.lower() == ".npy"
+    text = "" if npy else read_text(path)
+    if npy and not read_bytes(path):
+        raise PointFileError(f"{path}: the file is empty")
     try:
-        points, notes = points_of(parse_columns(text), scale)
-        _refuse_fewer_than_two(points)
+        return _read_npy(path, unit, scale, columns) if npy else _read_table(text, unit, scale, columns)
     except PointFileError as error:
         raise PointFileError(f"{path}: {error}") from None
-    return PointFile(points, notes)
 
 
-def points_of(columns: Columns, scale: float) -> tuple[Array, tuple[str, ...]]:
+def _read_table(text: str, unit: UnitName | None, scale: float, columns: Mapping[AxisName, int] | None) -> PointFile:
+    table = parse_columns(text, axes_of(columns).values())
+    chosen, notes = choose_axes(table, columns)
+    points = _points_with_gaps(table.values, chosen, table.line_numbers, _mm_per_unit(table, scale, unit))
+    _refuse_fewer_than_two(points)
+    return PointFile(points, (*table.notes, *notes, *_note_of_unit(table, unit), *_note_of_gaps(points)))
+
+
+def points_of(columns: Columns, scale: float, unit: UnitName | None = None) -> tuple[Array, tuple[str, ...]]:
     """Return points (m, 3) in mm from the columns x, y and z, found by their names or else the first ones, and notes.
 
     Raises PointFileError when it is not clear which columns those are, or when a coordinate is no usable number.
     """
-    chosen, notes = _choose_columns(columns, scale)
+    chosen, notes = choose_axes(columns, None)
     points = np.zeros((len(columns.values), 3))
-    points[:, : len(chosen)] = convert_to_mm(columns.values[:, chosen], columns.line_numbers, scale)
-    return points, columns.notes + tuple(notes)
+    factor = _mm_per_unit(columns, scale, unit)
+    for axis, place in chosen.items():
+        points[:, "xyz".index(axis)] = convert_to_mm(columns.values[:, [place]], columns.line_numbers, factor)[:, 0]
+    return points, (*columns.notes, *notes, *_note_of_unit(columns, unit))
+
+
+def _mm_per_unit(table: Columns | None, scale: float, unit: UnitName | None) -> float:
+    """How many mm a unit of the file is: as asked, else as the file states it. Raises PointFileError where it states another than mm."""
+    if unit is not None:
+        if scale != 1.0:
+            raise PointFileError(f"unit {unit} and scale {scale:g} are both given; expected one of them")
+        return MM_PER_UNIT[unit]
+    stated = [*units_of_names(table.names), *table.units] if table else []
+    if scale != 1.0 or not stated:
+        return scale
+    kinds = {each.unit: each for each in reversed(stated)}  # of each unit the first word
+    if len(kinds) > 1:
+        second, first = list(kinds.values())[-2:]
+        raise PointFileError(f"{first.place} {first.word}, but {second.place} {second.word}; expected one unit: give the unit")
+    only = kinds.popitem()[1]
+    if only.unit == "mm":
+        return 1.0
+    by_name = f"the unit {only.unit}, or " if only.unit in UNITS else ""
+    raise PointFileError(f"{only.place} {only.word}; expected mm: give {by_name}the scale {only.mm:g}")
+
+
+def _note_of_unit(table: Columns, unit: UnitName | None) -> list[str]:
+    """Say what unit was taken where it was asked for, and where the file states another."""
+    if unit is None:
+        return []
+    others = [each for each in (*units_of_names(table.names), *table.units) if each.unit != unit]
+    return [f"read in {unit}, as asked" + (f", although {others[0].place} {others[0].word}" if others else "")]
+
+
+def _points_with_gaps(
+    values: Array, chosen: Mapping[AxisName, int], line_numbers: NDArray[np.int64], factor: float, place: str = "line"
+) -> Array:
+    """Points (m, 3) in mm of the chosen columns; a row that lacks a number is NaN as a whole. Axes that are not there are 0."""
+    columns = values[:, list(chosen.values())]
+    there = np.isfinite(columns).all(axis=1)
+    if not there.any():
+        raise PointFileError("no row holds numbers for all coordinates; expected coordinates in mm")
+    points = np.full((len(values), 3), np.nan)
+    points[there] = 0.0
+    for column, axis in enumerate(chosen):
+        points[there, "xyz".index(axis)] = convert_to_mm(columns[there][:, [column]], line_numbers[there], factor, place)[:, 0]
+    return points
+
+
+def _note_of_gaps(points: Array) -> list[str]:
+    missing = int(np.count_nonzero(np.isnan(points).any(axis=1)))
+    return [f"{count_of(missing, 'row')} without numbers: rejected"] if missing else []
 
 
 def convert_to_mm(values: Array, line_numbers: NDArray[np.int64], scale: float, place: str = "line") -> Array:
@@ -121,60 +194,27 @@ def convert_to_mm(values: Array, line_numbers: NDArray[np.int64], scale: float, 
     return scaled
 
 
-def _choose_columns(columns: Columns, scale: float) -> tuple[list[int], list[str]]:
-    """Choose the columns that are x, y and, if there is one, z; return their places, and notes."""
-    count = columns.values.shape[1]
-    letters = axis_letters(columns.names)
-    for letter in "xyz":
-        if letters.count(letter) > 1:
-            raise PointFileError(f"the header names more than one column {letter}: {', '.join(columns.names)}; expected one x, y and z")
-    if "x" in letters and "y" in letters:
-        _refuse_other_unit(columns.names, scale)
-        chosen = [letters.index(letter) for letter in "xyz" if letter in letters]
-        ignored = [name or f"column {i + 1}" for i, name in enumerate(columns.names) if i not in chosen]
-        return chosen, [f"columns left out: {', '.join(ignored)}"] if ignored else []
-    _refuse_unclear_columns(columns, count)
-    return list(range(min(count, 3))), [f"the first three of {count} columns taken as x, y, z"] if count > 3 else []
-
-
-def _refuse_other_unit(names: Sequence[str], scale: float) -> None:
-    for axis in filter(None, map(AXIS_NAME.match, names)):
-        factor = _MM_PER_UNIT.get((axis[2] or "mm").lower())
-        if factor is not None and scale == 1.0:
-            raise PointFileError(f"the header gives {axis[1]} in {axis[2]}; expected mm: give the scale {factor:g}")
-
-
-def _refuse_unclear_columns(columns: Columns, count: int) -> None:
-    """Ask for names rather than guess: a column in front of x would shift every coordinate by one place."""
-    if columns.names and count > 2:
-        names = shorten(", ".join(columns.names))
-        raise PointFileError(f"the header names no columns x and y: {names}; expected x, y and perhaps z among them")
-    first = columns.values[:, 0]
-    if count > 3 and len(first) > 2 and first[0] in (0, 1) and np.all(np.diff(first) == 1):
-        raise PointFileError("the first column counts the rows; expected x, y, z first, or a header line that names the columns x, y, z")
-
-
 def _refuse_fewer_than_two(points: Sequence[object] | Array) -> None:
     if len(points) < 2:
         raise PointFileError(f"{count_of(len(points), 'point')}; expected at least two")
 
 
-def _read_npy(path: Path, scale: float) -> PointFile:
-    """Read an array (m, 2) or (m, 3) from an npy file. It is mapped first, so that a header that promises too much costs no memory."""
-    if not read_bytes(path):
-        raise PointFileError(f"{path}: the file is empty")
+def _read_npy(path: Path, unit: UnitName | None, scale: float, columns: Mapping[AxisName, int] | None) -> PointFile:
+    """Read an array (m, 2) or (m, 3) from an npy file, or a wider one where columns are given.
+
+    The file is mapped first, so that a header that promises too much costs no memory.
+    """
     try:
         array = np.lib.format.open_memmap(path, mode="r")
     except _NPY_ERRORS:
-        raise PointFileError(f"{path}: not a readable npy file of numbers; expected an array (m, 2) or (m, 3)") from None
-    if not isinstance(array, np.ndarray) or array.ndim != 2 or array.shape[1] not in (2, 3) or array.dtype.kind not in "fiu":
+        raise PointFileError("not a readable npy file of numbers; expected an array (m, 2) or (m, 3)") from None
+    flat = isinstance(array, np.ndarray) and array.ndim == 2 and array.dtype.kind in "fiu"
+    if not flat or (columns is None and array.shape[1] not in (2, 3)):
         found = f"{array.dtype} array of shape {array.shape}" if isinstance(array, np.ndarray) else "an archive"
-        raise PointFileError(f"{path}: {found}; expected numbers of shape (m, 2) or (m, 3)")
-    try:
-        values = np.array(array, dtype=np.float64)
-        _refuse_fewer_than_two(values)
-        points = np.zeros((len(values), 3))
-        points[:, : values.shape[1]] = convert_to_mm(values, np.arange(len(values)), scale, place="row")
-    except PointFileError as error:
-        raise PointFileError(f"{path}: {error}") from None
-    return PointFile(points, ())
+        raise PointFileError(f"{found}; expected numbers of shape (m, 2) or (m, 3)")
+    refuse_places(columns, array.shape[1])
+    values = np.array(array, dtype=np.float64)
+    _refuse_fewer_than_two(values)
+    chosen = axes_of(columns) or dict(zip(("x", "y", "z"), range(values.shape[1]), strict=False))
+    points = _points_with_gaps(values, chosen, np.arange(len(values)), _mm_per_unit(None, scale, unit), "row")
+    return PointFile(points, tuple(_note_of_gaps(points)))

@@ -1,14 +1,16 @@
 """A table of numbers from any text: nominals, plans and files of points are read through it.
 
 What a text may look like: two or more columns apart by commas, semicolons, tabs or blanks, with decimal points or decimal
-commas, a header, comment lines, a byte order mark, a first line that counts the rows. What it means is settled from the text
-itself; where it could mean two things it is refused, with the line.
+commas, a header, a row of units, comment lines, a byte order mark, a first line that counts the rows, quoted fields, words in
+columns that are not asked for, rows without numbers. What it means is settled from the text itself; where it could mean two
+things it is refused, with the line.
 
 Functions that take a path name the file in their errors; functions that take text name the line alone.
 """
 
+import csv
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.errors import PointFileError
+from drivers.files.stated_units import StatedUnit, axis_letters, units_of_lines, units_of_row
 
 Array = NDArray[np.float64]
 Numbered = list[tuple[int, str]]  # line number and what stands on the line
@@ -24,23 +27,28 @@ _SNIFFED_LINES = 100
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
 _COMMENT = re.compile(r"#(?!N/A|VALUE!|DIV/0!|REF!|NUM!|NAME\?|NULL!)|%|!|//")  # a spreadsheet's error value is no comment
 _COMMENT_STARTS = ("#", "%", "!", "/")
-AXIS_NAME = re.compile(r"([xyz])(?![a-z0-9])(?:.*?(?<![a-zµ])(mm|cm|m|µm|um|inch|in)[\])]?$)?", re.IGNORECASE)
+_REMARK = re.compile(r"\s*(?:#(?!N/A|VALUE!|DIV/0!|REF!|NUM!|NAME\?|NULL!)|!|//).*")  # behind the numbers of a row
+_NO_NUMBER = re.compile(r"|-+|\*+|\?+|nan|null|none|#?N/?A|#(VALUE!|DIV/0!|REF!|NUM!|NAME\?|NULL!)", re.IGNORECASE)
+_UNDERLINE = re.compile(r"[-=+|\s]+")
+_VECTOR_NAMES = tuple("xyzijk")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Columns:
     """Numbers of a text, one row a line.
 
-    values       : (m, c)
+    values       : (m, c); NaN where a row holds no number
     line_numbers : (m,) where each row stands, from 1
     names        : (c,) the header's names of the columns, or none
     notes        : what was understood that the reader of the file may want to know
+    units        : what the text states of its unit in remarks, header lines and a row of units; the names are not among them
     """
 
     values: Array
     line_numbers: NDArray[np.int64]
     names: tuple[str, ...]
     notes: tuple[str, ...]
+    units: tuple[StatedUnit, ...] = ()
 
     def __post_init__(self) -> None:
         self.values.setflags(write=False)
@@ -80,29 +88,25 @@ def read_bytes(path: Path) -> bytes:
         raise PointFileError(f"{path}: cannot be read: {error}") from None
 
 
-def parse_columns(text: str) -> Columns:
-    """Read columns of numbers, at least two, from a text. Raises PointFileError, naming the line."""
-    header, data, comment = _split_lines(text)
+def parse_columns(text: str, places: Collection[int] = ()) -> Columns:
+    """Read columns of numbers, at least two, from a text. Raises PointFileError, naming the line.
+
+    places : columns (from 0) whose numbers are wanted; words in the others do no harm. None: those that the header names x, y and z
+    """
+    header, data, remarks, wanted = _split_lines(text, tuple(sorted(places)))
     if not data:
         raise PointFileError("no line of numbers in the file; expected two or three columns of numbers")
-    reading = _find_reading(data)
+    reading, wanted = _find_reading(data, wanted)
     notes: list[str] = []
     data = _drop_count(data, reading, notes)
-    values = _values(data, reading)
+    values = _values(data, reading, wanted)
     columns = values.shape[1]
     _refuse_unclear_commas(data, reading, columns)
     if reading.decimal == ",":
         notes.append("decimal commas")
-    names = _names(header, comment, reading, columns)
-    understood = 1 if header and {"x", "y"} <= set(axis_letters(names)) else 0
-    notes += [f"line {number} taken as a header: '{shorten(line)}'" for number, line in header[: len(header) - understood]]
-    return Columns(values, np.array([number for number, _ in data], dtype=np.int64), names, tuple(notes))
-
-
-def axis_letters(names: Sequence[str]) -> list[str]:
-    """Return which axis each name of a column is: x, y, z, or nothing."""
-    axes = [AXIS_NAME.match(name) for name in names]
-    return [axis[1].lower() if axis else "" for axis in axes]
+    names, units, understood = _names_and_units(header, remarks, data[0][0], reading, columns)
+    notes += [f"line {number} taken as a header: '{shorten(line)}'" for number, line in header if number not in understood]
+    return Columns(values, np.array([number for number, _ in data], dtype=np.int64), names, tuple(notes), tuple(units))
 
 
 def shorten(text: str) -> str:
@@ -132,18 +136,27 @@ class _Reading:
             field = "?" if "." in field else field.replace(",", ".")
         return _NUMBER.fullmatch(field) is not None
 
-    def explains(self, line: str) -> bool:
+    def explains(self, line: str, wanted: Collection[int] = ()) -> bool:
+        """Tell whether all fields of a line are numbers, or those in the wanted places."""
         fields = self.fields(line)
-        return len(fields) > 1 and all(map(self.is_number, fields))
+        if not wanted:
+            return len(fields) > 1 and all(map(self.is_number, fields))
+        return len(fields) > max(wanted) and all(self.is_number(fields[place]) for place in wanted)
 
-    def row(self, number: int, line: str) -> list[float]:
-        """Return the numbers of a line. Raises PointFileError, naming what is none."""
+    def row(self, number: int, line: str, wanted: Collection[int] = ()) -> list[float]:
+        """Return the numbers of a line, NaN for words not wanted and for a row without numbers. Raises PointFileError, naming the word."""
         fields = self.fields(line)
-        for column, field in enumerate(fields, 1):
+        if wanted and len(fields) == max(wanted):
+            fields.append("")  # the last field, which is empty
+        asked = wanted if wanted and len(fields) > max(wanted) else range(len(fields))
+        if len(fields) > 1 and all(_NO_NUMBER.fullmatch(fields[place]) for place in asked):
+            return [float("nan")] * len(fields)
+        for place in asked:
+            field = fields[place]
             if not self.is_number(field):
-                found = f"'{shorten(field)}' is not a number" if field else f"column {column} is empty"
-                raise PointFileError(f"line {number}: {found}; expected numbers {self}")
-        return [float(field.replace(",", ".").replace("d", "e").replace("D", "e")) for field in fields]
+                found = f"'{shorten(field)}' is not a number" if field else f"column {place + 1} is empty"
+                raise PointFileError(f"line {number}: {found}; expected numbers {self}{_hint_of_labels(fields, self)}")
+        return [_number(field) if self.is_number(field) else float("nan") for field in fields]
 
     def __str__(self) -> str:
         between = {None: "blanks", "\t": "tabs", ";": "semicolons", ",": "commas"}[self.delimiter]
@@ -154,36 +167,86 @@ class _Reading:
 _READINGS = tuple(_Reading(*marks) for marks in ((";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), (None, "."), (None, ",")))
 
 
-def _split_lines(text: str) -> tuple[Numbered, Numbered, Numbered]:
-    """Split a text into header lines, lines of data, and the last comment before the data, which may name the columns."""
+def _number(field: str) -> float:
+    return float(field.replace(",", ".").replace("d", "e").replace("D", "e"))
+
+
+def _hint_of_labels(fields: Sequence[str], reading: _Reading) -> str:
+    """Say what to do where words stand beside two numbers or more: a label has a column of its own."""
+    words = [field for field in fields if not reading.is_number(field)]
+    if len(fields) - len(words) < 2 or not all(re.match(r"[^\W\d_]{2}", word) for word in words):
+        return ""
+    return "; name the columns in a header line, like name,x,y,z, or say which are x and y (columns x=2,y=3)"
+
+
+def _split_lines(text: str, wanted: tuple[int, ...]) -> tuple[Numbered, Numbered, Numbered, tuple[int, ...]]:
+    """Split a text into header lines, lines of data and remarks; give the wanted columns as well, if need be by their names."""
     header: Numbered = []
     data: Numbered = []
-    comment: Numbered = []
+    remarks: Numbered = []
+    asked = bool(wanted)
     for number, raw in enumerate(text.split("\n"), 1):
-        line = raw.strip()
+        line = _without_quotes(raw.strip())
         remark = _COMMENT.match(line) if line[:1] in _COMMENT_STARTS else None
         if remark:
-            comment = comment if data else [(number, line[remark.end() :].lstrip("#%!/ "))]
-        elif line and (data or not _is_header(line)):
-            data.append((number, line.split(" #")[0].rstrip() if " #" in line else line))
+            line = line[remark.end() :].lstrip("#%!/ ")
+            remarks.append((number, line))
+        elif line and (data or _is_data(line, wanted, bool(header))):
+            data.append((number, _REMARK.sub("", line, count=1)))
+            continue
         elif line:
             header.append((number, line))
-    return header, data, comment
+        if line and not data and not asked:
+            wanted = _named_places(line) or wanted
+    return header, data, remarks, wanted
 
 
-def _values(data: Numbered, reading: _Reading) -> Array:
+def _is_data(line: str, wanted: Sequence[int], below_header: bool) -> bool:
+    """Tell whether a line may begin the data: it is no header, or holds numbers where they are wanted."""
+    if wanted and any(reading.explains(line, wanted) for reading in _READINGS):
+        return True
+    return not _is_header(line) and not (below_header and _UNDERLINE.fullmatch(line))
+
+
+def _without_quotes(line: str) -> str:
+    """Take the quotes from fields; where a quoted field holds a comma, semicolons stand between the fields instead."""
+    if line.count('"') < 2 or line.count('"') % 2:
+        return line
+    if not re.search(r'"[^"]*,[^"]*"\s*(,|$)', line) or ";" in line or "\t" in line:
+        return line.replace('"', "")
+    return ";".join(next(csv.reader([line], skipinitialspace=True)))
+
+
+def _named_places(line: str) -> tuple[int, ...]:
+    """Where a line names the axes x and y, and perhaps z: their columns (from 0); none where it does not."""
+    for delimiter in (";", "\t", ",", None):
+        letters = axis_letters([name.strip() for name in line.split(delimiter)])
+        places = [place for place, letter in enumerate(letters) if letter]
+        if {"x", "y"} <= set(letters) and len(places) == len({letters[place] for place in places}):
+            return tuple(places)
+    return ()
+
+
+def _values(data: Numbered, reading: _Reading, wanted: Sequence[int]) -> Array:
     """Return the numbers (m, c) of the lines. numpy reads plain files; what it cannot read is looked at line by line."""
     if reading.decimal == ".":
         try:
             return np.loadtxt([line for _, line in data], delimiter=reading.delimiter, comments=None, ndmin=2)
         except ValueError:
             pass
-    rows = [reading.row(number, line) for number, line in data]
-    first = len(rows[0])
-    for (number, _), row in zip(data, rows, strict=True):
-        if len(row) != first:
+    rows = [reading.row(number, line, wanted) for number, line in data]
+    widest = max(map(len, rows))
+    for (_, line), row in zip(data, rows, strict=True):
+        if wanted and reading.delimiter and line.endswith(reading.delimiter) and len(row) == widest - 1:
+            row.append(float("nan"))  # an empty last field
+    full = next((at for at, row in enumerate(rows) if not np.isnan(row).all()), 0)
+    first = len(rows[full])
+    for at, (number, _) in enumerate(data):
+        if len(rows[at]) != first and np.isnan(rows[at]).all():
+            rows[at] = [float("nan")] * first
+        if len(rows[at]) != first:
             raise PointFileError(
-                f"line {number}: {count_of(len(row), 'column')}, line {data[0][0]} has {first}; expected as many on every line"
+                f"line {number}: {count_of(len(rows[at]), 'column')}, line {data[full][0]} has {first}; expected as many on every line"
             )
     return np.array(rows)
 
@@ -191,21 +254,29 @@ def _values(data: Numbered, reading: _Reading) -> Array:
 def _is_header(line: str) -> bool:
     """Tell whether a line is a header: its first word is no number, and at most half of its words are (a damaged row has more)."""
     words = [word for word in re.split(r"[;,\t ]+", line) if word]
+    if len(words) > 1 and all(map(_NO_NUMBER.fullmatch, words)):
+        return False
     numbers = [_NUMBER.fullmatch(word) is not None for word in words]
     return line[0] != "#" and re.search(r"[^\W\d_]", line) is not None and not numbers[0] and 2 * sum(numbers) <= len(numbers)
 
 
-def _find_reading(data: Numbered) -> _Reading:
-    """Find the reading that explains most of the first lines. Raises PointFileError when none explains any."""
+def _find_reading(data: Numbered, wanted: tuple[int, ...]) -> tuple[_Reading, tuple[int, ...]]:
+    """Find the reading that explains most of the first lines, and the places that it wants: none named where that explains fewer.
+
+    Raises PointFileError when none explains any.
+    """
     sample = [line for _, line in data[:_SNIFFED_LINES]]
-    score = {reading: sum(map(reading.explains, sample)) for reading in _READINGS}
-    best = max(_READINGS, key=lambda reading: score[reading])
-    if score[best]:
-        return best
+    for places in ((), wanted) if wanted else ((),):
+        score = {reading: sum(reading.explains(line, places) for line in sample) for reading in _READINGS}
+        best = max(_READINGS, key=lambda reading: score[reading])
+        if score[best]:
+            as_wanted = sum(best.explains(line, wanted) for line in sample) if wanted else 0
+            return best, wanted if as_wanted >= score[best] else ()
     number, line = data[0]
     if re.fullmatch(_NUMBER, line) or re.fullmatch(r"[+-]?\d+,\d+", line):
         raise PointFileError(f"line {number}: one column ('{shorten(line)}'); expected two or three: x, y and perhaps z")
-    raise PointFileError(f"line {number}: '{shorten(line)}' is not a row of numbers; expected two or three columns of numbers")
+    labels = next(filter(None, (_hint_of_labels(reading.fields(line), reading) for reading in _READINGS)), "")
+    raise PointFileError(f"line {number}: '{shorten(line)}' is not a row of numbers; expected two or three columns of numbers{labels}")
 
 
 def _drop_count(data: Numbered, reading: _Reading, notes: list[str]) -> Numbered:
@@ -231,15 +302,37 @@ def _refuse_unclear_commas(data: Numbered, reading: _Reading, columns: int) -> N
             )
 
 
-def _names(header: Numbered, comment: Numbered, reading: _Reading, columns: int) -> tuple[str, ...]:
-    """Return the names of the columns: the last header line or the last comment before the data, when one fits.
+def _names_and_units(
+    header: Numbered, remarks: Numbered, first: int, reading: _Reading, columns: int
+) -> tuple[tuple[str, ...], list[StatedUnit], set[int]]:
+    """Return the names of the columns, the units that the text states, and the header lines that are understood so.
+
+    The names are those of the last header line, or the last remark before the first row, that fits the columns.
+    """
+    before = [(number, line) for number, line in remarks[::-1] if number < first]
+    names, line_of_names = _names(header, before, reading, columns)
+    units, understood = units_of_lines(header + remarks), {line_of_names}
+    for number, line in header:
+        if number == line_of_names:
+            continue
+        row = units_of_row(number, line.split(reading.delimiter), axis_letters(names))
+        if row or any(unit.place.startswith(f"line {number} ") for unit in units):
+            units = [unit for unit in units if not unit.place.startswith(f"line {number} ")] + row if row else units
+            understood.add(number)
+    return names, units, understood
+
+
+def _names(header: Numbered, remarks: Numbered, reading: _Reading, columns: int) -> tuple[tuple[str, ...], int]:
+    """Return the names of the columns and their line, 0 where nothing names an axis.
 
     Words apart by blanks are names only if x and y are among them; else they are a title of as many words.
     """
-    for _, line in header[-1:] + comment:
+    for number, line in header[::-1] + remarks:
+        if line.upper().startswith("XYZIJK"):
+            return (*_VECTOR_NAMES[:columns], *[""] * (columns - len(_VECTOR_NAMES))), number
         for delimiter in (reading.delimiter, ";", "\t", ",", None):
             names = [name.strip().strip("\"'") for name in line.split(delimiter)]
-            if len(names) == columns and {"x", "y"} <= set(axis_letters(names)):
-                return tuple(names)
+            if len(names) == columns and len({"x", "y", "z"} & set(axis_letters(names))) > 1:
+                return tuple(names), number
     names = [name.strip() for name in header[-1][1].split(reading.delimiter)] if header and reading.delimiter else []
-    return tuple(names) if len(names) == columns else ()
+    return (tuple(names) if len(names) == columns else ()), 0

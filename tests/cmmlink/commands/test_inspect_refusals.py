@@ -18,8 +18,7 @@ WRONG_POINTS = {
     "text": (b"this is\nno list of points\n", "no line of numbers"),
     "header alone": (b"x_mm,y_mm\n", "no line of numbers"),
     "bytes": (bytes(range(256)), "line 1: not a text file"),
-    "nan": (f"1,2\n3,nan\n{GOOD_ROWS}".encode(), r"line 2: nan is not a finite number"),
-    "infinite": (f"x,y\n1,2\n3,inf\n{GOOD_ROWS}".encode(), r"line 3: inf is not a finite number"),
+    "nothing but nan": (b"1,nan\n" * 30, r"no row holds numbers for all coordinates"),
     "word": (f"1,2\n3,four\n{GOOD_ROWS}".encode(), r"line 2: 'four' is not a number"),
     "ragged": (f"1,2\n3\n{GOOD_ROWS}".encode(), r"line 2: "),
     "one column": (b"1\n2\n3\n", r"line 1: one column"),
@@ -39,6 +38,14 @@ def test_points_that_cannot_be_used_are_refused_by_file_and_line(nominal: Path, 
     ended = cmmlink("inspect", points, "--nominal", nominal, *TOLERANCE)
     assert re.match(re.escape(f"{points}: ") + message, ended.refused())
     assert ended.out == ""
+
+
+def test_rows_without_numbers_are_rejected_and_counted(nominal: Path) -> None:
+    points = nominal.parent / "gaps.csv"
+    points.write_text(f"nan,nan\n{GOOD_ROWS}3,nan\n", encoding="utf-8")
+    facts = cmmlink("inspect", points, "--nominal", nominal, *TOLERANCE, "--fit", "none", "--json").json()
+    assert (facts["received"], facts["judged"], facts["rejected"]) == (362, 360, 2)
+    assert facts["rejected_by_reason"] == {"not finite": 2}
 
 
 def test_swapped_columns_are_named_as_the_cause(tmp_path: Path) -> None:
