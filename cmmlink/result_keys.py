@@ -84,8 +84,9 @@ class Inspected(_Json):
 
 
 class Measured(Inspected):
-    """The result of `inspect`: also how the run ended, what was measured, by whom and with what."""
+    """The result of a run that was not recorded (`--no-record`): also how the run ended, what was measured, by whom and with what."""
 
+    measured_at: str = Field(description="when the run began, in UTC, like 2026-03-14T15:09:26.000Z")
     ending: Ending = Field(description="how the run ended; aborted (by the operator, then the verdict is uncertain), or cut short")
     part: str = Field(description="the name of the part")
     serial_number: str | None = Field(description="the serial number of the part")
@@ -95,7 +96,7 @@ class Measured(Inspected):
 
 
 class Recorded(Measured):
-    """The result of `run` and `demo`: also what ties it to its record."""
+    """The result of `inspect`, `run` and `demo`: also what ties it to its record."""
 
     run: str = Field(description="the id of the recorded run")
     chain_sha256: str = Field(description="the hash of the run's last record, which follows from every record before it")
@@ -115,6 +116,7 @@ class Change(_Json):
 class Replayed(Inspected):
     """The result of `replay`: also how it compares with the recorded one."""
 
+    measured_at: str = Field(description="when the recorded run began, in UTC")
     ending: Ending = Field(description="how the recorded run ended")
     replay_of: str = Field(description="the id of the recorded run")
     chain_sha256: str = Field(description="the hash of the run's last record")
@@ -143,6 +145,7 @@ class StackInspected(_Json):
 
     verdict: VerdictName = Field(description="the verdict of the worst section; at best uncertain where sections are missing")
     complete: bool = Field(description="whether every section that was asked for was inspected")
+    measured_at: str = Field(description="when the inspection began, in UTC")
     mesh: str = Field(description="the file of the surface")
     mesh_kind: str = Field(description="the format of that file, like binary STL")
     triangles: int = Field(description="the number of triangles of the surface")
@@ -174,7 +177,7 @@ class RunLine(_Json):
     """One run in the list of runs."""
 
     run: str = Field(description="the id of the run")
-    started: str | None = Field(description="date and time with the offset from UTC")
+    started: str | None = Field(description="date and time in UTC, with a Z; of records of earlier versions with the offset from UTC")
     part: str | None = Field(description="the name of the part")
     serial_number: str | None = Field(description="the serial number of the part, empty where none was given")
     state: State = Field(description="how the run ended; running: it is being recorded just now; damaged: its records were altered")
@@ -226,7 +229,7 @@ class Shown(_Json):
     """The answer of `show`, and `run.json` of `export`: all that is known of a run but its points."""
 
     run: str = Field(description="the id of the run")
-    started: str = Field(description="date and time with the offset from UTC")
+    started: str = Field(description="date and time in UTC, with a Z; of records of earlier versions with the offset from UTC")
     clock_s: float = Field(description="the reading of the run's clock at its start")
     part: str = Field(description="the name of the part")
     serial_number: str = Field(description="the serial number of the part, empty where none was given")

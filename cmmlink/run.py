@@ -19,8 +19,10 @@ from cmmlink.from_plan import inspection_of, run_started
 from cmmlink.log import log_event
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan import Plan
-from cmmlink.record import Recorder, RecordReference, RunInputs, open_to_record
+from cmmlink.record import PATIENCE_S, Recorder, RecordReference, RunInputs, open_to_record
+from cmmlink.result_folder import folder_of
 from cmmlink.result_json import identity_json, result_json
+from cmmlink.words import utc_words
 from inspection import NominalProfile, rehearse
 
 _log = logging.getLogger(__name__)
@@ -28,12 +30,16 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FinishedRun:
-    """A run that is over: what was measured, against what, and what came of it. `evidence` is None where nothing was recorded."""
+    """A run that is over: what was measured, against what, and what came of it. `evidence` is None where nothing was recorded.
+
+    began : date and time of day, with its zone
+    """
 
     profile: NominalProfile
     started: RunStarted
     outcome: RunOutcome
     evidence: RecordReference | None
+    began: datetime
 
     @property
     def title(self) -> str:
@@ -45,7 +51,12 @@ class FinishedRun:
         """The run as `--json` and result.json hold it."""
         evidence = asdict(self.evidence) if self.evidence else {}
         found = result_json(self.outcome.result, self.outcome.counts)
-        return found | {"ending": self.outcome.ending} | identity_json(self.started) | evidence
+        return found | {"ending": self.outcome.ending, "measured_at": utc_words(self.began)} | identity_json(self.started) | evidence
+
+    def folder_of(self, pattern: Path) -> Path:
+        """The folder of this run's results, its placeholders filled in; without a record the run is named by when it began."""
+        run = self.evidence.run if self.evidence else f"{self.began:%Y%m%d-%H%M%S}"
+        return folder_of(pattern, part=self.started.part, serial_number=self.started.serial_number, run=run)
 
 
 def carry_out(
@@ -59,6 +70,7 @@ def carry_out(
     stop: threading.Event,
     sinks: Sequence[Sink] = (),
     on_ready: Callable[[], None] = lambda: None,
+    patience_s: float = PATIENCE_S,
 ) -> FinishedRun:
     """Carry out one run of a plan to its end. Blocks the calling thread, in which all sinks are called, the recorder first.
 
@@ -66,6 +78,7 @@ def carry_out(
     device  : made ready for one scan; its `source.stop()` ends the scan early with a result, setting `stop` aborts it
     records : folder of the run records; None records nothing
     clock   : monotonic seconds of the run; now : date and time of day
+    patience_s : how long another process may go on recording before this run is refused
     on_ready: called when everything is compiled, just before the device is asked for points
 
     A device that fails does not raise: the outcome says so. Raises StoreError when the record cannot be kept, PlanError when
@@ -75,14 +88,15 @@ def carry_out(
     live = inspection_of(plan, profile)
     started = run_started(plan, device.device, device.simulated)
     on_ready()
+    began = now()
     with ExitStack() as stack:
         recorder: Recorder | None = None
         if records is not None:
-            store = stack.enter_context(open_to_record(records, now))
+            store = stack.enter_context(open_to_record(records, now, patience_s))
             recorder = stack.enter_context(Recorder(store, RunInputs.of(plan), clock=clock, now=now))
         listeners: list[Sink] = [*([recorder] if recorder else []), *sinks, log_event]
         outcome = run_inspection(device.source, live, listeners, started, buffer_points=plan.buffer_points, clock=clock, stop=stop)
     evidence = recorder.evidence if recorder else None
     if evidence is not None:
         _log.info("recorded in %s as run %s, chain %s, plan %s", records, evidence.run, evidence.chain_sha256, evidence.plan_sha256)
-    return FinishedRun(profile, started, outcome, evidence)
+    return FinishedRun(profile, started, outcome, evidence, began)

@@ -9,6 +9,7 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,9 @@ from cmmlink.from_plan import discretize_file, run_started, section_inspection_o
 from cmmlink.nominal_files import goes_round, load_nominal
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan import CtPlan, Discretisation
+from cmmlink.result_folder import folder_of
 from cmmlink.result_json import result_json
+from cmmlink.words import utc_words
 from drivers.surface import (
     Contour,
     ContourSource,
@@ -89,6 +92,7 @@ class StackOutcome:
     sections: tuple[SectionOutcome, ...]
     asked: int
     notes: tuple[str, ...]
+    began: datetime
 
     @property
     def complete(self) -> bool:
@@ -101,12 +105,18 @@ class StackOutcome:
         worst = max(section.verdict for section in self.sections)
         return worst if self.complete else max(worst, Verdict.UNCERTAIN)
 
+    def folder_of(self, pattern: Path, plan: CtPlan) -> Path:
+        """The folder of this stack's results, its placeholders filled in."""
+        serial_number = plan.part.serial_number or ""
+        return folder_of(pattern, part=plan.part.name, serial_number=serial_number, run=f"{self.began:%Y%m%d-%H%M%S}")
+
     def result_json(self) -> dict[str, Any]:
         """The stack as JSON holds it."""
         slices = [section.result_json() for section in self.sections]
         return {
             "verdict": self.verdict.word,
             "complete": self.complete,
+            "measured_at": utc_words(self.began),
             "mesh": self.mesh.source,
             "mesh_kind": self.mesh.kind,
             "triangles": self.mesh.triangles,
@@ -126,6 +136,7 @@ def inspect_stack(
     *,
     clock: Callable[[], float],
     stop: threading.Event,
+    now: Callable[[], datetime] = lambda: datetime.now().astimezone(),
     on_start: Callable[[int], None] = lambda sections: None,
     on_section: Callable[[SectionOutcome], None] = lambda section: None,
 ) -> StackOutcome:
@@ -136,7 +147,7 @@ def inspect_stack(
 
     Raises PlanError, NominalError and MeshError for what cannot be used, RegistrationError when no section fits its nominal.
     """
-    profiles = _Profiles(plan)
+    began, profiles = now(), _Profiles(plan)
     with ExitStack() as stack:
         open3d = _Open3D(stack)
         mesh = _read(plan, open3d)
@@ -153,7 +164,7 @@ def inspect_stack(
                 break
     if all(section.run.result is None for section in sections) and sections[0].run.refusal is not None:
         raise sections[0].run.refusal
-    outcome = StackOutcome(mesh, tuple(sections), len(heights), tuple(notes))
+    outcome = StackOutcome(mesh, tuple(sections), len(heights), tuple(notes), began)
     _log.info("%s: %s, %d of %d sections. %s", surface_words(plan), outcome.verdict.word, len(sections), len(heights), "; ".join(notes))
     return outcome
 

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from typing import Literal
 
 from inspection import Verdict
@@ -35,6 +36,17 @@ class Headline:
 
     words: str
     shape: Shape
+
+
+def utc_words(moment: datetime) -> str:
+    """A moment as files hold it: ISO 8601 in UTC, to the millisecond, with a Z."""
+    return moment.astimezone(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+
+
+def local_words(moment: datetime) -> str:
+    """A moment as people of this place read it: date, time of day and the offset from UTC."""
+    local = moment.astimezone()
+    return f"{local:%Y-%m-%d %H:%M:%S} {local:%z}"
 
 
 NOT_MEASURED = Headline("NOT MEASURED", "none")

@@ -108,8 +108,8 @@ radians; what a function takes and gives stands in its docstring, with shapes an
 
 OBJECTS: tuple[tuple[str, type[BaseModel], type[BaseModel] | None], ...] = (
     ("Of every inspection", Inspected, None),
-    ("`inspect`: further keys", Measured, Inspected),
-    ("`run` and `demo`: further keys", Recorded, Measured),
+    ("`inspect --no-record`: further keys", Measured, Inspected),
+    ("`inspect`, `run` and `demo`: further keys", Recorded, Measured),
     ("`replay`: further keys", Replayed, Inspected),
     ("`ct`", StackInspected, None),
     ("`nominal`", Understood, None),

@@ -85,8 +85,8 @@ def run_on_page(plan_file: Path, connect: Connect, output: Output) -> int:
         code = report_outcome(job.finished, replace(output, out=None))
         if job.unwritten is not None:
             raise job.unwritten
-        if output.out is not None:
-            typer.echo(f"results in {output.out}")
+        if output.out is not None and job.finished.outcome.measured:
+            typer.echo(f"results in {job.finished.folder_of(output.out)}")
         if server.pages and not stop.is_set():
             sys.stderr.write("the page stays for the next part until it is closed, or Ctrl-C\n")
             stay_while_seen(server, stop)
@@ -100,10 +100,11 @@ def inspect_surface(file: Path, stop: threading.Event, on_start: Callable[[int],
     stack = inspect_stack(
         plan, clock=time.monotonic, stop=stop, on_start=on_start, on_section=lambda section: on_section(_section(plan, section, file.name))
     )
-    if plan.out is not None:
-        write_stack(plan.out, stack, plan.tolerance.zone, plan.part.name, pictures=False)
+    folder = None if plan.out is None else stack.folder_of(plan.out, plan)
+    if folder is not None:
+        write_stack(folder, stack, plan.tolerance.zone, plan.part.name, pictures=False)
     sentences = [f"{VERDICT_WORDS[stack.verdict]}: {len(stack.sections)} sections of {plan.mesh.file.name}", *stack.notes]
-    return ". ".join([*sentences, *([f"Results in {plan.out}"] if plan.out is not None else [])])
+    return ". ".join([*sentences, *([f"Results in {folder}"] if folder is not None else [])])
 
 
 def _section(plan: CtPlan, outcome: SectionOutcome, plan_name: str) -> Section:
@@ -125,7 +126,7 @@ def _write_for(out: Path | None = None) -> Callable[[Plan, FinishedRun], None]:
     def write(plan: Plan, run: FinishedRun) -> None:
         folder = out or plan.out
         if folder is not None and run.outcome.measured:
-            write_run(folder, run)
+            write_run(run.folder_of(folder), run)
 
     return write
 

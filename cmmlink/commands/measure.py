@@ -18,6 +18,7 @@ from cmmlink.commands.options import (
     Json,
     NoBrowser,
     NominalScale,
+    NoRecord,
     Out,
     PlanFile,
     Records,
@@ -38,6 +39,7 @@ from cmmlink.run_view import RunContext, RunView
 from cmmlink.simulated import connect_demo_device
 from inspection import FitName, Material, Method, NominalProfile
 
+_PATIENCE_S = 60.0  # files are inspected side by side, and each waits for its turn to be recorded
 _OPTION_OF = {
     "device": "POINTS",
     "nominal.file": "--nominal",
@@ -136,9 +138,11 @@ def inspect(
     ] = 0.95,
     reject_outliers: RejectOutliers = False,
     out: Out = None,
+    records: Records = None,
+    no_record: NoRecord = False,
     as_json: Json = False,
 ) -> int:
-    """Inspect a file of points."""
+    """Inspect a file of points, and record it as a run."""
     settings = {
         "part": {"name": points.stem.strip() or points.name},
         "nominal": {"file": nominal, "scale": scale, "closed": closed, "material": material},
@@ -155,7 +159,8 @@ def inspect(
         except ValueError as error:
             raise PlanError(f"--tip-radius {tip_radius:g}: {error}") from None
         prepare(out)
-        finished = carry_out(plan, profile, device, records=None, clock=time.monotonic, now=now, stop=stop)
+        folder = None if no_record else records_folder(records)
+        finished = carry_out(plan, profile, device, records=folder, clock=time.monotonic, now=now, stop=stop, patience_s=_PATIENCE_S)
     if finished.outcome.refusal is not None:
         raise PlanError(f"{points}: {finished.outcome.refusal}")
     return report_outcome(finished, Output(headless=True, as_json=as_json, out=out))

@@ -18,6 +18,7 @@ RejectOutliers = Annotated[
 ]
 Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for deviations.csv, result.json and profile.png.")]
 Records = Annotated[Path | None, typer.Option("--records", metavar="DIR", help="Folder of the run records.")]
+NoRecord = Annotated[bool, typer.Option("--no-record", help="Keep no record of it.")]
 RunName = Annotated[str, typer.Argument(metavar="RUN", help="The id of a run, the beginning of one, or last.")]
 Headless = Annotated[bool, typer.Option("--headless", help="No page, no live table.")]
 NoBrowser = Annotated[bool, typer.Option("--no-browser", help="Serve the page and print its address, but open no browser.")]

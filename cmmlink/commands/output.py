@@ -61,16 +61,18 @@ def report_outcome(run: FinishedRun, output: Output) -> int:
     if message:
         sys.stderr.write(f"cmmlink: {message}\n")
     written: Sequence[str] = ()
+    folder: Path | None = None
     try:
         if output.out is not None and outcome.measured:
-            written = write_run(output.out, run)
+            folder = run.folder_of(output.out)
+            written = write_run(folder, run)
     finally:
         if output.as_json:
             print_json(run.result_json())
         else:
             print_summary(terminal(), outcome.result, outcome.counts, f"{run.title}, {run.started.device}", outcome.ending)
     if written and not output.as_json:
-        typer.echo(f"results in {output.out}: {', '.join(written)}")
+        typer.echo(f"results in {folder}: {', '.join(written)}")
     if evidence is not None and not output.as_json:
         typer.echo(f"recorded as run {evidence.run}")
     if outcome.failure is not None:

@@ -1,6 +1,7 @@
 """Commands on what was recorded: list, show, export, evaluate again, verify."""
 
 from dataclasses import asdict
+from datetime import datetime
 from pathlib import Path
 from typing import Annotated
 
@@ -12,6 +13,7 @@ from cmmlink.commands.output import now, print_json, terminal
 from cmmlink.devices import decoder_of
 from cmmlink.record import Replay, check_chain, describe, export_run, find_run, list_runs, open_to_read, recorded_run, replay_run
 from cmmlink.report import print_summary, write_results
+from cmmlink.words import local_words, utc_words
 from inspection import Method
 
 _DETAILS = ("run", "started", "ended", "state", "message", "verdict", "part", "serial_number", "operator", "device", "chain_sha256")
@@ -27,12 +29,15 @@ def runs(records: Records = None, as_json: Json = False) -> int:
         part = " ".join(filter(None, [entry["part"], entry["serial_number"]]))
         verdict = (entry["verdict"] or "-") if entry["state"] == "complete" else "-"
         received = "-" if entry["received"] is None else entry["received"]
-        typer.echo(
-            f"{entry['run']}  {(entry['started'] or '-')[:19]:<19}  {entry['state']:<11}  {verdict:<10}  {received:>9} points  {part}"
-        )
+        typer.echo(f"{entry['run']}  {_local(entry['started']):<25}  {entry['state']:<11}  {verdict:<10}  {received:>9} points  {part}")
     if not found:
         typer.echo(f"no run was recorded yet in {records_folder(records)}")
     return 0
+
+
+def _local(recorded: str | None) -> str:
+    """A recorded moment as people of this place read it."""
+    return local_words(datetime.fromisoformat(recorded)) if recorded else "-"
 
 
 def show(name: RunName, records: Records = None, as_json: Json = False) -> int:
@@ -44,7 +49,8 @@ def show(name: RunName, records: Records = None, as_json: Json = False) -> int:
         return 0
     for key in _DETAILS:
         if found[key]:
-            typer.echo(f"{key:<14} {found[key]}{' (simulated)' if key == 'device' and found['simulated'] else ''}")
+            value = _local(found[key]) if key in ("started", "ended") else found[key]
+            typer.echo(f"{key:<14} {value}{' (simulated)' if key == 'device' and found['simulated'] else ''}")
     for key in ("software", "recorded"):
         typer.echo(f"{key:<14} {', '.join(f'{name} {value}' for name, value in found[key].items() if value)}")
     for event in found["events"]:
@@ -84,7 +90,7 @@ def replay(
         recorded = recorded_run(store, find_run(store, name))
         again = replay_run(store, recorded, decoder_of, tolerance=tolerance, method=method)
     document = again.result_json | {"replay_of": recorded.run, "chain_sha256": recorded.chain_sha256, "identical": again.identical}
-    document["ending"] = again.outcome.ending
+    document |= {"ending": again.outcome.ending, "measured_at": utc_words(datetime.fromisoformat(recorded.header["started"]))}
     document |= {"changed": [asdict(change) for change in again.changed], "differs": [asdict(change) for change in again.differs]}
     if out is not None:
         write_results(out, document, again.outcome.result, again.profile, f"{recorded.header['part']}, run {recorded.run} replayed")

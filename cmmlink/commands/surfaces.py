@@ -122,8 +122,8 @@ def ct(
 
 def _inspect_stack(plan: CtPlan, output: Output, pictures: bool) -> int:
     """Inspect a stack with a progress bar; write its files and print what came of it, each even if the other fails."""
-    folder = output.out or plan.out
-    prepare(folder)
+    pattern = output.out or plan.out
+    prepare(pattern)
     bar = _SectionBar(Console(stderr=True), visible=not output.as_json and sys.stderr.isatty())
     steps: list[Callable[[], None]] = []
     with bar.show(), stop_on_ctrl_c() as stop:
@@ -134,6 +134,7 @@ def _inspect_stack(plan: CtPlan, output: Output, pictures: bool) -> int:
             on_start=lambda sections: steps.append(bar.begin_round("inspected", sections)),
             on_section=lambda _: steps[0](),
         )
+    folder = None if pattern is None else stack.folder_of(pattern, plan)
     try:
         if folder is not None:
             with bar.show():

@@ -29,7 +29,7 @@ from cmmlink.record import (
 from cmmlink.record import export_run as export_files
 from cmmlink.result_json import result_json
 from cmmlink.run_view import Ended, RunContext
-from cmmlink.words import headline_of
+from cmmlink.words import headline_of, local_words
 from drivers import Decoder
 from inspection import NominalProfile, Verdict
 
@@ -88,7 +88,7 @@ class PastRuns:
             recorded.run,
             plan := recorded_plan(recorded),
             recorded_profile(plan, recorded),
-            datetime.fromisoformat(recorded.header["started"]),
+            datetime.fromisoformat(recorded.header["started"]).astimezone(),
             RunStarted.from_header(recorded.header),
             Ended(end["state"], end["message"], result, unpack_judged(bodies) if bodies else None),
         )
@@ -126,7 +126,7 @@ def _row_of(entry: dict[str, Any], result: dict[str, Any]) -> RunRow:
     headline = headline_of(verdict, entry["state"], result.get("coverage"))
     return RunRow(
         entry["run"],
-        entry["started"] or "",
+        local_words(datetime.fromisoformat(entry["started"])) if entry["started"] else "",
         entry["part"] or "",
         entry["serial_number"] or "",
         entry["state"],

@@ -14,7 +14,7 @@ from cmmlink.console.alarms import Alarms
 from cmmlink.console.choice import CheckedPlan, Choice, check_choice
 from cmmlink.console.ct_import import CtImport, InspectSurface
 from cmmlink.console.device_test import TESTING, listen_to_device
-from cmmlink.console.entry import Entry, next_serial_number
+from cmmlink.console.entry import Entry
 from cmmlink.console.job import Job, JobKind
 from cmmlink.console.protocol import DeviceTest, History, StationState
 from cmmlink.console.refused import Refused, answer_errors
@@ -258,7 +258,7 @@ class Station:
         finished = job.finished
         if finished is not None and finished.outcome.ending == "complete" and finished.outcome.result is not None:
             with self._lock:
-                self._set_entry(replace(self._entry, serial_number=next_serial_number(self._entry.serial_number)))
+                self._set_entry(self._entry.for_next_part())
         self._read_history()
 
     def _replay(self, job: Job, view: RunView, records: Records, run: str) -> None:

@@ -15,11 +15,20 @@ from pydantic import AfterValidator, Field, ValidationInfo, field_validator, mod
 from cmmlink.buffer import CAPACITY_POINTS
 from cmmlink.errors import PlanError, YamlError
 from cmmlink.plan.yaml_model import Positive, Settings, line_of, read_model
+from cmmlink.result_folder import check_placeholders
 from drivers import PointFileError, device_address, read_text, shipped_maps
 from inspection import FitName, Material, Method, ToleranceZone
 
 Vector = tuple[float, float, float]
 Text = Annotated[str, Field(min_length=1)]
+
+
+def _with_known_placeholders(folder: Path) -> Path:
+    check_placeholders(folder)
+    return folder
+
+
+ResultFolder = Annotated[Path, AfterValidator(_with_known_placeholders)]
 
 
 def _address(text: str) -> str:
@@ -35,6 +44,10 @@ Address = Annotated[Text, AfterValidator(_address)]
 _SILENCE = "how long a device may send nothing before it counts as failed"
 _RECONNECT = "how long a lost link is tried again while the run goes on"
 _PARITY = "the parity of a serial port: none, even or odd"
+OUT = (
+    "the folder for the results, like results/{part}/{serial}_{run}; null: no results are written. What an earlier run left in the "
+    "same folder is moved aside, never overwritten"
+)
 _AXIS = "what makes points of the distances of a one-dimensional sensor"
 _LEAST_SINE = 1e-3  # between x axis and normal: below it the direction of x in the plane is noise
 
@@ -264,7 +277,7 @@ class Plan(Settings):
     registration: Registration = Field(default=Registration(), description="how the points come onto the nominal")
     discretisation: Discretisation = Field(default=Discretisation(), description="how finely the nominal is sampled")
     buffer_points: int = Field(default=CAPACITY_POINTS, ge=1, description="how many points may wait between the device and the inspection")
-    out: Path | None = Field(default=None, description="the folder for the results; null: no results are written")
+    out: ResultFolder | None = Field(default=None, description=OUT)
     records: Path | None = Field(
         default=None, description="the folder of the run records; null: the user's own. A console keeps all its runs in one folder"
     )

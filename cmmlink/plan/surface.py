@@ -10,7 +10,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from cmmlink.errors import PlanError, YamlError
-from cmmlink.plan.scan import Nominal, Part, Registration, Tolerance
+from cmmlink.plan.scan import OUT, Nominal, Part, Registration, ResultFolder, Tolerance
 from cmmlink.plan.yaml_model import Positive, Settings, read_model
 from drivers import PointFileError, read_text
 
@@ -82,7 +82,7 @@ class CtPlan(Settings):
     sections: Sections = Field(description="a mapping with heights_mm or every_mm")
     cut: Cut = Field(default=Cut(), description="how the surface is cut")
     registration: Registration = Field(default=Registration(), description="how the points of a section come onto its nominal")
-    out: Path | None = Field(default=None, description="the folder for the results; null: no results are written")
+    out: ResultFolder | None = Field(default=None, description=OUT)
 
 
 def load_ct_plan(path: Path) -> CtPlan:

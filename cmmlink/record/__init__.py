@@ -19,10 +19,12 @@ from cmmlink.record.reader import (
 )
 from cmmlink.record.recorder import Recorder, RecordReference, RunInputs
 from cmmlink.record.replay import Change, Replay, recorded_plan, recorded_profile, replay_run
+from cmmlink.record.station_lock import PATIENCE_S
 from cmmlink.record.store import FILE_NAME, Store
 
 __all__ = [
     "FILE_NAME",
+    "PATIENCE_S",
     "Change",
     "Draft",
     "Record",

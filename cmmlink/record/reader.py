@@ -18,6 +18,7 @@ from cmmlink.errors import RunError, StoreError
 from cmmlink.record.bodies import PlacedArrival, unpack_arrivals, unpack_document, unpack_points, unpack_reads
 from cmmlink.record.chain import Record, is_damaged
 from cmmlink.record.recorder import end_draft
+from cmmlink.record.station_lock import PATIENCE_S
 from cmmlink.record.store import FILE_NAME, Store
 from drivers import Arrival, PointBatch, Rejected, WireBytes
 
@@ -47,9 +48,9 @@ def default_folder() -> Path:
 
 
 @contextmanager
-def open_to_record(folder: Path, now: Callable[[], datetime]) -> Iterator[Store]:
-    """Open the records to add a run. Raises StoreError when another process does so."""
-    with Store(folder, writing=True, epoch_s=lambda: now().timestamp()) as store:
+def open_to_record(folder: Path, now: Callable[[], datetime], patience_s: float = PATIENCE_S) -> Iterator[Store]:
+    """Open the records to add a run. Raises StoreError when another process does so, and goes on doing so for `patience_s`."""
+    with Store(folder, writing=True, epoch_s=lambda: now().timestamp(), patience_s=patience_s) as store:
         _close_interrupted(store, now)
         yield store
 

@@ -23,6 +23,7 @@ from cmmlink.record.chain import Draft, Kind
 from cmmlink.record.store import Store
 from cmmlink.result_json import number, result_json
 from cmmlink.version import __version__
+from cmmlink.words import utc_words
 from drivers import LinkDown, PointBatch, Rejected, WireBytes
 from inspection import JudgedRows
 
@@ -156,7 +157,7 @@ class Recorder:
         plan = inputs.plan.encode()
         header = {
             "run": self.run,
-            "started": began.isoformat(timespec="milliseconds"),
+            "started": utc_words(began),
             "clock_s": self._clock(),
             **asdict(started),
             "software": dict(inputs.software),
@@ -288,7 +289,7 @@ def end_draft(run: str, state: str, message: str, now: datetime, result: Mapping
     document = {
         "state": state,
         "message": message,
-        "ended": now.isoformat(timespec="milliseconds"),
+        "ended": utc_words(now),
         "received": result.get("received", 0),
         "verdict": result.get("verdict") if result.get("received") else None,
         "result_sha256": sha256,

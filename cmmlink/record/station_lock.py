@@ -9,14 +9,15 @@ from pathlib import Path
 
 from cmmlink.errors import StoreError
 
-_PATIENCE_S = 0.5  # another process may hold the lock for a moment to close an interrupted run
+PATIENCE_S = 0.5  # another process may hold the lock for a moment to close an interrupted run
 
 
 class StationLock:
     """Holds the lock from its making to `release`. Raises StoreError when another process holds it."""
 
-    def __init__(self, path: Path) -> None:
-        self._connection = sqlite3.connect(path, timeout=_PATIENCE_S, isolation_level=None, check_same_thread=False)
+    def __init__(self, path: Path, patience_s: float = PATIENCE_S) -> None:
+        """`patience_s` is how long another process may hold it before that counts as taken."""
+        self._connection = sqlite3.connect(path, timeout=patience_s, isolation_level=None, check_same_thread=False)
         try:
             self._take()
         except sqlite3.OperationalError as error:

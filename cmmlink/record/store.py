@@ -14,7 +14,7 @@ from pathlib import Path
 
 from cmmlink.errors import StoreError
 from cmmlink.record.chain import GENESIS, Alteration, Draft, Record, chain_record, first_alteration, is_damaged
-from cmmlink.record.station_lock import StationLock
+from cmmlink.record.station_lock import PATIENCE_S, StationLock
 
 FILE_NAME = "station.sqlite"
 APPLICATION_ID = 0x434D4D4C  # "CMML", in the file's header
@@ -43,7 +43,15 @@ _PATIENCE_S = 5.0  # for another connection's transaction
 class Store:
     """An open station file. `writing` takes the station's lock for as long as the store is open."""
 
-    def __init__(self, folder: Path, *, writing: bool, epoch_s: Callable[[], float], migrations: Sequence[str] = MIGRATIONS) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        *,
+        writing: bool,
+        epoch_s: Callable[[], float],
+        migrations: Sequence[str] = MIGRATIONS,
+        patience_s: float = PATIENCE_S,
+    ) -> None:
         """`epoch_s` gives seconds since 1970. Raises StoreError: locked, newer, unusable folder, not a file of records."""
         self.path = folder / FILE_NAME
         self._epoch_s = epoch_s
@@ -53,7 +61,7 @@ class Store:
         try:
             if writing:
                 folder.mkdir(parents=True, exist_ok=True)
-                self._lock = StationLock(folder / "station.lock")
+                self._lock = StationLock(folder / "station.lock", patience_s)
             self._connection = _connect(self.path)
         except (OSError, sqlite3.Error) as error:
             self._unlock()

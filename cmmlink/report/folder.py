@@ -9,6 +9,7 @@ from typing import Any
 
 from cmmlink.deviations_csv import write_deviations
 from cmmlink.errors import PlanError
+from cmmlink.result_folder import fixed_part, make_room
 from cmmlink.run import FinishedRun
 from inspection import InspectionResult, NominalProfile
 
@@ -17,6 +18,7 @@ def prepare(folder: Path | None) -> None:
     """Create the folder and check that it can be written, before anything is measured. Raises PlanError."""
     if folder is None:
         return
+    folder = fixed_part(folder)
     with _or_refuse(folder):
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
@@ -26,12 +28,14 @@ def prepare(folder: Path | None) -> None:
 def write_results(
     folder: Path, document: dict[str, Any], result: InspectionResult | None, profile: NominalProfile, title: str
 ) -> list[str]:
-    """Write result.json and, when points were judged, deviations.csv and profile.png. Returns their names; raises PlanError."""
+    """Write result.json and, when points were judged, deviations.csv and profile.png. Returns their names; raises PlanError.
+
+    What an earlier run left there is moved aside, into a folder of its own.
+    """
     with _or_refuse(folder):
         folder.mkdir(parents=True, exist_ok=True)
+        make_room(folder)
         (folder / "result.json").write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
-        for name in ("deviations.csv", "profile.png"):
-            (folder / name).unlink(missing_ok=True)  # files of an earlier run must not stay beside this result
         if result is None or not result.judged:
             return ["result.json"]
         from cmmlink.report.picture import write_picture  # noqa: PLC0415 - matplotlib takes half a second that other commands need not pay
@@ -42,7 +46,7 @@ def write_results(
 
 
 def write_run(folder: Path, run: FinishedRun) -> list[str]:
-    """Write the files of a finished run. Returns their names; raises PlanError."""
+    """Write the files of a finished run, as `FinishedRun.folder_of` names its folder. Returns their names; raises PlanError."""
     return write_results(folder, run.result_json(), run.outcome.result, run.profile, run.title)
 
 

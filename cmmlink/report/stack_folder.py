@@ -7,6 +7,7 @@ from pathlib import Path
 
 from cmmlink.deviations_csv import write_deviations
 from cmmlink.errors import PlanError
+from cmmlink.result_folder import make_room
 from cmmlink.result_keys import SectionInspected
 from cmmlink.stack import SectionOutcome, StackOutcome
 from drivers.surface import SurfaceSection
@@ -22,7 +23,6 @@ CONTOUR_COLUMNS = {
     "section_x_mm": "x in the plane of the section",
     "section_y_mm": "y in the plane of the section",
 }
-_SECTION_FILES = ("contours.csv", "deviations.csv", "profile.png")
 _SECTION_KEYS = (
     "height_mm", "asked_height_mm", "verdict", "received", "judged", "rejected", "out_of_tolerance", "max_deviation_mm", "min_deviation_mm",
     "rms_mm", "profile_error_mm", "coverage", "contours", "holes", "open_contours", "set_aside", "cutter",
@@ -50,7 +50,7 @@ def write_stack(
 
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        _clear(folder)
+        make_room(folder)
         (folder / "result.json").write_text(json.dumps(stack.result_json(), indent=2) + "\n", encoding="utf-8")
         _write_sections(stack, folder / "sections.csv")
         for number, section in enumerate(stack.sections, start=1):
@@ -68,17 +68,6 @@ def write_stack(
             write_stack_picture(stack, zone, title, folder / "stack.png")
     except OSError as error:
         raise PlanError(f"{folder}: the results cannot be written ({error.strerror}); choose another folder with --out") from None
-
-
-def _clear(folder: Path) -> None:
-    """Delete what an earlier run wrote here: it must not stay beside this result."""
-    earlier = [folder / name for name in ("result.json", "sections.csv", "stack.png")]
-    own = [path for path in folder.glob("section-*_*mm") if path.is_dir()]
-    for path in [*earlier, *(path / name for path in own for name in _SECTION_FILES)]:
-        path.unlink(missing_ok=True)
-    for path in own:
-        if not any(path.iterdir()):
-            path.rmdir()
 
 
 def section_folder(number: int, section: SectionOutcome) -> str:

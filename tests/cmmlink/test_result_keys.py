@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -70,7 +71,9 @@ def test_every_key_is_explained(model: type[BaseModel]) -> None:
 def test_inspect(folder: Path) -> None:
     out = folder / "inspected"
     arguments = ("inspect", folder / "points.csv", "--nominal", folder / "oval.yaml", "--tolerance", -0.05, 0.05, "--out", out)
-    found = printed(Measured, *arguments)
+    found = printed(Recorded, *arguments)
+    assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z", found["measured_at"])
+    printed(Measured, *arguments[:6], "--no-record")
     assert found["verdict"] == "nonconform"
     assert len(found["stretches"]) == 1
     assert found["registration"]["other_poses"]  # an ellipse fits half a turn on, too

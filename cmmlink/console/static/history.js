@@ -51,6 +51,6 @@ export function chartWords(runs) {
 
 /** @param {RunRow} run */
 function rowOf(run) {
-  const words = [run.part, run.serial_number, run.began.replace("T", " ").slice(0, 19), run.state];
+  const words = [run.part, run.serial_number, run.began, run.state];
   return [verdictCell(run.word, run.shape), ...words.map((word) => cell(word)), cell(count(run.received), "number"), ...worstCells(run)];
 }

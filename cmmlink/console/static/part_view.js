@@ -80,6 +80,7 @@ export class PartView {
     const input = inputOf(id);
     input.disabled = isRunning;
     if (input.dataset.shown === value) return;
+    if (input === document.activeElement && input.value !== (input.dataset.shown ?? "")) return; // it is being typed over
     input.value = input.dataset.shown = value;
     if (input === document.activeElement) input.select(); // so that typing replaces what was suggested
   }
@@ -95,8 +96,9 @@ export class PartView {
   }
 
   enterSerialNumber() {
-    inputOf("serial").focus();
-    inputOf("serial").select();
+    const input = inputOf("serial"), isTyped = input.value !== (input.dataset.shown ?? "");
+    input.focus();
+    if (!isTyped) input.select(); // so that typing replaces what was suggested, and nothing that was typed
   }
 
   /** @param {ChosenPlan | null} choice */

@@ -8,6 +8,7 @@ import pytest
 from cmmlink.console.past_runs import PastRuns
 from cmmlink.errors import RunError
 from cmmlink.events import RunFinished
+from cmmlink.words import local_words
 from tests.cmmlink.recorded import Script, no_decoder, record, scan_arrivals, today
 
 
@@ -46,7 +47,7 @@ def test_runs_are_listed_newest_first_with_their_own_limits(past: PastRuns) -> N
         record(past.folder, Script(*scan_arrivals(300)))
     newest, oldest = past.runs()
     assert newest.run > oldest.run
-    assert newest.began == oldest.began == today().isoformat(timespec="milliseconds")
+    assert newest.began == oldest.began == local_words(today())
     assert (newest.part, newest.serial_number) == (oldest.part, "T-1")
     assert newest.lower_mm is not None
     assert newest.upper_mm is not None

@@ -24,7 +24,18 @@ def test_the_folder_holds_what_it_says(profile: NominalProfile, tmp_path: Path) 
 def test_an_earlier_result_does_not_stay_beside_a_run_without_one(profile: NominalProfile, tmp_path: Path) -> None:
     write_results(tmp_path, {}, inspect_oval(profile, 0.0), profile, "oval")
     assert write_results(tmp_path, {"verdict": "uncertain"}, None, profile, "oval") == ["result.json"]
-    assert [path.name for path in tmp_path.iterdir()] == ["result.json"]
+    assert [path.name for path in tmp_path.iterdir() if path.is_file()] == ["result.json"]
+
+
+def test_the_results_of_another_run_are_moved_aside_and_never_overwritten(profile: NominalProfile, tmp_path: Path) -> None:
+    first = {"serial_number": "../B 1", "run": "20260314-150926-0001"}
+    write_results(tmp_path, first, inspect_oval(profile, 0.0), profile, "oval")
+    write_results(tmp_path, {"serial_number": "B2", "run": "2"}, inspect_oval(profile, bumped()), profile, "oval")
+    (aside,) = (path for path in tmp_path.iterdir() if path.is_dir())
+    assert aside.name == "_B_1_20260314-150926-0001"
+    assert sorted(path.name for path in aside.iterdir()) == ["deviations.csv", "profile.png", "result.json"]
+    assert json.loads((aside / "result.json").read_text(encoding="utf-8")) == first
+    assert json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))["run"] == "2"
 
 
 def test_a_prepared_folder_exists_and_is_empty(tmp_path: Path) -> None:
