@@ -38,6 +38,7 @@ def test_what_is_there_before_a_run_is_above_the_first_placeholder(tmp_path: Pat
 
 def test_results_that_say_nothing_of_themselves_are_kept_all_the_same(tmp_path: Path) -> None:
     for _ in range(3):
-        assert (make_room(tmp_path) is None) == (not (tmp_path / "result.json").exists())
+        stood = (tmp_path / "result.json").exists()
+        assert (make_room(tmp_path) is not None) == stood
         (tmp_path / "result.json").write_text("not JSON", encoding="utf-8")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["earlier", "earlier-2", "result.json"]

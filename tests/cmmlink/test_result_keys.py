@@ -73,7 +73,7 @@ def test_inspect(folder: Path) -> None:
     arguments = ("inspect", folder / "points.csv", "--nominal", folder / "oval.yaml", "--tolerance", -0.05, 0.05, "--out", out)
     found = printed(Recorded, *arguments)
     assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z", found["measured_at"])
-    printed(Measured, *arguments[:6], "--no-record")
+    printed(Measured, *arguments[:7], "--no-record")
     assert found["verdict"] == "nonconform"
     assert len(found["stretches"]) == 1
     assert found["registration"]["other_poses"]  # an ellipse fits half a turn on, too
