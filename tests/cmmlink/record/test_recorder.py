@@ -102,17 +102,17 @@ class Endless:
     """A source that is alive until it is stopped; `then` is called after the first arrivals."""
 
     def __init__(self, *first: Arrival, then: threading.Event) -> None:
-        self._first, self._then, self._stopped = first, then, threading.Event()
+        self._first, self._then, self.stopped = first, then, threading.Event()
 
     def stop(self) -> None:
-        self._stopped.set()
+        self.stopped.set()
 
     def arrivals(self) -> Iterator[Arrival]:
         yield from self._first
         self._then.wait(30)
-        while not self._stopped.is_set():
+        while not self.stopped.is_set():
             yield Heartbeat()
-            self._stopped.wait(0.001)
+            self.stopped.wait(0.001)
 
 
 def test_a_record_that_cannot_be_kept_stops_the_scan(tmp_path: Path) -> None:
@@ -128,7 +128,7 @@ def test_a_record_that_cannot_be_kept_stops_the_scan(tmp_path: Path) -> None:
     source = Endless(*scan_arrivals()[:3], then=spoiled)
     with pytest.raises(StoreError, match=r"so it has no result; 50 points are safe in run .*no such table"):
         record(tmp_path, source, acknowledge=spoil, commit_s=0.01)
-    assert source._stopped.is_set()
+    assert source.stopped.is_set()
 
 
 def test_a_program_that_fails_leaves_a_run_that_says_so(tmp_path: Path) -> None:
