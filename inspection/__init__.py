@@ -6,6 +6,7 @@ This is the front door: an application imports what `__all__` lists and none of 
 from inspection import synthetic
 from inspection.coarse import register_coarse
 from inspection.curve import NurbsCurve
+from inspection.curve_check import CurveCheck, Hollow, check_curve
 from inspection.deviations import Deviations, deviations, profile_error_mm
 from inspection.errors import InspectionError, NominalError, RegistrationError
 from inspection.fine import register, register_fine
@@ -18,13 +19,17 @@ from inspection.registration import Registration
 from inspection.result import NOT_JUDGED, InspectionResult, JudgedRows, Rejection, Stretch, coverage
 from inspection.rigid import RigidTransform
 from inspection.section import SectionPlane
+from inspection.self_crossings import Crossing, find_crossings
 from inspection.terms import FitName
 from inspection.tolerance import ToleranceZone, Verdict
 
 __all__ = [
     "NOT_JUDGED",
+    "Crossing",
+    "CurveCheck",
     "Deviations",
     "FitName",
+    "Hollow",
     "InspectionError",
     "InspectionResult",
     "JudgedRows",
@@ -45,10 +50,12 @@ __all__ = [
     "Stretch",
     "ToleranceZone",
     "Verdict",
+    "check_curve",
     "compiled_code_folder",
     "coverage",
     "deviations",
     "discretize",
+    "find_crossings",
     "fit_minimum_zone",
     "profile_error_mm",
     "register",

@@ -5,6 +5,7 @@ A closed curve is either periodic (wrapped control points, smooth seam) or clamp
 """
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -70,18 +71,28 @@ class NurbsCurve:
         return float(self.knots[self.degree]), float(self.knots[-self.degree - 1])
 
     @classmethod
-    def interpolate(cls, points_mm: ArrayLike, degree: int = 3, closed: bool = False, corner_at_seam: bool = False) -> "NurbsCurve":
+    def interpolate(
+        cls, points_mm: ArrayLike, degree: int = 3, closed: bool = False, corner_at_seam: bool = False, ends_along_chords: bool = False
+    ) -> "NurbsCurve":
         """Curve through points (m, 2) in order, centripetal parameter scaled to [0, 1] (Lee 1989).
 
         `closed` joins the last point to the first, smoothly, or with a corner there (`corner_at_seam`: a sharp trailing edge).
-        A last point equal to the first is taken as that join. Raises NominalError for too few or coinciding neighbours.
+        A last point equal to the first is taken as that join. `ends_along_chords` (degree 3, an open curve or a corner at the
+        seam): the curve leaves its first point in the direction of the second, and reaches its last from that of the one before.
+        Raises NominalError for too few or coinciding neighbours.
         """
         points = _check_neighbours(np.array(points_mm, dtype=np.float64), degree, closed)
         steps = np.sqrt(np.linalg.norm(np.diff(points, axis=0), axis=1))
         parameter = np.concatenate([[0.0], np.cumsum(steps)])
         parameter /= parameter[-1]
         smooth = closed and not corner_at_seam
-        spline = make_interp_spline(parameter, points, k=degree, bc_type="periodic" if smooth else None)
+        if ends_along_chords and (smooth or degree != 3):
+            raise NominalError("ends along chords need a curve of degree 3 with two ends, or with a corner at the seam")
+        first, last = (points[i + 1] - points[i] for i in (0, -2))
+        conditions: Any = "periodic" if smooth else None
+        if ends_along_chords:
+            conditions = ([(1, first / parameter[1])], [(1, last / (1 - parameter[-2]))])
+        spline = make_interp_spline(parameter, points, k=degree, bc_type=conditions)
         return cls(degree, spline.c, spline.t, closed=closed)
 
     def point(self, u: ArrayLike) -> Array:

@@ -10,15 +10,16 @@ file and nothing else:
 import importlib
 import pkgutil
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, Protocol, cast
 
 import numpy as np
 
 from cmmlink.errors import YamlError
+from cmmlink.nominal_files.curve_words import notes_of, refuse_crossings
 from drivers import PointFileError, read_text
-from inspection import NominalError, NurbsCurve
+from inspection import NominalError, NurbsCurve, check_curve
 
 _ALMOST_CLOSED = 0.05  # of the length: the widest gap, as of a blunt trailing edge, at which a curve still has an inside
 
@@ -50,7 +51,10 @@ def load_nominal(path: Path, scale: float = 1.0, closed: bool | None = None) -> 
     """Read a nominal profile; the suffix of the file says its format.
 
     scale  : turns the file's unit into mm (the chord, for airfoils in chord units)
-    closed : True joins the end to the beginning, False keeps the curve open, None follows the file
+    closed : True joins the end to the beginning, False keeps the curve open, None follows the file, which closes a blunt edge,
+             and asks about a gap that may be either
+
+    The curve is checked: one that crosses itself is refused; where it changes its curvature, and its tightest hollow, are noted.
 
     Raises NominalError: file, line, what was found, what is expected.
     """
@@ -63,7 +67,7 @@ def load_nominal(path: Path, scale: float = 1.0, closed: bool | None = None) -> 
         raise NominalError(str(error)) from None
     try:
         with np.errstate(over="raise", divide="raise", invalid="raise"):
-            return reader.read(text, scale, closed)
+            return _checked(reader.read(text, scale, closed))
     except (PointFileError, YamlError, NominalError) as error:
         raise NominalError(f"{path}: {error}") from None
     except FloatingPointError:
@@ -89,6 +93,13 @@ def material_side(curve: NurbsCurve) -> Literal["left", "right"] | None:
         return None
     x, y = (points - points[0]).T
     return "left" if float((x[:-1] * y[1:] - x[1:] * y[:-1]).sum()) > 0 else "right"
+
+
+def _checked(file: NominalFile) -> NominalFile:
+    """The file with notes of what its curve was checked for. Raises NominalError when the curve crosses itself."""
+    check = check_curve(file.curve, material_side(file.curve))
+    refuse_crossings(check)
+    return replace(file, notes=(*file.notes, *notes_of(check)))
 
 
 def _formats() -> Iterator[NominalFormat]:

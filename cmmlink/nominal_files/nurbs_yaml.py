@@ -20,6 +20,7 @@ SUFFIXES = (".yaml", ".yml")
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]  # mm: beyond a kilometre the unit or the scale is wrong
 
 _SAME_END = 1e-9  # of the size: the gap up to which a curve ends where it begins
+_OPEN = 0.25  # of the size: a curve with a larger gap between its ends is open
 _SHORTEST_SPAN = 1e-12
 _RESOLVED = 1e-6  # of the distance from the origin: a smaller curve drowns in round-off
 
@@ -49,6 +50,8 @@ def read(text: str, scale: float, closed: bool | None) -> NominalFile:
     if said is None and _ends_where_it_begins(curve):
         curve = NurbsCurve(given.degree, points, knots, weights, closed=True)
         return NominalFile(curve, "nurbs-yaml", ("closed: the curve ends where it begins",))
+    if said is None:
+        _ask_about_small_gap(curve)
     if closed is None or given.closed in (None, closed):
         return NominalFile(curve, "nurbs-yaml", ())
     return NominalFile(curve, "nurbs-yaml", (f"{'closed' if closed else 'open'}, as asked, against what the file says",))
@@ -81,6 +84,17 @@ def _require_spans(knots: NDArray[np.float64]) -> None:
     if short.any():
         i = int(np.argmax(short))
         raise NominalError(f"knots[{i}] and knots[{i + 1}] differ by {spans[i]:g} only; expected equal knots or a longer span")
+
+
+def _ask_about_small_gap(curve: NurbsCurve) -> None:
+    """Raise NominalError for a curve whose ends lie near each other although nobody said that it is open."""
+    first, last = curve.point(np.array(curve.domain))
+    gap = float(np.hypot(*(last - first)))
+    if gap <= _OPEN * np.ptp(curve.control_points_mm, axis=0).max():
+        raise NominalError(
+            f"the curve ends {gap:.6g} mm from where it begins: it may be closed or open; expected closed: false to keep it open, "
+            "or a curve that ends where it begins"
+        )
 
 
 def _ends_where_it_begins(curve: NurbsCurve) -> bool:

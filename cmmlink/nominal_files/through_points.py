@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmmlink.nominal_files import NominalFile
-from inspection import NominalError, NurbsCurve
+from inspection import NominalError, NurbsCurve, find_crossings
 
 Array = NDArray[np.float64]
 Lines = NDArray[np.int64]
@@ -19,13 +19,18 @@ _SMALLEST_MM = 1e-6
 _RESOLVED = 1e-6  # of the distance from the origin: a smaller profile drowns in round-off
 _SHARP_DEG = 60.0
 _ABOVE_NEIGHBOURS = 3.0
+_BLUNT_EDGE = 0.02  # of the size: a gap up to this, with its ends side by side, is the edge of a closed profile
+_FACING_DEG = 90.0  # both turns together: the sides run towards the edge within 90 deg of one direction
+_OPEN = 0.25  # of the size: a profile with a larger gap is open
+_LIKE_A_STEP = 1.5  # a gap no larger than the steps beside it may be a step itself: a loop that does not repeat its first point
 
 
 def through_points(points_mm: Array, lines: Lines, closed: bool | None, source_format: str, notes: tuple[str, ...]) -> NominalFile:
     """Interpolate points (m, 2), given on the lines (m,) of the file. Raises NominalError, naming lines.
 
-    closed None: closed if the last point repeats the first. A gap joined because `closed` says so is bridged smoothly
-    where the points run on (a circle), with a straight line where they do not (a blunt trailing edge).
+    closed None: closed if the last point repeats the first, or if a small gap lies between them as a blunt edge does; a gap that
+    may be either is asked about. A gap joined because `closed` says so is bridged smoothly where the points run on (a circle),
+    with a straight line where they do not (a blunt trailing edge).
     """
     _require_distinct(points_mm, lines)
     gap = float(np.hypot(*(points_mm[-1] - points_mm[0])))
@@ -33,30 +38,73 @@ def through_points(points_mm: Array, lines: Lines, closed: bool | None, source_f
     distinct = points_mm[:-1] if repeats else points_mm
     if len(distinct) < _DEGREE + 1:
         raise NominalError(f"{len(distinct)} different points; expected at least {_DEGREE + 1} for a cubic curve")
+    join = (repeats or _is_blunt_edge(points_mm, gap)) if closed is None else closed
     ends = "the last point repeats the first" if repeats else f"a gap of {gap:.6g} mm from last to first point"
     asked = "" if closed is repeats or closed is None else ", as asked"
-    if repeats if closed is None else closed:
-        curve, seam = _close(distinct, repeats)
-        note = f"closed{asked}: {ends}, {seam}"
+    if join:
+        curve, seam, mended = _close(distinct, repeats)
+        kept_open = "" if repeats or asked else "; to keep it open, say so: --open, or closed: false"
+        note = f"closed{asked}: {ends}, {seam}{kept_open}"
     else:
-        curve, note = NurbsCurve.interpolate(points_mm, _DEGREE), f"open{asked}: {ends}"
-    return NominalFile(curve, source_format, (*notes, note, *_notes_on_corners(distinct, lines)))
+        curve, mended = _without_crossing(points_mm, corner_at_seam=False)
+        note = f"open{asked}: {ends}"
+    return NominalFile(curve, source_format, (*notes, note, *mended, *_notes_on_corners(distinct, lines, repeats)))
 
 
-def _close(points: Array, repeats: bool) -> tuple[NurbsCurve, str]:
-    """Close the curve through distinct points (m, 2). Returns the curve and a note on how the seam was joined."""
+def _is_blunt_edge(points: Array, gap: float) -> bool:
+    """Whether the gap from last to first point is a blunt edge. Raises NominalError where it may be one, or an open profile.
+
+    It is one when it is small and both sides run towards it side by side, so that a straight line closes it with a corner at
+    one end at least. The profile is open when its ends lie far apart, seen from its size and from the steps beside the gap.
+    """
+    share = gap / _size(points)
+    turn, sharp = _sharp_turns(points)
+    if share <= _BLUNT_EDGE and (sharp[0] or sharp[-1]) and _FACING_DEG <= turn[0] + turn[-1] <= 360 - _FACING_DEG:
+        return True
+    step = max(float(np.hypot(*(points[i + 1] - points[i]))) for i in (0, -2))
+    if share > _OPEN and gap > _LIKE_A_STEP * step:
+        return False
+    raise NominalError(
+        f"a gap of {gap:.6g} mm from last to first point, {100 * share:.2g} % of the size: the profile may be closed or open; "
+        "expected to be told which: closed: true or closed: false in the plan, or --closed or --open"
+    )
+
+
+def _close(points: Array, repeats: bool) -> tuple[NurbsCurve, str, list[str]]:
+    """Close the curve through different points (m, 2), say what was made of its seam, and what was mended."""
     turn, sharp = _sharp_turns(points)
     if repeats and sharp[0]:
-        curve = NurbsCurve.interpolate(points, _DEGREE, closed=True, corner_at_seam=True)
-        return curve, f"a corner of {turn[0]:.0f} deg kept there (sharp trailing edge)"
+        curve, mended = _without_crossing(points, corner_at_seam=True)
+        return curve, f"a corner of {turn[0]:.0f} deg kept there (sharp trailing edge)", mended
     if not repeats and (sharp[0] or sharp[-1]):
-        return _with_straight_join(points), "joined by a straight line with a corner at each end (blunt trailing edge)"
-    return NurbsCurve.interpolate(points, _DEGREE, closed=True), "smooth there" if repeats else "joined smoothly"
+        body, mended = _without_crossing(points, corner_at_seam=False)
+        return _with_straight_join(points, body), "joined by a straight line with a corner at each end (blunt trailing edge)", mended
+    return NurbsCurve.interpolate(points, _DEGREE, closed=True), "smooth there" if repeats else "joined smoothly", []
 
 
-def _with_straight_join(points: Array) -> NurbsCurve:
-    """Join the ends of the interpolating curve with a line: a cubic piece behind a knot of multiplicity three."""
-    body = NurbsCurve.interpolate(points, _DEGREE)
+def _without_crossing(points: Array, corner_at_seam: bool) -> tuple[NurbsCurve, list[str]]:
+    """Interpolate points between two ends, or from corner to corner, so that the curve does not cross itself; and what was mended.
+
+    A smooth curve can turn itself inside out in the last micrometres before a sharp edge, where nothing but its own smoothness
+    holds its tangents. Laid along the lines to the neighbouring points they meet at the angle that the points show.
+    """
+    smoothest = NurbsCurve.interpolate(points, _DEGREE, closed=corner_at_seam, corner_at_seam=corner_at_seam)
+    crossings = find_crossings(smoothest)
+    mended = smoothest
+    if crossings:
+        mended = NurbsCurve.interpolate(points, _DEGREE, closed=corner_at_seam, corner_at_seam=corner_at_seam, ends_along_chords=True)
+    if not crossings or find_crossings(mended):
+        return smoothest, []
+    before = [min(crossing.first_mm, smoothest.length_mm - crossing.second_mm) for crossing in crossings]
+    place = f"{max(before):.3g} mm before the edge, at ({crossings[-1].x_mm:.6g}, {crossings[-1].y_mm:.6g})"
+    return mended, [
+        f"mended: the smoothest curve through the points would cross itself {place}; it runs into the edge along the lines from the "
+        "neighbouring points instead, through every point"
+    ]
+
+
+def _with_straight_join(points: Array, body: NurbsCurve) -> NurbsCurve:
+    """Join the ends of the curve through the points with a line: a cubic piece behind a knot of multiplicity three."""
     steps = np.sqrt(np.linalg.norm(np.diff(np.vstack([points, points[:1]]), axis=0), axis=1))  # (m,) centripetal, the gap last
     end = steps.sum() / steps[:-1].sum()  # the body's parameter runs from 0 to 1
     first, last = body.control_points_mm[0], body.control_points_mm[-1]
@@ -79,13 +127,23 @@ def _sharp_turns(points: Array) -> tuple[Array, NDArray[np.bool_]]:
     return turn, (turn > _SHARP_DEG) & (turn > _ABOVE_NEIGHBOURS * beside)
 
 
-def _notes_on_corners(points: Array, lines: Lines) -> list[str]:
-    """Note the sharp turns between the ends, which the interpolating cubic cannot keep."""
+def _notes_on_corners(points: Array, lines: Lines, repeats: bool) -> list[str]:
+    """Note the sharp turns between the ends, which the interpolating cubic cannot keep; all but the seam, if the ends meet there."""
     turn, sharp = _sharp_turns(points)
+    inner = np.arange(1, len(points) if repeats else len(points) - 1)
+    sharp = sharp | _sharp_pairs(np.where(np.isin(np.arange(len(points)), inner), turn, 0.0))
     return [
         f"line {lines[i]}: the points turn by {turn[i]:.0f} deg; the curve is smooth there, a corner would need a nurbs yaml"
-        for i in np.flatnonzero(sharp[1:-1]) + 1
+        for i in inner[sharp[inner]]
     ]
+
+
+def _sharp_pairs(turn: Array) -> NDArray[np.bool_]:
+    """Where two corners follow one another, as those of a blunt edge do: they turn by far more than the vertices beside the two."""
+    following = np.roll(turn, -1)
+    beside = np.maximum(np.roll(turn, 1), np.roll(turn, -2))
+    first = (np.minimum(turn, following) > _SHARP_DEG) & (np.minimum(turn, following) > _ABOVE_NEIGHBOURS * beside)
+    return np.asarray(first | np.roll(first, 1))
 
 
 def _require_distinct(points: Array, lines: Lines) -> None:

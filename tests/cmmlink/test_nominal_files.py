@@ -57,6 +57,16 @@ BAD: dict[str, tuple[str, str | bytes, str]] = {
     "yaml knots": ("a.yaml", QUARTER.replace("[0, 0, 0, 1", "[0, 0, 1"), "3 control points of degree 2 need 6 knots, got 5"),
     "yaml weight": ("a.yaml", QUARTER.replace("[1, 0.7", "[0, 0.7"), "line 4: weights[0] is '0'; expected a number greater than"),
     "yaml not closed": ("a.yaml", QUARTER + "closed: true\n", "a closed curve must end where it begins: the gap is 1.41421 mm"),
+    "yaml nearly closed": (
+        "a.yaml",
+        "degree: 1\nknots: [0, 0, 1, 2, 2]\ncontrol_points_mm: [[0, 0], [10, 5], [0.1, 0]]\n",
+        "the curve ends 0.1 mm from where it begins: it may be closed or open; expected closed: false",
+    ),
+    "yaml bow tie": (
+        "a.yaml",
+        "degree: 1\nknots: [0, 0, 1, 2, 3, 4, 4]\ncontrol_points_mm: [[0, 0], [4, 3], [4, 0], [0, 3], [0, 0]]\n",
+        "the curve crosses or touches itself at (2, 1.5) at stations 2.5 and 10.5 mm",
+    ),
     "yaml huge": ("a.yaml", QUARTER.replace("[1, 1]", "[1, 1e99]"), "line 3: control_points_mm[1][1] is '1e99'; expected a number less"),
     "yaml one place": ("a.yaml", QUARTER.replace("[1, 1], [0, 1]", "[1, 0], [1, 0]"), "the control points lie within 0 mm"),
     "yaml list": ("a.yaml", "- 1\n", "line 1: found a list of 1"),

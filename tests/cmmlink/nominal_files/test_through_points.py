@@ -8,8 +8,18 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from cmmlink.nominal_files import load_nominal
-from inspection import NurbsCurve
-from tests.cmmlink.nominal_files.shapes import BLUNT_LOOP, LOOP, circle_points, read_or_refuse, rows, same_curve, write_text
+from inspection import NominalError, NurbsCurve
+from tests.cmmlink.nominal_files.shapes import (
+    BLUNT_LOOP,
+    BLUNT_LOWER,
+    BLUNT_UPPER,
+    LOOP,
+    circle_points,
+    read_or_refuse,
+    rows,
+    same_curve,
+    write_text,
+)
 
 
 @pytest.mark.parametrize("count", [8, 100])
@@ -34,22 +44,43 @@ def test_circle_stays_smooth_at_its_seam(tmp_path: Path, count: int, form: str) 
     np.testing.assert_allclose(seam, seam[0], rtol=1e-6)
 
 
-def test_circle_without_its_last_point_is_open_until_told(tmp_path: Path) -> None:
+def test_circle_without_its_last_point_is_asked_about(tmp_path: Path) -> None:
     path = write_text(tmp_path, rows(circle_points(40)[:-1]), "circle.csv")
-    opened, closed = load_nominal(path), load_nominal(path, closed=True)
-    assert not opened.curve.closed
-    assert opened.notes == ("open: a gap of 3.13836 mm from last to first point",)  # 2 * 20 mm * sin(pi / 40)
+    with pytest.raises(
+        NominalError, match=r"a gap of 3\.13836 mm from last to first point, 7\.8 % of the size: .*closed: true or closed: false"
+    ):
+        load_nominal(path)  # 2 * 20 mm * sin(pi / 40)
+    opened, closed = load_nominal(path, closed=False), load_nominal(path, closed=True)
+    same_curve(opened.curve, NurbsCurve.interpolate(circle_points(40)[:-1]))
+    assert opened.notes == ("open: a gap of 3.13836 mm from last to first point",)
     same_curve(closed.curve, NurbsCurve.interpolate(circle_points(40)[:-1], closed=True))
     assert closed.notes == ("closed, as asked: a gap of 3.13836 mm from last to first point, joined smoothly",)
 
 
-def test_blunt_edge_stays_open_until_told_then_gets_a_straight_edge(tmp_path: Path) -> None:
+@pytest.mark.parametrize("count", [6, 40, 400, 4000])
+def test_a_loop_that_lacks_its_last_point_is_never_silently_open(tmp_path: Path, count: int) -> None:
+    """The gap is 50, 7.9, 0.79 and 0.079 % of the size: none of these is a blunt edge, for the points run on."""
+    with pytest.raises(NominalError, match="the profile may be closed or open"):
+        load_nominal(write_text(tmp_path, rows(circle_points(count)[:-1]), "circle.csv"))
+
+
+def test_a_profile_whose_ends_lie_far_apart_is_open(tmp_path: Path) -> None:
+    for share in (0.25, 0.5, 0.75):
+        nominal = load_nominal(write_text(tmp_path, rows(circle_points(80)[: round(80 * share) + 1]), "arc.csv"))
+        assert not nominal.curve.closed
+        assert nominal.notes[0].startswith("open: a gap of ")
+
+
+def test_blunt_edge_is_closed_by_a_straight_edge_unless_kept_open(tmp_path: Path) -> None:
     path = write_text(tmp_path, "NACA 0012\n" + rows(BLUNT_LOOP), "naca.dat")
-    opened, closed = load_nominal(path, scale=100.0), load_nominal(path, scale=100.0, closed=True)
+    opened, closed, asked = (load_nominal(path, scale=100.0, closed=closed) for closed in (False, None, True))
     body = NurbsCurve.interpolate(BLUNT_LOOP * 100)
     same_curve(opened.curve, body)
     assert opened.notes[1] == "open: a gap of 0.252 mm from last to first point"  # 2 * 5 * 0.12 * 0.0021 of the chord
-    assert closed.notes[1].endswith("joined by a straight line with a corner at each end (blunt trailing edge)")
+    said = "a gap of 0.252 mm from last to first point, joined by a straight line with a corner at each end (blunt trailing edge)"
+    assert closed.notes[1] == f"closed: {said}; to keep it open, say so: --open, or closed: false"
+    assert asked.notes[1] == f"closed, as asked: {said}"
+    same_curve(closed.curve, asked.curve)
     curve = closed.curve
     assert curve.closed
     assert len(curve.corners) == 2
@@ -59,6 +90,26 @@ def test_blunt_edge_stays_open_until_told_then_gets_a_straight_edge(tmp_path: Pa
     assert np.all(np.diff(edge[:, 1]) > 0)
     share = curve.corners[1]  # the body's parameter, shrunk
     np.testing.assert_allclose(curve.point(np.linspace(0, share, 400)[:-1]), body.point(np.linspace(0, 1, 400)[:-1]), atol=1e-11)
+
+
+@pytest.mark.parametrize("gap_share", [0.021, 0.06, 0.2])
+def test_a_thick_blunt_edge_is_asked_about(tmp_path: Path, gap_share: float) -> None:
+    """Parallel sides with an edge of this share of the chord: thicker than edges are, and far from open."""
+    x = np.linspace(1, 0.1, 30)
+    nose = np.linspace(0, np.pi, 12)[1:-1]
+    half = gap_share / 2
+    loop = np.vstack(
+        [
+            np.column_stack([x, np.full(30, half)]),
+            np.column_stack([0.1 - 0.1 * np.sin(nose), half * np.cos(nose)]),
+            np.column_stack([x[::-1], np.full(30, -half)]),
+        ]
+    )
+    path = write_text(tmp_path, rows(loop * 100), "flat.csv")
+    with pytest.raises(NominalError, match=f"{100 * gap_share:.2g} % of the size"):
+        load_nominal(path)
+    assert len(load_nominal(path, closed=True).curve.corners) == 2
+    assert not load_nominal(path, closed=False).curve.closed
 
 
 def test_closed_file_can_be_kept_open(tmp_path: Path) -> None:
@@ -72,6 +123,26 @@ def test_sharp_turn_between_the_ends_is_pointed_out(tmp_path: Path) -> None:
     roof = np.column_stack([np.concatenate([x, x[1:] + 10]), np.concatenate([2 * x, 20 - 2 * x[1:]])])
     notes = load_nominal(write_text(tmp_path, rows(roof), "roof.csv")).notes
     assert notes[1] == "line 11: the points turn by 127 deg; the curve is smooth there, a corner would need a nurbs yaml"
+
+
+BLUNT_CORNER = "the points turn by {} deg; the curve is smooth there, a corner would need a nurbs yaml"
+
+
+def test_both_corners_of_a_blunt_edge_closed_at_its_middle_are_pointed_out(tmp_path: Path) -> None:
+    loop = np.vstack([[1.0, 0.0], BLUNT_LOOP, [1.0, 0.0]]) * 100
+    nominal = load_nominal(write_text(tmp_path, rows(loop), "naca.csv"))
+    (x, y), half = BLUNT_UPPER[-2], BLUNT_UPPER[-1, 1]
+    turn = 90 - np.degrees(np.arctan2(y - half, 1 - x))
+    assert [note for note in nominal.notes if "turn by" in note] == [
+        f"line {line}: " + BLUNT_CORNER.format(f"{turn:.0f}") for line in (2, len(loop) - 1)
+    ]
+
+
+def test_both_corners_of_a_blunt_edge_inside_the_loop_are_pointed_out(tmp_path: Path) -> None:
+    """The loop begins at the leading edge, so that two corners follow one another far from its seam."""
+    loop = np.vstack([BLUNT_LOWER, BLUNT_UPPER[::-1]]) * 100
+    nominal = load_nominal(write_text(tmp_path, rows(loop), "naca.csv"))
+    assert [note.split(":")[0] for note in nominal.notes if "turn by" in note] == ["line 41", "line 42"]
 
 
 @settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
