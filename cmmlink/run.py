@@ -84,6 +84,7 @@ def carry_out(
     A device that fails does not raise: the outcome says so. Raises StoreError when the record cannot be kept, PlanError when
     the plan cannot be carried out, and whatever a sink raises.
     """
+    _log.info("nominal %s, %s, %s", plan.nominal.file, plan.tolerance.zone, plan.registration)
     rehearse(profile, plan.registration.method, plan.registration.reject_outliers)
     live = inspection_of(plan, profile)
     started = run_started(plan, device.device, device.simulated)

@@ -10,11 +10,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
-from cmmlink import stack as ct
 from cmmlink.errors import PlanError
 from cmmlink.stack import SectionOutcome, StackOutcome, inspect_stack
 from drivers.errors import MeshError
-from drivers.surface.open3d_process import Open3DMissing
+from drivers.surface.open3d_process import Open3DMissing, Open3DStatus
 from inspection import RegistrationError, Verdict
 from tests.cmmlink.blade import chord_mm, inspect, plan_of, tapered
 from tests.drivers.surface.ct_phantom import (
@@ -202,11 +201,20 @@ def test_a_cutter_that_breaks_down_in_the_middle_is_replaced_and_it_is_said(
     class Breaking:
         name = "open3d of a test"
 
+        def __enter__(self) -> "Breaking":
+            return self
+
+        def __exit__(self, *_: object) -> None:
+            return None
+
+        def status(self) -> Open3DStatus:
+            return Open3DStatus("0.20.0")
+
         def cut(self, triangles: NDArray[np.float64]) -> NDArray[np.float64]:
             raise Open3DMissing("the process with Open3D ended (exit status -11)")
 
-    monkeypatch.setattr(ct, "_cutter", lambda *_: Breaking())
-    stack = inspect(plan_of(*blade, {"heights_mm": (5.0, 6.0)}))
+    monkeypatch.setattr("cmmlink.stack.Open3DProcess", Breaking)
+    stack = inspect(plan_of(*blade, {"heights_mm": (5.0, 6.0)}, cut={"cutter": "open3d"}))
     assert [section.slice.cutter for section in stack.sections] == ["numpy", "numpy"]
     assert any("cut by numpy: the process with Open3D ended" in note for note in stack.notes)
 
