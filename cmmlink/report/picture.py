@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -72,7 +72,8 @@ def _draw_profile(axes: Axes, result: InspectionResult, nominal: NominalProfile)
     points = _loop(nominal.points_mm, nominal)
     zone = result.zone
     edges = [_loop(nominal.points_mm + factor * limit * outward, nominal) for limit in (zone.lower_mm, zone.upper_mm)]
-    axes.fill(*np.vstack([edges[0], edges[1][::-1]]).T, color=_BAND, lw=0)
+    # A collection finds its limits by numpy; `fill` goes through every corner of its polygon in Python.
+    axes.add_collection(PolyCollection([np.vstack([edges[0], edges[1][::-1]])], facecolors=_BAND, linewidths=0))
     axes.plot(*points.T, color=_NOMINAL, lw=1.0)
     shown = _rows_to_draw(result)
     tips = result.foot_mm[shown] + factor * (result.actual_mm - result.foot_mm)[shown]
