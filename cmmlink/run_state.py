@@ -8,6 +8,7 @@ from cmmlink.events import Ending
 from cmmlink.words import Shape, VerdictName
 
 Phase = Literal["preparing", "starting", "measuring", "ending", "finished"]
+RunKind = Literal["run", "replay", "recorded", "section"]
 LinkPhase = Literal["connecting", "up", "down", "closed"]
 
 
@@ -54,7 +55,8 @@ class ZoneLimits:
 class RunState:
     """Everything that is shown of a run in numbers and words, as it was at one moment.
 
-    began         : date and time of day, ISO 8601
+    kind          : a run that is measured, or what poses as none: a replay, a run from the records, a section of a surface
+    began         : when the points were measured: date, time of day and offset from UTC
     ending        : null while the run is on; message says why a run has no result, or what failed
     link_detail   : why the link was lost, or how long it was away; empty while it never was
     streaming     : whether the device shows itself alive now
@@ -64,6 +66,7 @@ class RunState:
     """
 
     number: str
+    kind: RunKind
     plan: str
     part: str
     serial_number: str

@@ -19,8 +19,8 @@ from cmmlink.events import Arrived, Counts, Ending, Event, Judged, RunStarted
 from cmmlink.extremes import DEVIATION, FOOT_X, NORMAL_X, STATION, VERDICT, ChangedBins, Extremes, PointsVersion
 from cmmlink.plan import Plan
 from cmmlink.result_json import number, result_json
-from cmmlink.run_state import LinkPhase, Phase, RegistrationState, RunState, VerdictState, WorstPoint, ZoneLimits
-from cmmlink.words import NOT_MEASURED, VERDICT_NAMES, Headline, headline_of
+from cmmlink.run_state import LinkPhase, Phase, RegistrationState, RunKind, RunState, VerdictState, WorstPoint, ZoneLimits
+from cmmlink.words import NOT_MEASURED, VERDICT_NAMES, Headline, headline_of, local_words
 from drivers import Heartbeat, LinkDown, LinkUp, PointBatch, ScanClosed, ScanOpened
 from inspection import JudgedRows, LiveUpdate, NominalProfile, ToleranceZone, Verdict, coverage
 
@@ -51,12 +51,13 @@ class RunContext:
     coverage_min: float
     buffer_points: int
     began: datetime
+    kind: RunKind = "run"
 
     @classmethod
-    def of(cls, plan: Plan, profile: NominalProfile, began: datetime, number: str, plan_name: str) -> "RunContext":
+    def of(cls, plan: Plan, profile: NominalProfile, began: datetime, number: str, plan_name: str, kind: RunKind = "run") -> "RunContext":
         """What a plan says of a run that begins, or began, at a time of day."""
         coverage_min = plan.registration.coverage_min
-        return cls(number, plan_name, profile, plan.tolerance.zone, coverage_min, plan.buffer_points, began)
+        return cls(number, plan_name, profile, plan.tolerance.zone, coverage_min, plan.buffer_points, began, kind)
 
 
 class _Received(NamedTuple):
@@ -247,6 +248,7 @@ class RunView:
         context, started, counts, ended, zone = self.context, self._started, self._counts, self._ended, self.context.zone
         return RunState(
             number=context.number,
+            kind=context.kind,
             plan=context.plan,
             part=started.part,
             serial_number=started.serial_number,
@@ -254,7 +256,7 @@ class RunView:
             device=self._device_name or started.device,
             address=started.device,
             simulated=started.simulated,
-            began=context.began.isoformat(timespec="seconds"),
+            began=local_words(context.began),
             phase=self._phase,
             ending="failed" if self._failure else ended.ending if ended else None,
             message=self._failure or (ended.message if ended else ""),

@@ -110,7 +110,9 @@ def inspect_surface(file: Path, stop: threading.Event, on_start: Callable[[int],
 def _section(plan: CtPlan, outcome: SectionOutcome, plan_name: str) -> Section:
     height_mm, run = outcome.slice.height_mm, outcome.run
     title = f"Section at height {height_mm:.3f} mm of {plan.mesh.file.name}"
-    context = RunContext(title, plan_name, outcome.profile, plan.tolerance.zone, plan.registration.coverage_min, CAPACITY_POINTS, now())
+    context = RunContext(
+        title, plan_name, outcome.profile, plan.tolerance.zone, plan.registration.coverage_min, CAPACITY_POINTS, now(), "section"
+    )
     started = run_started(plan, surface_words(plan), simulated=False)
     ended = Ended(run.ending, str(run.refusal or ""), outcome.result_json(), run.result)
     return Section(height_mm, context, started, ended, outcome.warnings)

@@ -24,6 +24,7 @@ class Alarms:
         self._now = now
         self._alarms: dict[int, AlarmRow] = {}  # in the order of their numbers
         self._of_this_run: dict[tuple[str, str], int] = {}
+        self._run = ""
         self._number = self._stalls = 0
         self._lock = threading.RLock()
         self._shown = AlarmList(False, ())
@@ -31,7 +32,7 @@ class Alarms:
     def __call__(self, event: Event) -> None:
         """Take one event of a run."""
         if isinstance(event, RunStarted):
-            self._begin_run()
+            self._begin_run(event.serial_number or event.part)
         elif isinstance(event, Arrived):
             self._take_arrival(event)
         elif isinstance(event, Judged):
@@ -63,8 +64,8 @@ class Alarms:
                 self._number += 1
                 _log.log(logging.ERROR if severity == "fault" else logging.WARNING, "alarm %d: %s: %s", self._number, what, detail)
                 self._of_this_run[(what, detail)] = self._number
-                since = self._now().strftime("%H:%M:%S")
-                self._alarms[self._number] = AlarmRow(self._number, severity, what, detail, count, since, active, False)
+                since = self._now().strftime("%Y-%m-%d %H:%M:%S")
+                self._alarms[self._number] = AlarmRow(self._number, severity, what, detail, count, since, self._run, True, active, False)
                 self._drop_oldest()
             self._publish()
 
@@ -89,8 +90,11 @@ class Alarms:
         with self._lock:
             return list(reversed(self._alarms.values()))
 
-    def _begin_run(self) -> None:
+    def _begin_run(self, run: str) -> None:
+        """Alarms from here on are those of another run; those before are an earlier run's, and none of them lasts."""
         with self._lock:
+            self._run = run
+            self._alarms = {number: replace(alarm, current=False) for number, alarm in self._alarms.items()}
             self._of_this_run.clear()
             self._stalls = 0
             self.clear_active()
@@ -122,5 +126,10 @@ class Alarms:
 
     def _publish(self) -> None:
         """Replace what pages are shown; called with the lock held."""
-        fault = any(alarm.severity == "fault" and (alarm.active or not alarm.acknowledged) for alarm in self._alarms.values())
+        fault = any(_is_fault_now(alarm) for alarm in self._alarms.values())
         self._shown = AlarmList(fault, tuple(islice(reversed(self._alarms.values()), _MOST_SHOWN)))
+
+
+def _is_fault_now(alarm: AlarmRow) -> bool:
+    """Whether a fault is there: of the current run, and active or unseen."""
+    return alarm.severity == "fault" and alarm.current and (alarm.active or not alarm.acknowledged)

@@ -1,13 +1,15 @@
 """A CT surface inspected from the page: how far it is, and every section as it comes."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from cmmlink.console.protocol import SectionRow, SurfaceState
 from cmmlink.events import RunStarted
 from cmmlink.run_view import Ended, RunContext
+from cmmlink.words import NOT_MEASURED, headline_of
+from inspection import Verdict
 
 _MOST_SHOWN = 1000
 
@@ -39,7 +41,7 @@ class CtImport:
         self._lock = threading.Lock()
         self._began_s = 0.0
         self._sections: list[Section] = []
-        self._state = SurfaceState("", "none", "", 0, 0, None, ())
+        self._state = SurfaceState("", "", "none", "none", "", 0, 0, None, ())
 
     @property
     def state(self) -> SurfaceState:
@@ -50,13 +52,13 @@ class CtImport:
         """Begin with another surface, which is read first."""
         with self._lock:
             self._sections = []
-            self._state = SurfaceState(plan, "reading", "", 0, 0, None, ())
+            self._state = SurfaceState(plan, "READING", "none", "reading", "", 0, 0, None, ())
 
     def expect(self, sections: int) -> None:
         """Note how many sections will come."""
         with self._lock:
             self._began_s = self._clock()
-            self._state = replace(self._state, state="inspecting", total=sections)
+            self._state = replace(self._state, state="inspecting", word="INSPECTING", total=sections)
 
     def add(self, section: Section) -> None:
         """Add a section that was judged."""
@@ -71,12 +73,24 @@ class CtImport:
     def end(self, message: str, failed: bool = False) -> None:
         """Note that it is over."""
         with self._lock:
-            self._state = replace(self._state, state="failed" if failed else "done", message=message, remaining_s=None)
+            headline = NOT_MEASURED if failed or not self._sections else headline_of(_worst_of(self._sections), _ending_of(self._sections))
+            ended = replace(self._state, word=headline.words, shape=headline.shape, message=message, remaining_s=None)
+            self._state = replace(ended, state="failed" if failed else "done")
 
     def section(self, index: int) -> Section | None:
         """Give the section at a place in the list, None where there is none."""
         with self._lock:
             return self._sections[index] if 0 <= index < len(self._sections) else None
+
+
+def _worst_of(sections: Sequence[Section]) -> Verdict:
+    """The verdict of the worst section."""
+    return max(Verdict[section.ended.result["verdict"].upper()] for section in sections)
+
+
+def _ending_of(sections: Sequence[Section]) -> str:
+    """Aborted where any section was; what was not cut any more is missing in the list."""
+    return "aborted" if any(section.ended.ending == "aborted" for section in sections) else "complete"
 
 
 def _row_of(section: Section) -> SectionRow:

@@ -28,6 +28,7 @@ from cmmlink.record import (
 )
 from cmmlink.record import export_run as export_files
 from cmmlink.result_json import result_json
+from cmmlink.run_state import RunKind
 from cmmlink.run_view import Ended, RunContext
 from cmmlink.words import headline_of, local_words
 from drivers import Decoder
@@ -47,9 +48,9 @@ class OpenedRun:
     started: RunStarted
     ended: Ended
 
-    def context(self, title: str) -> RunContext:
+    def context(self, title: str, kind: RunKind) -> RunContext:
         """What the run was judged by, under a title that pages show in place of a number."""
-        return RunContext.of(self.plan, self.profile, self.began, title, plan_name="")
+        return RunContext.of(self.plan, self.profile, self.began, title, plan_name="", kind=kind)
 
 
 @dataclass(slots=True)

@@ -111,7 +111,12 @@ class StationState:
 
 @dataclass(frozen=True, slots=True)
 class AlarmRow:
-    """One thing that went wrong: how often, since when (time of day), whether it still is so, whether somebody has seen it."""
+    """One thing that went wrong: how often, since when, whether it still is so, whether somebody has seen it.
+
+    since : date and time of day at this place
+    run   : the serial number, or the part, of the run it belongs to; empty before the first
+    current : it belongs to the run that is on, or was the last; an earlier one says nothing about the part in front
+    """
 
     number: int
     severity: Severity
@@ -119,13 +124,15 @@ class AlarmRow:
     detail: str
     count: int
     since: str
+    run: str
+    current: bool
     active: bool
     acknowledged: bool
 
 
 @dataclass(frozen=True, slots=True)
 class AlarmList:
-    """The newest alarms, newest first, and whether a fault is there that is active or unseen."""
+    """The newest alarms, newest first, and whether a fault of the current run is there that is active or unseen."""
 
     fault: bool
     alarms: tuple[AlarmRow, ...]
@@ -189,9 +196,11 @@ class SectionRow:
 
 @dataclass(frozen=True, slots=True)
 class SurfaceState:
-    """The CT surface that is inspected, or was inspected last."""
+    """The CT surface that is inspected, or was inspected last; `word` and `shape` are those of its worst section so far."""
 
     plan: str
+    word: str
+    shape: Shape
     state: Literal["none", "reading", "inspecting", "done", "failed"]
     message: str
     done: int

@@ -138,7 +138,7 @@ class Station:
             records = self._records()
             with answer_errors():
                 recorded = records.open_run(run)
-            view = RunView(recorded.context(f"replay of {recorded.run}"), self._setup.clock, self._setup.now)
+            view = RunView(recorded.context(f"replay of {recorded.run}", "replay"), self._setup.clock, lambda: recorded.began)
             job.view = view
             self.show(view)
             job.start(lambda: self._replay(job, view, records, recorded.run))
@@ -189,7 +189,7 @@ class Station:
         with answer_errors():
             recorded = records.open_run(run)
         title = f"Recorded run {recorded.run} of {recorded.began:%Y-%m-%d %H:%M}"
-        view = RunView(recorded.context(title), self._setup.clock, lambda: recorded.began)
+        view = RunView(recorded.context(title, "recorded"), self._setup.clock, lambda: recorded.began)
         view.recall(recorded.started, recorded.ended)
         return view
 
@@ -308,7 +308,9 @@ class Station:
         context = RunContext.of(plan, checked.profile, self._setup.now(), number, name)
         view = RunView(context, self._setup.clock, self._setup.now)
         part, operator = plan.part, plan.operator or ""
-        view(RunStarted(part.name, part.serial_number or "", operator, words_of(plan.device), simulated=False))
+        started = RunStarted(part.name, part.serial_number or "", operator, words_of(plan.device), simulated=False)
+        view(started)
+        self.alarms(started)  # from here on alarms belong to this run, also where its device cannot be opened
         return view
 
     def _read_history(self) -> None:

@@ -5,25 +5,52 @@ import { test } from "node:test";
 
 import { alarmWords } from "../../cmmlink/console/static/alarms.js";
 import { CODE_OF, SHAPE_OF, wordOf } from "../../cmmlink/console/static/verdicts.js";
-import { ageWords, bannerOf, moveWords, readiness } from "../../cmmlink/console/static/panels.js";
+import { ageWords, bannersOf, cardOf, moveWords, readiness } from "../../cmmlink/console/static/panels.js";
 
-const HEARD = { run: null, isRecorded: false, station: null, control: null, hasFault: false, isRemote: false, link: "live" };
+const HEARD = { view: "live", chosen: null, surface: null, run: null, isRecorded: false, station: null, control: null, hasFault: false, isRemote: false, link: "live" };
 const RUN = { number: "run 7", phase: "measuring", link: "up", remark: "" };
 
 test("the most urgent thing stands in the banner", () => {
   const lost = { ...RUN, link: "down" };
   const watching = { controls: false, taken: true };
-  assert.equal(bannerOf(HEARD).words, "");
+  const bannerOf = (heard) => bannersOf(heard)[0];
+  assert.deepEqual(bannersOf(HEARD), []);
   assert.match(bannerOf({ ...HEARD, link: "refused", run: lost }).words, /not valid/);
   assert.match(bannerOf({ ...HEARD, link: "stale", run: lost }).words, /STALE/);
   assert.match(bannerOf({ ...HEARD, link: "away" }).words, /STALE/);
   assert.match(bannerOf({ ...HEARD, run: lost, control: watching }).words, /LINK LOST/);
-  assert.equal(bannerOf({ ...HEARD, run: { ...lost, phase: "finished" } }).words, "");
-  assert.deepEqual(bannerOf({ ...HEARD, run: RUN, isRecorded: true }), { words: "run 7", kind: "note", button: "Back to live" });
+  assert.deepEqual(bannersOf({ ...HEARD, run: { ...lost, phase: "finished" } }), []);
+  assert.deepEqual(bannerOf({ ...HEARD, run: RUN, isRecorded: true }), { words: "run 7", kind: "note", button: "Back to live", act: "live" });
   assert.match(bannerOf({ ...HEARD, control: watching }).words, /another page is in control/);
   assert.match(bannerOf({ ...HEARD, control: { ...watching, taken: false } }).words, /no page is in control/);
   assert.equal(bannerOf({ ...HEARD, run: { ...RUN, remark: "identical" }, isRemote: true }).words, "identical");
   assert.match(bannerOf({ ...HEARD, run: RUN, isRemote: true }).words, /open to the network/);
+});
+
+test("banners stack: one thing never hides another", () => {
+  const replay = { ...RUN, kind: "replay", began: "2026-03-14 15:09:26 +0000", link: "down" };
+  const words = bannersOf({ ...HEARD, run: replay, control: { controls: false, taken: true }, isRemote: true }).map((one) => one.words);
+  assert.deepEqual(words.map((one) => one.split(/[ .:]/)[0]), ["LINK", "Replaying", "Watching", "This"]);
+});
+
+test("the card belongs to what the view shows", () => {
+  const verdict = { word: "CONFORM", shape: "conform", final: true, why: "all within" };
+  const run = { ...RUN, kind: "run", phase: "finished", part: "blade", serial_number: "B-1", began: "then", verdict };
+  const station = { can_start: true, choice: { name: "a.yaml", part: "vane" }, serial_number: "B-2" };
+  const heard = { ...HEARD, run, station };
+  assert.equal(cardOf(heard).word, "CONFORM");
+  const next = cardOf({ ...heard, view: "part" });
+  assert.deepEqual([next.part, next.serial, next.word, next.run], ["vane", "B-2", "READY", null]);
+  assert.match(next.before, /B-1.*CONFORM.*then/);
+  const surface = { plan: "ct.yaml", word: "NOT CONFORM", shape: "not-conform", state: "done", message: "", done: 3, total: 3 };
+  const ct = cardOf({ ...heard, view: "ct", surface });
+  assert.deepEqual([ct.part, ct.serial, ct.word], ["ct.yaml", "", "NOT CONFORM"]);
+  const chosen = { part: "blade", serial_number: "B-0", word: "ABORTED AT 32 %", shape: "ended-early", counted: false, began: "once", run: "r" };
+  const row = cardOf({ ...heard, view: "history", chosen });
+  assert.deepEqual([row.serial, row.word, row.final, row.badge], ["B-0", "ABORTED AT 32 %", false, "RECORDED once"]);
+  const isOn = { ...run, phase: "measuring", verdict: { ...verdict, final: false } };
+  for (const view of ["live", "part", "history", "ct"]) assert.equal(cardOf({ ...heard, run: isOn, view, chosen, surface }).run, isOn);
+  assert.equal(cardOf({ ...heard, run: { ...run, kind: "replay" } }).badge, "REPLAY of then");
 });
 
 test("values move by nothing only where the registration is final", () => {

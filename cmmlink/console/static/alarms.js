@@ -3,15 +3,19 @@
 import { byId, make, put, showSymbol, within } from "./dom.js";
 import { count } from "./numbers.js";
 
-/** @import { AlarmRow } from "./protocol.js" */
+/** @import { AlarmRow, RunState } from "./protocol.js" */
 
-/** @param {readonly AlarmRow[]} alarms newest first */
-export function showAlarms(alarms) {
+/**
+ * @param {readonly AlarmRow[]} alarms newest first
+ * @param {RunState["kind"]} kind what the page shows: beside a replay or a recorded run, no alarm is that run's
+ */
+export function showAlarms(alarms, kind) {
   const open = alarms.filter((alarm) => !alarm.acknowledged || alarm.active);
-  const first = open.find((alarm) => alarm.severity === "fault") ?? open[0];
-  const words = first ? alarmWords(first) : "", more = open.length > 1 ? `  (+${open.length - 1})` : "";
+  const first = open.find((alarm) => alarm.severity === "fault" && alarm.current) ?? open.find((alarm) => alarm.current) ?? open[0];
+  const isEarlier = first && (!first.current || kind === "replay" || kind === "recorded");
+  const words = !first ? "" : isEarlier ? `${whose(first)}: ${alarmWords(first)}` : alarmWords(first), more = open.length > 1 ? `  (+${open.length - 1})` : "";
   const line = byId("alarms");
-  line.dataset.severity = first?.severity ?? "none";
+  line.dataset.severity = isEarlier ? "earlier" : first?.severity ?? "none";
   line.dataset.acknowledged = String(Boolean(first?.acknowledged));
   showSymbol(within(line, "svg"), first ? "lamp-fault" : "lamp-off");
   put("alarm-text", words ? words + more : "No alarm");
@@ -24,11 +28,17 @@ export function showAlarms(alarms) {
 /** @param {AlarmRow} alarm */
 function itemOf(alarm) {
   const marks = [alarm.active ? "still active" : "", alarm.acknowledged ? "acknowledged" : ""].filter(Boolean);
-  const item = make("li", [`${alarm.since}  ${alarmWords(alarm)}`, ...marks].join("  \u00b7 "));
-  item.dataset.severity = alarm.severity;
+  const item = make("li", [whose(alarm), alarmWords(alarm), ...marks].join("  \u00b7 "));
+  item.dataset.severity = alarm.current ? alarm.severity : "earlier";
   item.dataset.acknowledged = String(alarm.acknowledged && !alarm.active);
   return item;
 }
+
+/**
+ * Which run an alarm belongs to, and when it was raised.
+ * @param {AlarmRow} alarm
+ */
+export const whose = ({ run, since, current }) => [current ? "" : "earlier run", run, since].filter(Boolean).join(" ");
 
 /** @param {AlarmRow} alarm */
 export function alarmWords({ what, count: times, detail }) {

@@ -13,12 +13,15 @@ const SHOWN = 20;
 const ACTS = ["open", "replay", "export"];
 
 export class History {
-  /** @param {Record<Act, (run: string) => void>} acts what can be done with a run */
-  constructor(acts) {
+  /**
+   * @param {Record<Act, (run: string) => void>} acts what can be done with a run
+   * @param {() => void} onChoice hears that another run is chosen
+   */
+  constructor(acts, onChoice) {
     this.acts = acts;
     this.charts = [new Chart(byId("chart-large"), true), new Chart(byId("chart-small"), false)];
     /** @type {Table<RunRow>} */
-    this.table = new Table(byId("runs"), rowOf, ({ run }) => acts.open(run));
+    this.table = new Table(byId("runs"), rowOf, ({ run }) => acts.open(run), onChoice);
     for (const act of ACTS) buttonOf(`${act}-run`).addEventListener("click", () => this.act(act));
   }
 

@@ -6,7 +6,7 @@ import { buttonOf, byId, inputOf, put } from "./dom.js";
 import { listen } from "./gestures.js";
 import { History } from "./history.js";
 import { Link, OUT_OF_REACH } from "./link.js";
-import { ageWords, showBanner, showButtons, showLamps, showRun } from "./panels.js";
+import { ageWords, cardOf, showBanners, showButtons, showLamps, showRun } from "./panels.js";
 import { PartView } from "./part_view.js";
 import { Scan } from "./points.js";
 import { Profile } from "./profile.js";
@@ -25,7 +25,8 @@ const SAID_MS = 8000; // so long the answer to a command stays
 const SILENT = ["enter", "devices"]; // commands whose success is not worth a word
 
 /** @type {Heard} */
-const heard = { run: null, isRecorded: false, station: null, control: null, hasFault: false, isRemote: false, link: "connecting" };
+const heard = {
+  view: "part", chosen: null, surface: null, run: null, isRecorded: false, station: null, control: null, hasFault: false, isRemote: false, link: "connecting" };
 /** @type {{ nowMs: number, at: number }} */
 let clock = { nowMs: 0, at: 0 }; // the station's time of day, and when it was heard
 /** @type {readonly AlarmRow[]} */
@@ -48,7 +49,7 @@ const history = new History({
   open: (run) => askToSee({ do: "open", run }),
   replay: (run) => askToSee({ do: "replay", run }),
   export: download,
-});
+}, rewrite);
 const ctView = new CtView((plan) => ask({ do: "import", plan }), (section) => askToSee({ do: "section", section }));
 
 // What the station says.
@@ -61,7 +62,7 @@ function onMessage(message) {
   else if (message.type === "control") heard.control = message;
   else if (message.type === "alarms") [alarms, heard.hasFault] = [message.alarms, message.fault];
   else if (message.type === "history") history.show(message.runs);
-  else if (message.type === "ct") ctView.show(message);
+  else if (message.type === "ct") ctView.show((heard.surface = message));
   else if (message.type === "alive") clock = { nowMs: message.now_ms, at: performance.now() };
   rewrite();
 }
@@ -144,20 +145,21 @@ function paintDrawings() {
 }
 
 function paintWords() {
+  heard.chosen = history.table.chosen ?? null;
   showRun(heard);
   showLamps(heard);
-  showAlarms(alarms);
+  showAlarms(alarms, heard.run?.kind ?? "run");
   if (heard.station) {
     partView.show(heard.station);
     ctView.showPlans(heard.station.ct_plans, heard.station.running);
   }
-  showBanner(heard);
+  showBanners(heard, (act) => ask({ do: act }));
   showButtons(heard);
   showAge();
 }
 
 function showAge() {
-  put("age", ageWords(heard.run, clock.nowMs + performance.now() - clock.at));
+  put("age", ageWords(cardOf(heard).run, clock.nowMs + performance.now() - clock.at));
 }
 
 /** @param {number} magnification */
@@ -226,7 +228,7 @@ function save(content, name) {
 /** @param {string} view */
 function go(view) {
   if (!VIEWS.includes(view)) return;
-  document.body.dataset.view = view;
+  document.body.dataset.view = heard.view = view;
   for (const button of viewButtons()) button.toggleAttribute("aria-current", button.dataset.go === view);
   redraw();
   rewrite();
@@ -297,7 +299,6 @@ buttonOf("abort").addEventListener("click", () => ask({ do: "abort" }));
 buttonOf("next").addEventListener("click", nextPart);
 buttonOf("acknowledge").addEventListener("click", () => ask({ do: "acknowledge" }));
 buttonOf("alarm-list-button").addEventListener("click", toggleAlarmList);
-buttonOf("banner-button").addEventListener("click", () => ask({ do: heard.isRecorded ? "live" : "take control" }));
 inputOf("magnification").addEventListener("input", (event) => {
   profile.magnify(magnificationOf(Number(/** @type {HTMLInputElement} */ (event.target).value)));
 });

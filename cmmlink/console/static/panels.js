@@ -1,14 +1,19 @@
 // The right-hand side, the lamps, the banner and the buttons: words and numbers of the run.
 
-import { buttonOf, byId, fillBar, put, putInto, showSymbol, styleOf, within } from "./dom.js";
+import { buttonOf, byId, fillBar, make, put, putInto, showSymbol, styleOf, within } from "./dom.js";
 import { count, digitsFor, signed } from "./numbers.js";
 import { classOf, toleranceUse } from "./points.js";
 import { CODE_OF } from "./verdicts.js";
 
-/** @import { Control, RegistrationState, RunState, StationState } from "./protocol.js" */
+/** @import { Control, RegistrationState, RunRow, RunState, StationState, SurfaceState } from "./protocol.js" */
 /** @import { LinkState } from "./link.js" */
 /** @typedef {[symbol: string, word: string]} Lamp */
-/** @typedef {{ words: string, kind: "none" | "note" | "warning" | "fault", button: string }} Banner */
+/** @typedef {{ words: string, kind: "none" | "note" | "warning" | "fault", button: string, act: "live" | "take control" }} Banner */
+/**
+ * What stands at the right of the page: whose verdict, and the verdict.
+ * @typedef {{ part: string, serial: string, names: (string | undefined)[], word: string, shape: RunState["verdict"]["shape"], final: boolean,
+ *   why: string, phase: string, badge: string, before: string, run: RunState | null }} Card
+ */
 /**
  * What the station says, as far as it was heard.
  * @typedef {object} Heard
@@ -16,12 +21,17 @@ import { CODE_OF } from "./verdicts.js";
  * @property {boolean} isRecorded whether that run comes from the records
  * @property {StationState | null} station
  * @property {Control | null} control
+ * @property {string} view what the page shows: live, part, history or ct
+ * @property {RunRow | null} chosen the run chosen in the history
+ * @property {SurfaceState | null} surface
  * @property {boolean} hasFault
  * @property {boolean} isRemote whether the station is open to the network
  * @property {LinkState} link
  */
 
 const NONE = "\u2013";
+/** @type {Card} */
+const NO_CARD = { part: "", serial: "", names: [], word: "", shape: "none", final: false, why: "", phase: "", badge: "", before: "", run: null };
 const SIGNS = { over: "\u25b2", under: "\u25bc", "not-proven": "\u25c6", in: "\u25cf", near: "\u25cf" };
 const PHASES = { preparing: "preparing", starting: "connecting", measuring: "so far", ending: "ending", finished: "" };
 
@@ -33,14 +43,17 @@ const LINK_LAMPS = {
 const DARK = ["lamp-off", "none"];
 
 /** @param {Heard} heard */
-export function showRun({ run, station }) {
-  const choice = station?.choice;
-  put("part", run?.part || choice?.part || "No part");
-  put("serial-number", run?.serial_number ?? station?.serial_number ?? "");
-  byId("serial-number").title = byId("serial-number").textContent ?? ""; // a long one is cut
-  const names = run ? [run.plan, run.operator] : [choice?.name, station?.operator];
-  put("plan-operator", names.filter(Boolean).join("  \u00b7  "));
-  showVerdict(run, station);
+export function showRun(heard) {
+  const card = cardOf(heard), { run } = card;
+  put("part", card.part || "No part");
+  put("serial-number", card.serial);
+  byId("serial-number").title = card.serial; // a long one is cut
+  put("plan-operator", card.names.filter(Boolean).join("  \u00b7  "));
+  byId("before").hidden = !card.before;
+  put("before", card.before);
+  byId("kind").hidden = !card.badge;
+  put("kind", card.badge);
+  showVerdict(card);
   showWorst(run);
   showRegistration(run?.registration);
   showCoverage(run?.coverage ?? 0, run?.coverage_min ?? 0);
@@ -48,14 +61,65 @@ export function showRun({ run, station }) {
 }
 
 /**
+ * What stands at the right: it always belongs to what the view shows, and a run that is on stands there whatever is looked at.
+ * @param {Heard} heard
+ * @returns {Card}
+ */
+export function cardOf({ run, isRecorded, station, view, chosen, surface }) {
+  const isOn = run !== null && run.phase !== "finished" && !isRecorded;
+  if (!isOn && view === "part") return cardOfNextPart(run, station);
+  if (!isOn && view === "history" && chosen) return cardOfRow(chosen);
+  if (!isOn && view === "ct" && surface) return cardOfSurface(surface);
+  return run ? cardOfRun(run) : cardOfNextPart(null, station);
+}
+
+/**
+ * @param {RunState} run
+ * @returns {Card}
+ */
+function cardOfRun(run) {
+  const { word, shape, final, why } = run.verdict, badge = { run: "", section: "SECTION", replay: "REPLAY of", recorded: "RECORDED" }[run.kind];
+  const dated = run.kind === "section" || !badge ? badge : `${badge} ${run.began}`;
+  const phase = final ? "" : PHASES[run.phase];
+  return { part: run.part, serial: run.serial_number, names: [run.plan, run.operator], word, shape, final, why, phase, badge: dated, before: "", run };
+}
+
+/**
+ * While the next part is prepared, the verdict on the last one is a line with its own serial number and time.
  * @param {RunState | null} run
  * @param {StationState | null} station
+ * @returns {Card}
  */
-function showVerdict(run, station) {
-  const { word, why } = run?.verdict ?? readiness(station), card = byId("verdict");
-  const shape = run?.verdict.shape ?? "none", phase = run && !run.verdict.final ? PHASES[run.phase] : "";
+function cardOfNextPart(run, station) {
+  const choice = station?.choice, last = run && [run.serial_number || run.part, run.verdict.word, run.began];
+  return {
+    ...NO_CARD, ...readiness(station), part: choice?.part ?? "", serial: station?.serial_number ?? "",
+    names: [choice?.name, station?.operator], before: last ? `Before: ${last.filter(Boolean).join("  \u00b7  ")}` : "",
+  };
+}
+
+/**
+ * @param {RunRow} row
+ * @returns {Card}
+ */
+function cardOfRow({ part, serial_number: serial, word, shape, counted, began, run }) {
+  return { ...NO_CARD, part, serial, names: [run], word, shape, final: counted, why: "as recorded; O opens the run", badge: `RECORDED ${began}` };
+}
+
+/**
+ * @param {SurfaceState} surface
+ * @returns {Card}
+ */
+function cardOfSurface({ plan, word, shape, state, message, done, total }) {
+  const why = state === "done" || state === "failed" ? message : total ? `${done} of ${total} sections` : "choose a CT plan";
+  return { ...NO_CARD, part: plan || "No surface", names: ["CT surface"], word: word || "NO SURFACE", shape, final: state === "done", why };
+}
+
+/** @param {Card} shown */
+function showVerdict({ word, shape, final, why, phase }) {
+  const card = byId("verdict");
   document.body.dataset.verdict = shape;
-  card.dataset.final = String(Boolean(run?.verdict.final));
+  card.dataset.final = String(final);
   showSymbol(within(card, ".shape"), `shape-${shape}`);
   put("verdict-word", word);
   put("verdict-why", why);
@@ -80,7 +144,7 @@ function showWorst(run) {
   byId("worst").dataset.kind = kind ?? "none";
   put("worst-shape", kind ? SIGNS[kind] : "");
   put("worst-value", worst ? signed(worst.deviation_mm, digitsFor(run.zone)) : NONE);
-  put("worst-where", worst ? `at station ${worst.station_mm.toFixed(2)} mm` : "no point judged");
+  put("worst-where", worst ? `at station ${worst.station_mm.toFixed(2)} mm` : run ? "no point judged" : "");
   put("worst-use", worst ? `${Math.round(100 * toleranceUse(worst.deviation_mm, run.zone))} % of the tolerance` : "");
 }
 
@@ -144,6 +208,7 @@ function bufferWords({ buffered, buffer_capacity, buffer_peak, stalls }) {
  */
 export function ageWords(run, nowMs) {
   if (!run?.verdict_at_ms) return NONE;
+  if (run.kind === "replay" || run.kind === "recorded") return run.began.slice(0, 19); // not of today
   if (run.phase === "finished") return `at ${new Date(run.verdict_at_ms).toTimeString().slice(0, 8)}`;
   const age = Math.max(0, nowMs - run.verdict_at_ms) / 1000;
   return `${age < 10 ? age.toFixed(1) : Math.round(age)} s ago`;
@@ -178,38 +243,62 @@ function showLamp(id, [symbol, word]) {
   putInto(within(element, "i"), word);
 }
 
-/** @param {Heard} heard */
-export function showBanner(heard) {
-  const { words, kind, button } = bannerOf(heard);
-  byId("banner").hidden = !words;
-  byId("banner").dataset.kind = kind;
-  put("banner-text", words);
-  byId("banner-button").hidden = !button;
-  put("banner-button", button);
+let shownBanners = "";
+
+/**
+ * @param {Heard} heard
+ * @param {(act: Banner["act"]) => void} onPress
+ */
+export function showBanners(heard, onPress) {
   document.body.dataset.stale = String(heard.link !== "live");
+  const banners = bannersOf(heard), words = JSON.stringify(banners);
+  if (words === shownBanners) return;
+  shownBanners = words;
+  byId("banners").hidden = !banners.length;
+  byId("banners").replaceChildren(...banners.map((banner) => bannerElement(banner, onPress)));
 }
 
 /**
- * The one thing that the operator has to know first.
- * @param {Heard} heard
- * @returns {Banner}
+ * @param {Banner} banner
+ * @param {(act: Banner["act"]) => void} onPress
  */
-export function bannerOf({ run, isRecorded, control, isRemote, link }) {
-  /** @type {(words: string, kind: Banner["kind"], button?: string) => Banner} */
-  const banner = (words, kind, button = "") => ({ words, kind, button });
-  if (link === "refused") return banner("This address is not valid any more: open the one the program printed.", "fault");
-  if (link === "connecting") return banner("Connecting to the station \u2026", "note");
-  if (link !== "live") return banner("STALE: the station does not answer. What you see is old. Trying again \u2026", "fault");
+function bannerElement({ words, kind, button, act }, onPress) {
+  const element = document.createElement("div"), text = make("span", words);
+  element.dataset.kind = kind;
+  element.append(text);
+  if (button) {
+    const pressed = document.createElement("button");
+    pressed.type = "button";
+    pressed.textContent = button;
+    pressed.addEventListener("click", () => onPress(act));
+    element.append(pressed);
+  }
+  return element;
+}
+
+/**
+ * What the operator has to know, the most urgent first; one thing never hides another.
+ * @param {Heard} heard
+ * @returns {Banner[]}
+ */
+export function bannersOf({ run, isRecorded, control, isRemote, link }) {
+  /** @type {(words: string, kind: Banner["kind"], button?: string, act?: Banner["act"]) => Banner} */
+  const banner = (words, kind, button = "", act = "live") => ({ words, kind, button, act });
+  if (link === "refused") return [banner("This address is not valid any more: open the one the program printed.", "fault")];
+  if (link === "connecting") return [banner("Connecting to the station \u2026", "note")];
+  const banners = [];
+  if (link !== "live") banners.push(banner("STALE: the station does not answer. What you see is old. Trying again \u2026", "fault"));
   if (run?.link === "down" && run.phase !== "finished") {
-    return banner("LINK LOST. The device cannot be reached; trying again \u2026", "fault");
+    banners.push(banner("LINK LOST. The device cannot be reached; trying again \u2026", "fault"));
   }
-  if (isRecorded) return banner(run?.number ?? "", "note", "Back to live");
-  if (control && !control.controls) {
-    return banner(`Watching: ${control.taken ? "another" : "no"} page is in control.`, "note", "Take control");
+  if (isRecorded) banners.push(banner(run?.number ?? "", "note", "Back to live"));
+  else if (run?.kind === "replay") banners.push(banner(run.remark || `Replaying the run of ${run.began}`, "note"));
+  else if (run?.remark) banners.push(banner(run.remark, "note"));
+  if (control && !control.controls && link === "live") {
+    banners.push(banner(`Watching: ${control.taken ? "another" : "no"} page is in control.`, "note", "Take control", "take control"));
   }
-  if (run?.remark) return banner(run.remark, "note");
-  if (isRemote) return banner("This station is open to the network: whoever knows the address can control it.", "warning");
-  return banner("", "none");
+  if (isRemote) banners.push(banner("This station is open to the network: whoever knows the address can control it.", "warning"));
+  return banners;
 }
 
 /** @param {Heard} heard */

@@ -82,7 +82,7 @@ export interface StationState {
   readonly type: "station";
 }
 
-/** One thing that went wrong: how often, since when (time of day), whether it still is so, whether somebody has seen it. */
+/** One thing that went wrong: how often, since when, whether it still is so, whether somebody has seen it. since : date and time of day at this place run : the serial number, or the part, of the run it belongs to; empty before the first current : it belongs to the run that is on, or was the last; an earlier one says nothing about the part in front */
 export interface AlarmRow {
   readonly number: number;
   readonly severity: "fault" | "warning";
@@ -90,11 +90,13 @@ export interface AlarmRow {
   readonly detail: string;
   readonly count: number;
   readonly since: string;
+  readonly run: string;
+  readonly current: boolean;
   readonly active: boolean;
   readonly acknowledged: boolean;
 }
 
-/** The newest alarms, newest first, and whether a fault is there that is active or unseen. */
+/** The newest alarms, newest first, and whether a fault of the current run is there that is active or unseen. */
 export interface AlarmList {
   readonly fault: boolean;
   readonly alarms: readonly AlarmRow[];
@@ -132,9 +134,10 @@ export interface ZoneLimits {
   readonly uncertainty_mm: number;
 }
 
-/** Everything that is shown of a run in numbers and words, as it was at one moment. began : date and time of day, ISO 8601 ending : null while the run is on; message says why a run has no result, or what failed link_detail : why the link was lost, or how long it was away; empty while it never was streaming : whether the device shows itself alive now expected : number of points the device announced latency_s : how long the newest judged point waited for its verdict verdict_at_ms : when the newest verdict was given, ms since 1970 */
+/** Everything that is shown of a run in numbers and words, as it was at one moment. kind : a run that is measured, or what poses as none: a replay, a run from the records, a section of a surface began : when the points were measured: date, time of day and offset from UTC ending : null while the run is on; message says why a run has no result, or what failed link_detail : why the link was lost, or how long it was away; empty while it never was streaming : whether the device shows itself alive now expected : number of points the device announced latency_s : how long the newest judged point waited for its verdict verdict_at_ms : when the newest verdict was given, ms since 1970 */
 export interface RunState {
   readonly number: string;
+  readonly kind: "run" | "replay" | "recorded" | "section";
   readonly plan: string;
   readonly part: string;
   readonly serial_number: string;
@@ -219,9 +222,11 @@ export interface SectionRow {
   readonly warnings: readonly string[];
 }
 
-/** The CT surface that is inspected, or was inspected last. */
+/** The CT surface that is inspected, or was inspected last; `word` and `shape` are those of its worst section so far. */
 export interface SurfaceState {
   readonly plan: string;
+  readonly word: string;
+  readonly shape: "conform" | "not-proven" | "not-conform" | "ended-early" | "none";
   readonly state: "none" | "reading" | "inspecting" | "done" | "failed";
   readonly message: string;
   readonly done: number;

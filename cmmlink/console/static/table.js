@@ -13,8 +13,10 @@ export class Table {
    * @param {HTMLElement} element
    * @param {(item: Item) => HTMLElement[]} rowOf gives the cells of a row
    * @param {(item: Item, place: number) => void} open
+   * @param {() => void} onChoice hears that another row is chosen
    */
-  constructor(element, rowOf, open) {
+  constructor(element, rowOf, open, onChoice = () => {}) {
+    this.onChoice = onChoice;
     this.element = element;
     this.rowOf = rowOf;
     this.open = open;
@@ -49,6 +51,7 @@ export class Table {
   /** @param {number} at */
   point(at) {
     this.at = at;
+    this.onChoice();
     const rows = this.element.querySelectorAll("tbody tr");
     rows.forEach((row, k) => row.setAttribute("aria-selected", String(k === at)));
     rows[at]?.scrollIntoView({ block: "nearest" });

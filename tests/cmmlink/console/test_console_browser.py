@@ -105,12 +105,14 @@ def test_what_was_aborted_never_stands_as_a_settled_verdict(bench: Bench, keep: 
     page.keyboard.press("2")
     page.locator("#view-part").wait_for(state="visible")
     page.keyboard.press("Escape")
+    expect(page.locator("#verdict-word")).to_have_text("READY")
+    expect(page.locator("#before")).to_have_text(re.compile(r"Before: B-0041.*ABORTED AT (49|50) %"))
+    page.keyboard.press("1")
     expect(page.locator("#verdict-word")).to_have_text(re.compile(r"ABORTED AT (49|50) %"))
     expect(page.locator("#verdict-why")).to_have_text(re.compile(r"no verdict: the scan was aborted; \d+ points out until then"))
     expect(page.locator("body")).to_have_attribute("data-verdict", "ended-early")
     expect(page.locator("#verdict")).to_have_attribute("data-final", "false")
     expect(page.locator("#can-move")).not_to_contain_text("final")
-    page.keyboard.press("1")
     keep(page, "aborted")
     assert bench.station.wait(20.0)
     assert finished(bench).verdict is Verdict.UNCERTAIN
@@ -138,7 +140,7 @@ def test_unplugged_and_recovered(bench: Bench, keep: Keep) -> None:
     expect(page.locator("#received")).to_have_text("1,000")
     bench.device.source.put(LinkDown("the port is gone"))
     expect(page.locator("#lamp-link")).to_contain_text("LOST")
-    expect(page.locator("#banner-text")).to_contain_text("LINK LOST")
+    expect(page.locator("#banners")).to_contain_text("LINK LOST")
     expect(page.locator("#lamp-faults")).to_contain_text("FAULT")
     expect(page.locator("#alarm-text")).to_have_text("Link lost: the port is gone")
     keep(page, "link-lost")
@@ -228,7 +230,7 @@ def test_invalid_plan_is_shown_with_its_line(make_bench: MakeBench, keep: Keep) 
 
 def test_wrong_token_is_refused(bench: Bench) -> None:
     page = bench.page(address=bench.server.address.replace(TOKEN, "guessed"))
-    expect(page.locator("#banner-text")).to_contain_text("not valid")
+    expect(page.locator("#banners")).to_contain_text("not valid")
     expect(page.locator("#plans div")).to_have_count(0)
     code = page.evaluate(
         """() => new Promise(done => { const s = new WebSocket(`ws://${location.host}/live`);
@@ -308,7 +310,7 @@ def focus(page: Page, name: str) -> None:
 def test_two_pages_see_the_same_run_and_one_controls_it(bench: Bench) -> None:
     page = bench.started()
     watcher = bench.page()
-    expect(watcher.locator("#banner-text")).to_contain_text("Watching: another page is in control")
+    expect(watcher.locator("#banners")).to_contain_text("Watching: another page is in control")
     bench.device.source.put(opened(2000), *batches(measured(bench.profile, 2000, seed=1), 50)[:20])
     for one in (page, watcher):
         expect(one.locator("#received")).to_have_text("1,000")
@@ -316,8 +318,8 @@ def test_two_pages_see_the_same_run_and_one_controls_it(bench: Bench) -> None:
     watcher.keyboard.press("Escape")
     expect(watcher.locator("#said")).to_contain_text("another page is in control")
     assert bench.station.running
-    watcher.locator("#banner-button").click()
-    expect(page.locator("#banner-text")).to_contain_text("Watching")
+    watcher.locator("#banners button").click()
+    expect(page.locator("#banners")).to_contain_text("Watching")
     expect(page.locator("#abort")).to_be_disabled()
     watcher.keyboard.press("Escape")
     for one in (page, watcher):
@@ -328,11 +330,11 @@ def test_page_says_that_it_is_stale_and_comes_back_after_a_restart(bench: Bench)
     page = bench.page()
     expect(page.locator("#plans div")).to_have_count(1)
     bench.server.stop()
-    expect(page.locator("#banner-text")).to_contain_text("STALE")
+    expect(page.locator("#banners")).to_contain_text("STALE")
     assert page.locator("body").get_attribute("data-stale") == "true"
     bench.server = ConsoleServer(bench.station, "test", port=bench.server.port, token=TOKEN)
     bench.server.start()
-    expect(page.locator("#banner")).to_be_hidden()
+    expect(page.locator("#banners")).to_be_hidden()
     page.locator("#plans div").click()
     expect(page.locator("#check-word")).to_contain_text("can be run")
     bench.complaints = [said for said in bench.complaints if "ERR_CONNECTION_REFUSED" not in said]
@@ -352,11 +354,11 @@ def test_every_button_works_again_after_a_stall(bench: Bench, monkeypatch: pytes
 
     monkeypatch.setattr(bench.station, "now_ms", stall)
     assert stalled.wait(20)
-    expect(page.locator("#banner-text")).to_contain_text("STALE")
+    expect(page.locator("#banners")).to_contain_text("STALE")
     for button in ("start", "end", "abort", "next", "acknowledge"):
         expect(page.locator(f"#{button}")).to_be_disabled()
     released.set()
-    expect(page.locator("#banner")).to_be_hidden()
+    expect(page.locator("#banners")).to_be_hidden()
     for button in ("start", "next"):
         expect(page.locator(f"#{button}")).to_be_enabled()
     bench.station.alarms.raise_alarm("fault", "Link lost", "unplugged")
@@ -432,12 +434,12 @@ def test_history_is_listed_opened_replayed_and_exported(make_bench: MakeBench, t
     for _ in range(2):
         page.keyboard.press("ArrowDown")
     page.keyboard.press("Enter")
-    expect(page.locator("#banner-text")).to_contain_text("Recorded run")
+    expect(page.locator("#banners")).to_contain_text("Recorded run")
     expect(page.locator("#verdict-word")).to_have_text("NOT CONFORM")
     expect(page.locator("#serial-number")).to_have_text("B-0042")
     keep(page, "recorded")
     page.keyboard.press("Escape")
-    expect(page.locator("#banner")).to_be_hidden()
+    expect(page.locator("#banners")).to_be_hidden()
     expect(page.locator("#verdict-word")).to_have_text("CONFORM")
     page.keyboard.press("3")
     with page.expect_download() as download:
@@ -448,7 +450,7 @@ def test_history_is_listed_opened_replayed_and_exported(make_bench: MakeBench, t
     expect(page.locator("#said")).to_have_text(re.compile("-0002.zip was not saved: the station cannot be reached"))
     bench.complaints = [said for said in bench.complaints if "ERR_FAILED" not in said]
     page.keyboard.press("r")
-    expect(page.locator("#banner-text")).to_contain_text("identical to the recorded result, to the last bit")
+    expect(page.locator("#banners")).to_contain_text("identical to the recorded result, to the last bit")
     expect(page.locator("#verdict-word")).to_have_text("NOT CONFORM")
 
 
@@ -490,6 +492,49 @@ cut: {cutter: numpy}
 """
 
 
+def test_no_screen_shows_two_opposite_verdicts(make_bench: MakeBench, tmp_path: Path, keep: Keep) -> None:
+    past = PastRuns(tmp_path / "records", lambda _: None, monotonic, lambda: datetime.now().astimezone())
+    bench = make_bench(past)
+    page = bench.started()
+    bad = measured(bench.profile, 2000, seed=1, defect_mm=0.4)
+    bench.device.source.put(opened(2000), *batches(bad, 50), Damaged(17, "checksum"), CLOSED)
+    expect(page.locator("#verdict-word")).to_have_text("NOT CONFORM")
+    assert bench.station.wait(20.0)
+    page.keyboard.press("n")
+    expect(page.locator("#serial-number")).to_have_text("B-0042")
+    expect(page.locator("#verdict-word")).to_have_text("READY")
+    expect(page.locator("#before")).to_have_text(re.compile("Before: B-0041.*NOT CONFORM"))
+    keep(page, "next-part")
+    bench.device.renew()
+    bench.station.alarms.raise_alarm("fault", "Device failed", "left over from the part before")
+    page.keyboard.press("Enter")
+    expect(page.locator("#said")).to_contain_text("started")
+    bench.device.source.put(opened(2000), *batches(measured(bench.profile, 2000, seed=1), 50), CLOSED)
+    expect(page.locator("#verdict-word")).to_have_text("CONFORM")
+    expect(page.locator("#alarms")).to_have_attribute("data-severity", "earlier")
+    expect(page.locator("#alarm-text")).to_contain_text("earlier run B-0041 20")
+    expect(page.locator("#lamp-faults")).to_contain_text("none")
+    keep(page, "alarm-of-an-earlier-run")
+    assert bench.station.wait(20.0)
+    page.keyboard.press("3")
+    page.locator("#runs tbody tr").nth(1).click()
+    expect(page.locator("#verdict-word")).to_have_text("NOT CONFORM")
+    expect(page.locator("#serial-number")).to_have_text("B-0041")
+    expect(page.locator("#kind")).to_contain_text("RECORDED 20")
+    keep(page, "history-card")
+    began = past.runs()[1].began
+    page.keyboard.press("r")
+    expect(page.locator("#banners")).to_contain_text("identical to the recorded result")
+    second = bench.page()
+    second.keyboard.press("1")
+    for one in (page, second):
+        expect(one.locator("#kind")).to_have_text(f"REPLAY of {began}")
+        expect(one.locator("#verdict-word")).to_have_text("NOT CONFORM")
+        expect(one.locator("#age")).to_have_text(began[:19])
+    expect(second.locator("#banners div")).to_have_count(2)  # a replay, and that another page is in control
+    keep(second, "replay-on-a-second-page")
+
+
 def test_surface_is_imported_with_progress_and_its_sections_opened(make_bench: MakeBench, tmp_path: Path, keep: Keep) -> None:
     """A tube of the nominal section, 0.1 mm too thick over 20 mm of its outline above height 10 mm."""
     plan = tmp_path / "ct.yaml"
@@ -526,7 +571,7 @@ def test_surface_is_imported_with_progress_and_its_sections_opened(make_bench: M
     focus(page, "sections")
     page.keyboard.press("End")
     page.keyboard.press("Enter")
-    expect(page.locator("#banner-text")).to_have_text("Section at height 16.000 mm of blade.stl")
+    expect(page.locator("#banners")).to_contain_text("Section at height 16.000 mm of blade.stl")
     expect(page.locator("#verdict-word")).to_have_text("NOT CONFORM")
     section = bench.station.ct.section(3)
     assert section is not None
@@ -535,7 +580,7 @@ def test_surface_is_imported_with_progress_and_its_sections_opened(make_bench: M
     assert millimetres(page.locator("#worst-value").text_content()) == pytest.approx(worst, abs=5.1e-5)
     page.wait_for_function(f"({INKED})('#profile') && ({INKED})('#strip')")
     page.keyboard.press("Escape")
-    expect(page.locator("#banner")).to_be_hidden()
+    expect(page.locator("#banners")).to_be_hidden()
     page.wait_for_function(f"!({INKED})('#profile') && !({INKED})('#strip')")  # nothing is left of what is no longer shown
 
 
@@ -555,7 +600,7 @@ def surface_ring(profile: NominalProfile, station_mm: NDArray[np.float64], exces
 def test_station_open_to_the_network_says_so(make_bench: MakeBench) -> None:
     bench = make_bench(host="0.0.0.0")
     page = bench.page()
-    expect(page.locator("#banner-text")).to_contain_text("open to the network")
+    expect(page.locator("#banners")).to_contain_text("open to the network")
 
 
 @pytest.mark.parametrize(("width", "height"), [(1280, 800), (1920, 1080), (1024, 700)])
