@@ -64,3 +64,13 @@ def test_list_of_alarms_does_not_grow_without_end(alarms: Alarms) -> None:
         alarms.raise_alarm("warning", "Data lost", f"gap {k}")
     assert len(alarms.newest_first()) == 200
     assert alarms.newest_first()[0].detail == "gap 999"
+
+
+def test_an_alarm_carries_its_run_and_is_no_fault_beside_the_next_part(alarms: Alarms) -> None:
+    alarms(RunStarted("blade", "B-1", "", "", simulated=False))
+    arrive(alarms, LinkDown("the port is gone"))
+    assert alarms.fault
+    alarms(RunStarted("blade", "B-2", "", "", simulated=False))
+    (alarm,) = alarms.shown.alarms
+    assert (alarm.run, alarm.current, alarm.active, alarm.acknowledged) == ("B-1", False, False, False)
+    assert not alarms.fault
