@@ -41,8 +41,14 @@ def write_results(
         from cmmlink.report.picture import write_picture  # noqa: PLC0415 - matplotlib takes half a second that other commands need not pay
 
         write_deviations(result, folder / "deviations.csv")
-        write_picture(result, profile, title, folder / "profile.png", document.get("ending", "complete"))
+        write_picture(result, profile, title, folder / "profile.png", document.get("ending", "complete"), _said_at_foot(document))
     return ["result.json", "deviations.csv", "profile.png"]
+
+
+def _said_at_foot(document: dict[str, Any]) -> str:
+    """Which run a picture is of, and when it was measured, as far as the result says so."""
+    run, measured_at = document.get("run") or document.get("replay_of"), document.get("measured_at")
+    return "   ".join(filter(None, [run and f"run {run}", measured_at and f"measured {measured_at}"]))
 
 
 def write_run(folder: Path, run: FinishedRun) -> list[str]:

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from cmmlink.words import headline_of
-from inspection import InspectionResult, NominalProfile, Verdict
+from inspection import InspectionResult, NominalProfile, ToleranceZone, Verdict
 
 Array = NDArray[np.float64]
 
@@ -43,13 +43,20 @@ _LOOKS = (
 )
 
 
-def write_picture(result: InspectionResult, nominal: NominalProfile, title: str, path: Path, ending: str = "complete") -> None:
-    """Draw the profile and the strip of deviations to a PNG file; `ending` is how the run ended."""
+def write_picture(
+    result: InspectionResult, nominal: NominalProfile, title: str, path: Path, ending: str = "complete", said: str = ""
+) -> None:
+    """Draw the profile and the strip of deviations to a PNG file.
+
+    ending : how the run ended
+    said   : what stands small at the foot, like which run it was and when it was measured
+    """
     figure = Figure(figsize=(12, 8), dpi=110, layout="constrained")
     profile, strip = figure.subplots(2, 1, height_ratios=[3, 2])
     _draw_profile(profile, result, nominal)
     _draw_strip(strip, result, nominal)
     figure.suptitle(headline_on_picture(result, title, ending), fontsize=15, fontweight="bold")
+    figure.supxlabel(said, x=0.99, ha="right", fontsize=9)
     figure.savefig(path)
 
 
@@ -89,9 +96,12 @@ def _draw_profile(axes: Axes, result: InspectionResult, nominal: NominalProfile)
 def _draw_strip(axes: Axes, result: InspectionResult, nominal: NominalProfile) -> None:
     zone = result.zone
     axes.axhspan(zone.lower_mm, zone.upper_mm, color=_BAND, lw=0)
-    if zone.uncertainty_mm > 0:
-        for limit in (zone.lower_mm + zone.uncertainty_mm, zone.upper_mm - zone.uncertainty_mm):
-            axes.axhline(limit, color=_NOMINAL, lw=0.8, ls=":")
+    for limit, words in names_of_limits(zone):
+        own, above = limit in (zone.lower_mm, zone.upper_mm), "+" in words
+        axes.axhline(limit, color=_NOMINAL, lw=0.8, ls="--" if own else ":")
+        place, shift = ((1, limit), (4, 0)) if own else ((0, limit), (4, 1 if above else -1))
+        along = "center" if own else "bottom" if above else "top"
+        axes.annotate(words, place, shift, xycoords=("axes fraction", "data"), textcoords="offset points", va=along, fontsize=8)
     axes.axhline(0, color=_NOMINAL, lw=0.8)
     for look in _LOOKS:
         chosen = _has_look(result, look)
@@ -105,6 +115,18 @@ def _draw_strip(axes: Axes, result: InspectionResult, nominal: NominalProfile) -
     axes.set(xlim=(0, nominal.length_mm), xlabel="station (mm)", ylabel="deviation (mm)")
     basis = f"coverage {result.coverage:.1%}   fit {result.fit}   method {result.method}   out of tolerance {result.out_of_tolerance}"
     axes.set_title(basis, fontsize=10)
+
+
+def names_of_limits(zone: ToleranceZone) -> list[tuple[float, str]]:
+    """Each line that the verdict on a point depends on, with its name: the limits, and those within U of them.
+
+    Between a limit and the line a U to each side nothing is proven, so both are drawn.
+    """
+    limits = [(zone.upper_mm, f"upper {zone.upper_mm:+g}"), (zone.lower_mm, f"lower {zone.lower_mm:+g}")]
+    if not zone.uncertainty_mm:
+        return limits
+    around = [(limit + sign * zone.uncertainty_mm, "limit + U" if sign > 0 else "limit - U") for limit, _ in limits for sign in (1, -1)]
+    return limits + around
 
 
 def _mark_worst(axes: Axes, result: InspectionResult, factor: float) -> None:

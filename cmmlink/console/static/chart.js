@@ -62,7 +62,7 @@ export class Chart {
   /** @returns {Scale} */
   scale() {
     const { width, height, text } = this.sheet, foot = this.isLarge ? 2 : 0.6;
-    const left = text * 4.4, right = width - text, top = text * 0.6, bottom = height - text * foot;
+    const left = text * 7.4, right = width - text, top = text * 0.6, bottom = height - text * foot;
     const values = this.entries.flatMap((entry) => [entry.worst_mm, entry.lower_mm, entry.upper_mm]);
     const low = Math.min(...values), high = Math.max(...values), room = (high - low) * 0.12 || 0.01;
     const step = (right - left) / Math.max(FEWEST, this.entries.length);
@@ -96,7 +96,9 @@ export class Chart {
     pen.fillStyle = INK.soft;
     pen.textAlign = "right";
     pen.textBaseline = "middle";
-    for (const limit of [last.upper_mm, last.lower_mm]) pen.fillText(signed(limit, 3), left - 6, py(limit));
+    const apart = Math.max(0, this.sheet.text * 1.15 - (py(last.lower_mm) - py(last.upper_mm))) / 2; // however narrow the zone is drawn
+    pen.fillText(`upper ${signed(last.upper_mm, 3)}`, left - 6, py(last.upper_mm) - apart);
+    pen.fillText(`lower ${signed(last.lower_mm, 3)}`, left - 6, py(last.lower_mm) + apart);
     const places = Math.max(FEWEST, this.entries.length);
     this.drawLine(pen, [[left, py(0)], [px(places - 0.5), py(0)]], INK.faint);
   }

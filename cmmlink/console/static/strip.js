@@ -84,7 +84,10 @@ export class Strip extends Drawing {
     for (const limit of [zone.upper_mm, zone.lower_mm]) {
       this.rule(pen, limit, INK.limit, [7, 5]);
       if (!zone.uncertainty_mm) continue;
-      for (const side of [-1, 1]) this.rule(pen, limit + side * zone.uncertainty_mm, INK["not-proven"], [2, 4]);
+      for (const side of [-1, 1]) {
+        this.rule(pen, limit + side * zone.uncertainty_mm, INK["not-proven"], [2, 4]);
+        this.nameOfU(pen, limit + side * zone.uncertainty_mm, side);
+      }
     }
     this.labelLimits(pen, lower, upper);
     const isFree = [lower, upper].every((limit) => Math.abs(this.py(0) - limit) > sheet.text * 1.4);
@@ -104,6 +107,19 @@ export class Strip extends Drawing {
     this.yLabel(pen, upper - apart - line, "upper", INK.soft);
     this.yLabel(pen, lower + apart, signed(zone.lower_mm, 3), INK.text);
     this.yLabel(pen, lower + apart + line, "lower", INK.soft);
+  }
+
+  /**
+   * The name of a line that lies U beside a limit: between the two nothing is proven.
+   * @param {Pen} pen
+   * @param {number} deviation
+   * @param {number} side
+   */
+  nameOfU(pen, deviation, side) {
+    pen.fillStyle = INK["not-proven"];
+    pen.textAlign = "right";
+    pen.textBaseline = side > 0 ? "bottom" : "top";
+    pen.fillText(side > 0 ? "limit + U" : "limit \u2212 U", this.right - 4, this.py(deviation));
   }
 
   /**

@@ -8,8 +8,8 @@ import pytest
 from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 
-from cmmlink.report.picture import headline_on_picture, magnification, write_picture
-from inspection import NominalProfile
+from cmmlink.report.picture import headline_on_picture, magnification, names_of_limits, write_picture
+from inspection import NominalProfile, ToleranceZone
 from tests.cmmlink.judged_oval import bumped, inspect_oval
 
 
@@ -41,6 +41,19 @@ def test_points_nearer_to_a_limit_than_the_uncertainty_are_drawn_neither_good_no
     write_picture(inspect_oval(profile, deviation_mm), profile, "oval", tmp_path / "a.png")
     assert pixels_of(tmp_path / "a.png", UNPROVEN) > 1000
     assert pixels_of(tmp_path / "a.png", GOOD) == pixels_of(tmp_path / "a.png", BELOW) == 0
+
+
+def test_every_line_that_a_verdict_depends_on_has_its_name() -> None:
+    named = names_of_limits(ToleranceZone(-0.05, 0.07, 0.01))
+    assert [(round(limit, 9), words) for limit, words in named] == [
+        (0.07, "upper +0.07"),
+        (-0.05, "lower -0.05"),
+        (0.08, "limit + U"),
+        (0.06, "limit - U"),
+        (-0.04, "limit + U"),
+        (-0.06, "limit - U"),
+    ]
+    assert [words for _, words in names_of_limits(ToleranceZone(-0.05, 0.07))] == ["upper +0.07", "lower -0.05"]
 
 
 def test_the_magnification_is_a_round_number_that_shows_the_band(profile: NominalProfile) -> None:
