@@ -27,8 +27,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.codecs.outbox import Outbox
-from drivers.codecs.sequence import SequenceCounter, WrappingClock
-from drivers.source import AFTER_THE_END, FRAME_REPEATED, Arrival, Damaged, Heartbeat, PointBatch, Rejected, ScanClosed, ScanOpened
+from drivers.codecs.sequence import MOST_POINTS, SequenceCounter, WrappingClock
+from drivers.source import FRAME_REPEATED, Arrival, Damaged, Heartbeat, PointBatch, Rejected, ScanClosed, ScanOpened
 
 FRAME = np.dtype([("sync", "<u2"), ("type", "u1"), ("flags", "u1"), ("seq", "<u2"), ("t_us", "<u4"), ("xyz", "<i4", 3), ("crc", "<u2")])
 HEAD = np.dtype([("sync", "<u2"), ("n", "<u2"), ("seq", "<u4"), ("t_us", "<u8"), ("crc", "<u2")])
@@ -51,6 +51,7 @@ class BinaryDecoder:
         self._asked = False
         self._damage = 0
         self._away = False
+        self._opening = b""
         self._begin()
 
     def request(self) -> bytes:
@@ -59,16 +60,16 @@ class BinaryDecoder:
         return b"" if asked else b"G"
 
     def feed(self, data: bytes) -> list[Arrival]:
-        """Decode the next bytes."""
+        """Decode the next bytes, up to the end of the scan."""
         data = self._pending + data
         at = 0
-        while True:
+        while not self._out.closed:
             at += self._take_run(data, at)
             used = self._take_one(data, at)
             if not used:
                 break
             at += used
-        self._pending = data[at:]
+        self._pending = b"" if self._out.closed else data[at:]
         return self._out.hand_over()
 
     def break_off(self) -> list[Arrival]:
@@ -80,7 +81,7 @@ class BinaryDecoder:
     def _begin(self) -> None:
         self._counter = SequenceCounter(1 << 16)
         self._clock = WrappingClock(1 << 32, 1e6)
-        self._opened = self._closed = self._in_blocks = False
+        self._in_blocks = self._said_again = False
         self._last_us: int | None = None
         self._last_sequence = -1
         self._us_per_point = 0.0
@@ -88,7 +89,7 @@ class BinaryDecoder:
     def _take_run(self, data: bytes, start: int) -> int:
         """Take good points in sequence, many at once; return the number of bytes used."""
         count = min((len(data) - start) // SIZE, RUN)
-        if count < 2 or self._away or self._closed or self._damage:
+        if count < 2 or self._away or self._said_again or self._damage:
             return 0
         frames = np.frombuffer(data, dtype=FRAME, count=count, offset=start)
         places = range(start, start + count * SIZE, SIZE)
@@ -131,27 +132,26 @@ class BinaryDecoder:
             self._take_point(fields)
         elif kind == OPENING:
             self._open(frame)
+        elif total > MOST_POINTS:
+            self._out.append(Damaged(SIZE, "count of points that no scan has"))
         elif kind == HEARTBEAT:
             self._reach(total)
             self._out.append(Heartbeat())
-        elif not self._closed:
+        else:
             self._reach(total)
-            self._closed = True
             self._out.append(ScanClosed(total))
         return SIZE
 
     def _take_point(self, fields: np.void) -> None:
         raw_us = int(fields["t_us"])
-        near = self._counter.expected + self._estimate_missed(raw_us) if self._away else None
+        near = self._counter.expected + (self._estimate_missed(raw_us) if self._away else 0)
         self._away = False
-        if self._account_for(self._counter.unwrap(int(fields["seq"]), near), int(fields["flags"])):
+        sequence = self._hear_counter(int(fields["seq"]), self._counter.unwrap(int(fields["seq"]), near), near)
+        if self._account_for(sequence, int(fields["flags"])):
             self._append_batch(np.array([self._placed]), np.array([raw_us]), fields["xyz"][None])
 
     def _account_for(self, sequence: int, flags: int) -> bool:
         """Account for one frame; tell whether it is a point to hand on."""
-        if self._closed:
-            self._out.append(Rejected(1, AFTER_THE_END))
-            return False
         place = self._counter.place(sequence, near=sequence)
         self._placed = place.sequence
         if place.repeated:
@@ -177,13 +177,14 @@ class BinaryDecoder:
             return self._skip(1)
         self._out.flush()
         points = np.frombuffer(data, dtype=BLOCK_POINT, count=count, offset=body)
-        self._take_block_points(self._unwrap_32(int(head["seq"])), int(head["t_us"]) + points["dt_us"].astype(np.int64), points)
+        first = self._hear_counter(int(head["seq"]), self._unwrap_32(int(head["seq"])), self._counter.expected)
+        self._take_block_points(first, int(head["t_us"]) + points["dt_us"].astype(np.int64), points)
         return end + 4 - at
 
     def _take_block_points(self, first: int, t_us: NDArray[np.int64], points: NDArray[np.void]) -> None:
         self._away, self._in_blocks = False, True  # the clock of blocks does not wrap
         count = len(points)
-        if first >= self._counter.expected and not points["flags"].any() and not self._closed:
+        if first >= self._counter.expected and not points["flags"].any():
             self._out.append_loss(self._counter.place(first, near=first).lost)
             self._counter.expected = first + count
             self._append_batch(first + np.arange(count), t_us, points["xyz"])
@@ -197,12 +198,28 @@ class BinaryDecoder:
         return anchor + (seq - anchor + half) % (1 << 32) - half
 
     def _open(self, frame: bytes) -> None:
-        if self._opened and self._counter.expected == 0:
-            return  # said once more before the first point
+        body = frame[10:CHECKED]
+        if body == self._opening:
+            self._said_again = self._counter.expected > 0  # what it means, the next counter says
+        else:
+            self._begin_with(body)
+
+    def _begin_with(self, body: bytes) -> None:
         self._begin()
-        self._opened = True
-        count = int.from_bytes(frame[14:22], "little")
-        self._out.append(ScanOpened("counted binary frames", str(int.from_bytes(frame[10:14], "little")), count or None))
+        self._opening = body
+        count = int.from_bytes(body[4:], "little")
+        self._out.append(ScanOpened("counted binary frames", str(int.from_bytes(body[:4], "little")), count or None))
+
+    def _hear_counter(self, counter: int, sequence: int, near: int) -> int:
+        """Decide by the first counter after a repeated opening whether it was only said again, or the device began anew.
+
+        Returns `sequence`, which is `counter` unwrapped to the number closest to `near`, or the counter of a scan begun anew.
+        """
+        anew = self._said_again and counter < abs(sequence - near)
+        self._said_again = False
+        if anew:
+            self._begin_with(self._opening)
+        return counter if anew else sequence
 
     def _append_batch(self, sequence: NDArray[np.int64], t_us: NDArray[np.int64], xyz: NDArray[np.int32]) -> None:
         self._learn_pace(int(sequence[-1]), int(t_us[-1]))
@@ -224,6 +241,7 @@ class BinaryDecoder:
         return round(((raw_us - self._last_us) % (1 << 32)) / self._us_per_point) - 1
 
     def _reach(self, total: int) -> None:
+        self._hear_counter(total, total, self._counter.expected)
         self._out.append_loss(self._counter.reach_total(total))
 
     def _skip(self, count: int) -> int:

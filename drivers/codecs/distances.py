@@ -66,11 +66,17 @@ class Distances:
             self._numbers.append(number)
             self._readings.append(reading)
             self._distances_mm.append(distance_mm if distance_mm is not None else 0.0)
-        if number >= self.expected:  # a late one moves nothing
-            self.expected = number + 1
-        if self._count is not None and self.expected >= self._count:
-            self.out.append(ScanClosed(None))
-            self.closed = True
+        self._reach(number + 1)
+
+    def miss(self) -> None:
+        """Count one distance that was due and is lost."""
+        if not self.closed:
+            self.out.append_loss(1, self._gap)
+            self._reach(self.expected + 1)
+
+    def would_end(self, number: int) -> bool:
+        """Tell whether the distance with this number is the last one of the scan."""
+        return self._count is not None and number + 1 >= self._count
 
     def room(self, most: int) -> int:
         """Return how many distances, at most `most`, `take_many` may take: those that do not end the scan."""
@@ -88,6 +94,13 @@ class Distances:
         self.expected += len(distance_mm)
         self._before_mm = float(distance_mm[-1])
         self.out.append(PointBatch(numbers, self._seconds(readings), _points_mm(distance_mm)))
+
+    def _reach(self, expected: int) -> None:
+        """Note the number of the next distance; the scan ends where its count is reached."""
+        self.expected = max(self.expected, expected)  # a late one moves nothing
+        if self.would_end(self.expected - 1):
+            self.out.append(ScanClosed(None))
+            self.closed = True
 
     def _batch(self) -> Arrival | None:
         """Return the distances taken one by one as one batch."""

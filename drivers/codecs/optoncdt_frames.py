@@ -45,7 +45,7 @@ SHORTEST_REPLY, LONGEST_REPLY = 3, 4096
 OUTPUTS = re.compile(r"\b(DIST1|DIST_RAW|DIST|SHUTTER|COUNTER|TIMESTAMP(?:_?LO|_?HI)?|INTENSITY|STATE)\b")
 Whole = int | NDArray[np.int64]
 Number = TypeVar("Number", float, NDArray[np.float64])
-WORDS = re.compile(rb"[\x00-\x3f][\x40-\x7f][\x80-\xff]")
+WORDS = re.compile(rb"(?:[\x00-\x3d\x3f]|(?<!-)>)[\x40-\x7f][\x80-\xff]")  # a prompt is never the beginning of one
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +110,7 @@ class OptoncdtDecoder:
         """Decode the next bytes."""
         data = self._text + data
         at = 0
-        while True:
+        while not self._out.closed:
             at += self._take_run(data, at)
             found = WORDS.search(data, at)
             if found is None:
@@ -118,7 +118,7 @@ class OptoncdtDecoder:
             self._take_other_bytes(data[at : found.start()])
             self._take_word(*found.group())
             at = found.end()
-        self._text = self._take_replies(data[at:])
+        self._text = b"" if self._out.closed else self._take_replies(data[at:])
         return self._out.hand_over()
 
     def break_off(self) -> list[Arrival]:
@@ -187,15 +187,19 @@ class OptoncdtDecoder:
     def _take_replies(self, data: bytes) -> bytes:
         """Read the replies that end with a prompt; return what follows the last one."""
         *replies, rest = data.split(PROMPT)
-        for reply in replies:
+        for reply in map(self._drop_excess, replies):
             if len(reply) + len(PROMPT) < SHORTEST_REPLY or not reply.replace(b"\r", b"").replace(b"\n", b"").isascii():
                 self._out.append(Damaged(len(reply) + len(PROMPT), "neither value nor reply"))
             else:
                 self._take_reply(reply.decode("ascii"))
-        while len(rest) > LONGEST_REPLY:
+        return self._drop_excess(rest, PROMPT[:1])
+
+    def _drop_excess(self, text: bytes, open_end: bytes = b"") -> bytes:
+        """Count what no reply can hold as damage at fixed places, however the bytes are cut; `open_end` may be a prompt's beginning."""
+        while len(text.removesuffix(open_end)) > LONGEST_REPLY:
             self._out.append(Damaged(LONGEST_REPLY, "neither value nor reply"))
-            rest = rest[LONGEST_REPLY:]
-        return rest
+            text = text[LONGEST_REPLY:]
+        return text
 
     def _take_reply(self, text: str) -> None:
         error = re.search(r"\bE\d{2}\b.*", text)

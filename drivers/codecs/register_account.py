@@ -5,12 +5,13 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.codecs.outbox import Outbox
+from drivers.codecs.outbox import LARGEST_MM, NO_PART, Outbox
 from drivers.codecs.register_map import Entries, RegisterField, RegisterMap, equals_pattern
-from drivers.codecs.sequence import SequenceCounter, WrappingClock
+from drivers.codecs.sequence import MOST_POINTS, SequenceCounter, WrappingClock
 from drivers.source import POINT_REPEATED, Heartbeat, PointBatch, Rejected, ScanClosed
 
 PATIENCE = 3  # answers in a row that contradict what was read before, until the device is believed to have begun anew
+TINIEST = 1e-30  # of a stored number that a device means: what lies nearer to zero is read from the wrong registers
 WIDEST = 62  # bits of a counter that are unwrapped
 
 Columns = Mapping[str, NDArray[np.generic]]
@@ -19,6 +20,8 @@ Columns = Mapping[str, NDArray[np.generic]]
 class RegisterAccount:
     """The account of one scan.
 
+    seen, senseless, sensible_swapped   how many new points came, how many of them no part can have, and how many of these it could
+                                        have with the registers of their numbers swapped
     count        the scan ends after so many points by the device's counter, for devices that tell no end; None: it goes on
     first        number of the first point; None: the first that arrives, or 0 where the device tells how many it sent
     begin_anew   called when the device has begun anew; it has to call `begin`
@@ -33,6 +36,7 @@ class RegisterAccount:
         self._count = count
         self._begin_anew = begin_anew
         self._heartbeat: int | None = None
+        self.seen = self.senseless = self.sensible_swapped = 0
         self._overflow: dict[str, bool] = {}  # of each block: what one says is not taken back by another
         self.begin(first)
 
@@ -75,6 +79,10 @@ class RegisterAccount:
         """Tell whether a point with this counter is the last one that arrived."""
         return self._first is not None and self._counter.unwrap(counter) == self._counter.expected - 1
 
+    def tells_running(self, counter: int | None) -> bool:
+        """Tell whether the device's status says that the point with this counter was taken in a scan that is not over."""
+        return counter is not None and not self._finished and self._sent is not None and 0 <= counter < self._sent
+
     def contradicts(self, *, backward: bool) -> bool:
         """Tell whether an answer goes back behind an earlier one; several in a row mean that the device began anew."""
         if not backward:
@@ -101,11 +109,23 @@ class RegisterAccount:
     def hand_over(self, values: Columns, numbers: NDArray[np.int64]) -> None:
         """Hand over the points that are no repetitions and that the device does not mark invalid."""
         usable = numbers >= 0
+        self._suspect_word_order(values, usable)
         usable[usable] = ~self._find_invalid({name: column[usable] for name, column in values.items()}, int(usable.sum()))
         if usable.any():
             self._out.append(PointBatch(numbers[usable], self._seconds(values, usable), self._points_mm(values, usable)))
         if self._count is not None and self._first is not None and self._counter.expected - self._first >= self._count:
             self._close()
+
+    def _suspect_word_order(self, values: Columns, new: NDArray[np.bool_]) -> None:
+        """Remember of how many new points no coordinate makes sense, and of how many of these it would with the words swapped."""
+        if not new.any():
+            return
+        names = [name for name in "xyz" if name in values]
+        read = np.array([_makes_sense(self._fields[name], values[name][new]) for name in names]).all(axis=0)
+        swapped = np.array([_makes_sense(self._fields[name], _swapped(values[name][new])) for name in names]).all(axis=0)
+        self.senseless += int((~read).sum())
+        self.sensible_swapped += int((~read & swapped).sum())
+        self.seen += int(new.sum())
 
     def end_if_finished(self) -> None:
         """Close the scan if the device has told its end."""
@@ -123,8 +143,13 @@ class RegisterAccount:
     def _number_of(self, counter: int) -> int:
         """Account for one point by its counter; return its number, or -1 if it is a repetition."""
         if self._first is None:
-            self._first = 0 if self._sent is not None else counter  # a device that tells how many it sent begins with 0
-            self._counter.expected = self._first
+            # a device that tells how many it sent begins with 0
+            self._first = 0 if self._sent is not None else counter % self._counter.modulus
+            self._counter = SequenceCounter(self._counter.modulus, self._first)
+        ahead = self._counter.unwrap(counter) - self._counter.expected
+        if self._counter.expected + ahead - self._first > MOST_POINTS:
+            self._out.append(Rejected(1, "number that no scan reaches"))
+            return -1
         place = self._counter.place(counter)
         if place.repeated:
             self._out.append(Rejected(1, POINT_REPEATED))
@@ -141,6 +166,7 @@ class RegisterAccount:
                 (f"{name} holds no value", equals_pattern(column, field.invalid, field.type) if field.invalid is not None else None),
                 ("marked invalid by the device", column.astype(np.int64) & field.invalid_bits != 0 if field.invalid_bits else None),
                 (f"{name} is no number", ~np.isfinite(column) if field.type.startswith("float") else None),
+                (NO_PART, ~_makes_sense(field, column) if name in "xyz" else None),
             ):
                 if struck is not None and (new := struck & ~invalid).any():
                     self._out.append(Rejected(int(new.sum()), reason))
@@ -153,7 +179,8 @@ class RegisterAccount:
         if self._clock is None or time is None:
             return np.zeros(int(usable.sum()))
         if time.type.startswith("float"):
-            return np.asarray(values["time"][usable].astype(np.float64) * time.scale)
+            with np.errstate(over="ignore"):  # what is no time is rejected where it leaves
+                return np.asarray(values["time"][usable].astype(np.float64) * time.scale)
         return self._clock.seconds(values["time"][usable].astype(np.int64))
 
     def _points_mm(self, values: Columns, usable: NDArray[np.bool_]) -> NDArray[np.float64]:
@@ -162,6 +189,20 @@ class RegisterAccount:
             if name in self._fields:
                 points_mm[:, axis] = self._fields[name].to_unit(values[name][usable].astype(np.float64))
         return points_mm
+
+
+def _makes_sense(field: RegisterField, column: NDArray[np.generic]) -> NDArray[np.bool_]:
+    """Tell of each value whether it can be a coordinate: neither too large nor, but for 0, so small that it is another number's bits."""
+    with np.errstate(all="ignore"):
+        value_mm = np.abs(field.to_unit(column.astype(np.float64)))
+        tiny = (column != 0) & (np.abs(column.astype(np.float64)) < TINIEST) if field.type.startswith("float") else np.False_
+        return np.asarray((value_mm <= LARGEST_MM) & ~tiny)
+
+
+def _swapped(column: NDArray[np.generic]) -> NDArray[np.generic]:
+    """Return values whose registers come in the other order."""
+    words = np.ascontiguousarray(column).view(">u2").reshape(len(column), column.itemsize // 2)
+    return np.ascontiguousarray(words[:, ::-1]).view(column.dtype)[:, 0]
 
 
 def _bits(field: RegisterField) -> int:

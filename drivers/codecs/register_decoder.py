@@ -8,9 +8,11 @@ from drivers.codecs.outbox import Outbox
 from drivers.codecs.register_account import RegisterAccount
 from drivers.codecs.register_map import Block, RegisterMap, entries_of
 from drivers.codecs.register_patterns import PATTERN_OF
-from drivers.codecs.register_pdus import EXCEPTIONS, READ_FIFO, Exchange, first_exchange
+from drivers.codecs.register_pdus import EXCEPTIONS, READ_FIFO, Exchange, first_exchange, size_of_strange_answer
 from drivers.errors import DeviceRefused, ProtocolError
 from drivers.source import Arrival, Damaged, ScanOpened
+
+ENOUGH = 8  # senseless points, before the map is doubted
 
 
 class RegisterDecoder:
@@ -24,6 +26,7 @@ class RegisterDecoder:
         self._map = register_map
         self._count = count
         self._pending = b""
+        self._strange = 0  # bytes of an answer of another function that are no longer kept
         self._opened = False
         self._out = Outbox()
         self._account = RegisterAccount(register_map, self._out, count=count, first=first, begin_anew=self._begin_anew)
@@ -39,18 +42,38 @@ class RegisterDecoder:
         return self._pattern.request()
 
     def feed(self, data: bytes) -> list[Arrival]:
-        """Decode the next pairs of request and answer."""
+        """Decode the next pairs of request and answer, up to the end of the scan."""
         self._pending += data
-        while exchange := first_exchange(self._pending):
+        while not self._out.closed and self._step_over_strange_answer() and (exchange := first_exchange(self._pending)):
             self._pending = self._pending[exchange.size :]
             self._take(exchange)
+        if self._out.closed:
+            self._pending = b""
         return self._out.hand_over()
 
     def break_off(self) -> list[Arrival]:
         """Forget a pair that was cut off; begin the next turn with the status."""
+        if self._strange:
+            self._count_strange(len(self._pending))
         self._pending = b""
         self._pattern.begin_turn()
-        return []
+        return self._out.hand_over()
+
+    def _step_over_strange_answer(self) -> bool:
+        """Leave an answer of another function out, with its request; tell whether what is pending now is in step."""
+        while size := size_of_strange_answer(self._pending):
+            if size < 0:
+                keep = 3 if self._pending[0] == READ_FIFO else 5
+                self._strange += max(0, len(self._pending) - 2 * keep - 1)
+                self._pending = self._pending[: keep + 1] + self._pending[max(keep + 1, len(self._pending) - keep) :]
+                return False
+            self._count_strange(size)
+            self._pending = self._pending[size:]
+        return True
+
+    def _count_strange(self, byte_count: int) -> None:
+        self._out.append(Damaged(self._strange + byte_count, "answer of another function than asked for"))
+        self._strange = 0
 
     def _begin_anew(self) -> None:
         """Forget the scan, because the device has begun another one."""
@@ -65,7 +88,9 @@ class RegisterDecoder:
                 f"{self._map.device} answers exception {exchange.exception} ({what}) to function {exchange.function} at register "
                 f"{exchange.address}, count {exchange.count}; check the map and the device id"
             )
-        if exchange.function != READ_FIFO and len(exchange.registers) != 2 * exchange.count:
+        block = {"status": self._map.status, "pop": self._map.pop}.get(self._pattern.step)
+        count = block.size if block else exchange.count
+        if exchange.function != READ_FIFO and len(exchange.registers) != 2 * count:
             self._out.append(Damaged(len(exchange.registers), "answer of another length than asked for"))
         elif self._pattern.step == "status":
             self._take_status(exchange.registers)
@@ -107,8 +132,20 @@ class RegisterDecoder:
             self._out.append(Damaged(len(registers) - whole, "part of a point"))
         if whole:
             self._pattern.take_points(entries_of(block, self._map.word_order, registers[:whole]))
+            self._refuse_senseless_points()
         else:
             self._pattern.end_turn()
+
+    def _refuse_senseless_points(self) -> None:
+        """Raise ProtocolError when most of the points that came are such as no part can have."""
+        account = self._account
+        if account.senseless < ENOUGH or 2 * account.senseless <= account.seen:
+            return
+        found = f"{self._map.device}: {account.senseless} of {account.seen} points have coordinates that no part can have"
+        if 2 * account.sensible_swapped > account.senseless:
+            other = "low-first" if self._map.word_order == "high-first" else "high-first"
+            raise ProtocolError(f"{found}; the two halves of its numbers come swapped: set word_order: {other} in the map")
+        raise ProtocolError(f"{found}; are word_order, type and scale of the map right?")
 
     def _open(self, expected: int | None) -> None:
         if not self._opened:

@@ -15,7 +15,7 @@ from drivers.codecs.outbox import Outbox
 from drivers.codecs.register_account import PATIENCE, Columns, RegisterAccount
 from drivers.codecs.register_map import MOST_REGISTERS, Block, Entries, RegisterMap, entries_of
 from drivers.codecs.register_pdus import fifo_request, read_request
-from drivers.source import Damaged
+from drivers.source import OLDER_THAN_THE_SCAN, Damaged, Rejected
 
 Step = Literal["status", "pop", "points"]
 
@@ -90,17 +90,44 @@ class Pattern:
 
 
 class Latest(Pattern):
-    """The points block holds one point, which is new when its sequence has changed; without a sequence every reading counts."""
+    """The points block holds one point, which is new when its sequence has changed; without a sequence every reading counts.
+
+    What the block holds when the run begins is older than the scan until its sequence changes, or until there are coordinates.
+    """
+
+    def begin(self, first: int = 0) -> None:
+        """Forget what was read."""
+        self.begin_turn()
+        self._old: tuple[int | None, bytes] | None = None
+        self._is_running = False
 
     def take_points(self, read: Entries) -> None:
         """Take the point if it is a new one."""
         self._account.hear_overflow("points", read)
+        if read.sound[0] and self._is_older_than_the_scan(read):
+            self.end_turn()
+            return
         if "sequence" in read.values and self._account.is_repeated(int(read.values["sequence"][0])):
             self.end_turn()
             return
         self._hand_over(read.values, read.sound)
         self.idle = True
         self.begin_turn()
+
+    def _is_older_than_the_scan(self, read: Entries) -> bool:
+        """Tell whether the block still holds what it held when the run began."""
+        counter = int(read.values["sequence"][0]) if "sequence" in read.values else None
+        held = b"".join(read.values[name].tobytes() for name in ("x", "y", "z") if name in read.values)
+        if not self._is_running and self._old is None:
+            # Without a sequence a reading is a measurement of this moment, unless nothing was ever measured.
+            self._is_running = self._account.tells_running(counter) or (counter is None and any(held))
+            if not self._is_running:
+                self._old = counter, held
+                self._out.append(Rejected(1, OLDER_THAN_THE_SCAN))
+        elif not self._is_running and self._old is not None:
+            # A device that counts from 0 shows its first point only by its coordinates, where none stood before.
+            self._is_running = counter != self._old[0] or (any(held) and not any(self._old[1]))
+        return not self._is_running
 
 
 class Ring(Pattern):

@@ -3,7 +3,18 @@
 from dataclasses import dataclass
 
 READ_FIFO = 24
-EXCEPTIONS = {1: "function not supported", 2: "no such registers", 3: "value not allowed", 4: "device failure", 6: "device busy"}
+EXCEPTIONS = {
+    1: "function not supported",
+    2: "no such registers",
+    3: "value not allowed",
+    4: "device failure",
+    5: "accepted, but not ready yet",
+    6: "device busy",
+    8: "memory of the device is damaged",
+    10: "gateway has no path to the device",
+    11: "device behind the gateway does not respond",
+}
+PASSING = frozenset({5, 6, 10, 11})  # exceptions that may pass when the same is asked again
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +43,18 @@ def read_request(function: int, address: int, count: int) -> bytes:
 def fifo_request(address: int) -> bytes:
     """Return the request for what waits in the queue at `address`, by function 24."""
     return bytes([READ_FIFO]) + address.to_bytes(2, "big")
+
+
+def size_of_strange_answer(data: bytes) -> int:
+    """Return the size of the first request in `data` with its answer where it answers another function; 0 where it does not.
+
+    Where a strange answer ends, nothing in it says. But as nothing was learnt from it, the same is asked again: it ends where the
+    same request stands again. -1 while that has not come.
+    """
+    asked = 3 if data[:1] == bytes([READ_FIFO]) else 5
+    if len(data) <= asked or data[asked] & 0x7F == data[0]:
+        return 0
+    return data.find(data[:asked], asked + 1)
 
 
 def first_exchange(data: bytes) -> Exchange | None:

@@ -25,9 +25,8 @@ LONGEST_LINE = 64
 NUMBER = re.compile(rb"-?[0-9]{1,6}(\.[0-9]{1,6})?")
 
 
-def _distances(rate_hz: float, count: int | None, largest_step_mm: float | None) -> Distances:
+def _distances(rate_hz: float, count: int | None, largest_step_mm: float | None, gap: str) -> Distances:
     """Return an account whose clock is the number of the burst over the rate."""
-    gap = "gap in the burst counter"
     return Distances(lambda numbers: numbers / rate_hz, gap=gap, count=count, largest_step_mm=largest_step_mm)
 
 
@@ -47,7 +46,7 @@ class RiftekDecoder:
             raise ValueError(f"range {range_mm} mm and rate {rate_hz} Hz must be positive, address {address} between 1 and 127")
         self._range_mm = range_mm
         self._address = address
-        self._distances = _distances(rate_hz, count, largest_step_mm)
+        self._distances = _distances(rate_hz, count, largest_step_mm, "gap in the burst counter")
         self._out = self._distances.out
         self._burst = b""
         self._last_count: int | None = None
@@ -61,10 +60,12 @@ class RiftekDecoder:
         return bytes([self._address, 0x80 | (STOP if self._distances.closed else STREAM)])
 
     def feed(self, data: bytes) -> list[Arrival]:
-        """Decode the next bytes; a burst counts once the next one begins, so that an inserted byte shows."""
+        """Decode the next bytes; a burst counts once the next one begins, so that an inserted byte shows, but the last one at once."""
         if self._away:
             raise ProtocolError("the RIFTEK burst counter cannot tell what was lost while the link was away; begin the scan anew")
         for byte in data:
+            if self._distances.closed:
+                break
             if byte < 0x80:
                 self._end_burst()
                 self._out.append(Damaged(1, "byte of no answer"))
@@ -75,11 +76,15 @@ class RiftekDecoder:
                 self._burst += bytes([byte])
             else:
                 self._out.append(Damaged(1, "burst without end"))
+            if len(self._burst) == 4 and self._distances.would_end(self._distances.expected + self._lost_before(self._burst)):
+                self._end_burst()
         return self._out.hand_over()
 
     def break_off(self) -> list[Arrival]:
-        """Count the begun burst as damaged."""
-        if self._burst:
+        """Take a burst that is whole, and count a begun one as damaged."""
+        if len(self._burst) == 4:
+            self._end_burst()
+        elif self._burst:
             self._out.append(Damaged(len(self._burst), "burst cut off where the link ended"))
         self._burst, self._away = b"", True
         return self._out.hand_over()
@@ -92,9 +97,13 @@ class RiftekDecoder:
         for start in range(0, len(bursts), 4):  # more than one where three in a row were lost between them
             self._take_result(bursts[start : start + 4])
 
+    def _lost_before(self, burst: bytes) -> int:
+        """Return how many bursts its counter says are missing before this one."""
+        return 0 if self._last_count is None else ((burst[0] >> 4 & 3) - self._last_count - 1) % 4
+
     def _take_result(self, burst: bytes) -> None:
         counter = burst[0] >> 4 & 3
-        lost = 0 if self._last_count is None else (counter - self._last_count - 1) % 4
+        lost = self._lost_before(burst)
         self._last_count = counter
         value = sum((byte & 15) << 4 * place for place, byte in enumerate(burst))
         refusal = "" if burst[0] & 0x40 else "not renewed since the last transmission"
@@ -111,9 +120,10 @@ class RiftekAsciiDecoder:
         if not rate_hz > 0:
             raise ValueError(f"rate {rate_hz} Hz must be positive")
         self._line = request_line.encode("ascii") + b"\r\n"
-        self._distances = _distances(rate_hz, count, largest_step_mm)
+        self._distances = _distances(rate_hz, count, largest_step_mm, "answer that is no distance")
         self._out = self._distances.out
         self._pending = b""
+        self._overlong = False
         self._waiting = 0
 
     def request(self) -> bytes:
@@ -126,22 +136,33 @@ class RiftekAsciiDecoder:
         lines = (self._pending + data).split(b"\n")
         self._pending = lines.pop()
         for line in lines:
-            self._waiting = 0
-            if line.endswith(b"\r") and NUMBER.fullmatch(line[:-1]):
-                number = self._distances.expected
-                self._distances.take(number, number, float(line[:-1]))
-            else:
-                self._out.append(Damaged(len(line) + 1, "line that is no distance"))
-        while len(self._pending) > LONGEST_LINE:
-            self._out.append(Damaged(LONGEST_LINE, "no line end in time"))
-            self._pending = self._pending[LONGEST_LINE:]
+            self._take_line(self._drop_excess(line))
+            self._waiting, self._overlong = 0, False
+        self._pending = self._drop_excess(self._pending)
         return self._out.hand_over()
+
+    def _take_line(self, line: bytes) -> None:
+        """Take one answer. One that is no distance is a distance lost, but for greetings before the first one."""
+        if line.endswith(b"\r") and NUMBER.fullmatch(line[:-1]) and not self._overlong:
+            number = self._distances.expected
+            self._distances.take(number, number, float(line[:-1]))
+            return
+        self._out.append(Damaged(len(line) + 1, "line that is no distance"))
+        if self._distances.expected:
+            self._distances.miss()
+
+    def _drop_excess(self, line: bytes) -> bytes:
+        """Count what no answer can hold as damage at fixed places, however the bytes are cut."""
+        while len(line) > LONGEST_LINE:
+            self._out.append(Damaged(LONGEST_LINE, "no line end in time"))
+            line, self._overlong = line[LONGEST_LINE:], True
+        return line
 
     def break_off(self) -> list[Arrival]:
         """Count the begun line as damaged."""
         if self._pending:
             self._out.append(Damaged(len(self._pending), "line cut off where the link ended"))
-        self._pending, self._waiting = b"", 0
+        self._pending, self._overlong, self._waiting = b"", False, 0
         return self._out.hand_over()
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 GAPS_REMEMBERED = 4096  # bounds the memory; a frame later than that many gaps counts as repeated
+MOST_POINTS = 1 << 48  # of a scan: at a million points a second it would last nine years
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +29,7 @@ class SequenceCounter:
     def __init__(self, modulus: int, first: int = 0) -> None:
         self.modulus = modulus
         self.expected = first
+        self._lost = first  # what is not received of the numbers below the expected one
         self._gaps: deque[range] = deque(maxlen=GAPS_REMEMBERED)
 
     def place(self, counter: int, near: int | None = None) -> Place:
@@ -36,9 +38,11 @@ class SequenceCounter:
         ahead = sequence - self.expected
         if ahead >= 0:
             self._remember(range(self.expected, sequence))
+            self._lost += ahead
             self.expected = sequence + 1
             return Place(sequence, ahead, repeated=False)
         if self._fill(sequence):
+            self._lost -= 1
             return Place(sequence, -1, repeated=False)
         return Place(sequence, 0, repeated=True)
 
@@ -49,10 +53,15 @@ class SequenceCounter:
     def reach_total(self, total: int) -> int:
         """Take the device's word that it has sent `total` frames; return how many are newly lost.
 
+        A total that no scan has, or that is less than what was received, is not believed.
         Negative where a gap longer than the counter's range had been taken for a longer one still.
         """
+        received = self.expected - self._lost
+        if not received <= total <= MOST_POINTS:  # it has sent what arrived, whatever it says
+            return 0
         lost = total - self.expected
         self._remember(range(self.expected, total))
+        self._lost += lost
         self.expected = total
         return lost
 

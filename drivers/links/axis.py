@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.codecs.outbox import sifted
 from drivers.errors import LinkError, ProtocolError
 from drivers.source import Arrival, Damaged, LinkDown, LinkUp, PointBatch, Rejected, ScanClosed, ScanSource, WireBytes
 
@@ -36,7 +37,8 @@ class Beam:
 
     def points_mm(self, position_mm: NDArray[np.float64], distance_mm: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return (m, 3) points from (m,) axis positions and (m,) distances."""
-        moved = np.outer(position_mm, self.axis_direction) + np.outer(distance_mm, self.distance_direction)
+        with np.errstate(over="ignore", invalid="ignore"):  # what no part can have is rejected where it leaves
+            moved = np.outer(position_mm, self.axis_direction) + np.outer(distance_mm, self.distance_direction)
         return np.asarray(np.array(self.origin_mm) + moved)
 
 
@@ -63,9 +65,10 @@ class ConstantFeed:
                 if np.any(np.diff(times_s) == 0):
                     raise ProtocolError("the sensor's clock stands still: a constant feed needs one; follow a second device instead")
                 last_s = float(arrival.time_s[-1])
-                position_mm = (arrival.time_s - start_s) * self._speed_mm_s
+                with np.errstate(over="ignore"):
+                    position_mm = (arrival.time_s - start_s) * self._speed_mm_s
                 points_mm = self._beam.points_mm(position_mm, arrival.points_mm[:, 2])
-                yield PointBatch(arrival.sequence, arrival.time_s, points_mm)
+                yield from sifted(PointBatch(arrival.sequence, arrival.time_s, points_mm))
             else:
                 yield arrival
 
@@ -177,7 +180,7 @@ class _Path:
             if known.any():
                 position_mm = np.interp(at_s[known], self._times_s, self._positions_mm)
                 points_mm = self._beam.points_mm(position_mm, batch.points_mm[known, 2])
-                yield PointBatch(batch.sequence[known], batch.time_s[known], points_mm)
+                yield from sifted(PointBatch(batch.sequence[known], batch.time_s[known], points_mm))
             oldest = int(np.searchsorted(self._times_s, at_s[-1])) - 1
             del self._times_s[: max(0, oldest)], self._positions_mm[: max(0, oldest)]
 

@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterator
 from contextlib import closing
 from typing import Protocol
 
-from pymodbus import ModbusException
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 from pymodbus.client.base import ModbusBaseSyncClient
 from pymodbus.exceptions import ConnectionException, ModbusIOException
@@ -21,16 +20,18 @@ from pymodbus.pdu import ModbusPDU
 from pymodbus.pdu.file_message import ReadFifoQueueResponse
 
 from drivers.codecs.register_decoder import RegisterDecoder
-from drivers.codecs.register_pdus import READ_FIFO
-from drivers.errors import LinkError
+from drivers.codecs.register_pdus import EXCEPTIONS, PASSING, READ_FIFO
+from drivers.errors import DeviceError, LinkError
 from drivers.links.address import HostPort, device_address, require_port
 from drivers.links.link_settings import LinkSettings
 from drivers.links.reconnect import keep_up
-from drivers.source import Arrival, Damaged, ScanClosed, WireBytes
+from drivers.links.watch import Watch, explained
+from drivers.source import Arrival, PointBatch, ScanClosed, WireBytes
 
 TRIES = 3  # of one request, before the link counts as lost
 USUAL = LinkSettings(19_200, "E")  # of an RTU line, as the standard says
-BUSY = (5, 6)  # exceptions that ask for patience: accepted, busy
+LONGEST_PAUSE_S = 0.05  # between two requests of a device that asks for patience
+FAILURE = 4  # an exception that is a refusal only while no point has come
 
 
 class FifoAnswer(ReadFifoQueueResponse):
@@ -70,6 +71,7 @@ class ModbusScanner:
         self._poll_s = poll_s
         self._clock = clock
         self._stopped = threading.Event()
+        self._has_points = False
 
     def stop(self) -> None:
         """End `arrivals` within the time-out of one request."""
@@ -77,50 +79,64 @@ class ModbusScanner:
 
     def arrivals(self) -> Iterator[Arrival]:
         """Open the link, yield what arrives, end after `ScanClosed`."""
-        return keep_up(
-            lambda: closing(self._open()), self._scan, reconnect_s=self._settings.reconnect_s, stopped=self._stopped, clock=self._clock
-        )
+        settings, stopped = self._settings, self._stopped
+        kept_up = keep_up(lambda: closing(self._open()), self._scan, reconnect_s=settings.reconnect_s, stopped=stopped, clock=self._clock)
+        return explained(self._address, kept_up)
 
-    def _scan(self, client: ModbusBaseSyncClient) -> Iterator[Arrival]:
-        last_news_s = self._clock()
-        self._decoder.break_off()
-        while not self._stopped.is_set():
-            request = self._decoder.request()
-            answer = self._ask(client, request)
-            if answer is None:
-                return
-            yield WireBytes(self._clock(), request + answer)
-            found = self._decoder.feed(request + answer)
-            yield from found
-            if any(isinstance(arrival, ScanClosed) for arrival in found):
-                return
-            if any(not isinstance(arrival, Damaged) for arrival in found):
-                last_news_s = self._clock()
-            elif self._clock() - last_news_s > self._settings.silence_s:
-                silence = f"for {self._settings.silence_s:g} s without a new point or a moving heartbeat"
-                raise LinkError(f"{self._address}: the device answers, but {silence}; is it scanning?")
-            if self._decoder.idle:
-                self._stopped.wait(self._poll_s)
+    def _scan(self, client: ModbusBaseSyncClient, until_s: float) -> Iterator[Arrival]:
+        watch = Watch(self._settings.silence_s, until_s, self._clock())
+        try:
+            yield from self._decoder.break_off()
+            while not self._stopped.is_set():
+                request = self._decoder.request()
+                answer = self._ask(client, request, watch)
+                if answer is None:
+                    return
+                yield WireBytes(self._clock(), request + answer)
+                found = self._decoder.feed(request + answer)
+                for arrival in found:
+                    yield arrival
+                    if isinstance(arrival, ScanClosed):
+                        return
+                    self._has_points |= isinstance(arrival, PointBatch)
+                watch.note(found, self._clock())
+                if watch.is_over(self._clock()):
+                    silence = f"for {self._settings.silence_s:g} s without a new point or a moving heartbeat"
+                    raise LinkError(f"{self._address}: the device answers, but {silence}; is it scanning?")
+                if self._decoder.idle:
+                    self._stopped.wait(self._poll_s)
+        except DeviceError:  # whatever ends the scan, what was decoded before is handed over
+            yield from self._decoder.break_off()
+            raise
 
-    def _ask(self, client: ModbusBaseSyncClient, request: bytes) -> bytes | None:
+    def _ask(self, client: ModbusBaseSyncClient, request: bytes, watch: Watch) -> bytes | None:
         """Return the data unit of the answer, asking again where it did not come; None when told to stop."""
-        failure: ModbusException | None = None
-        for _ in range(TRIES):
-            if self._stopped.is_set():
-                return None
+        began_s, missing, busy = self._clock(), 0, 0
+        while not self._stopped.is_set():
             try:
                 response = _execute(client, request, self._device_id)
             except (ConnectionException, OSError) as error:  # the library lets a reset connection through as it is
                 raise LinkError(f"{self._address}: the link was lost: {error}") from error
             except ModbusIOException as error:
-                failure = error
+                missing += 1
+                if missing >= TRIES or watch.is_over(self._clock()):
+                    raise LinkError(
+                        f"{self._address}: no answer within {self._timeout_s:g} s, {missing} times in a row: {error}"
+                    ) from error
                 self._let_late_answers_pass(client)
                 continue
-            if response.isError() and response.exception_code in BUSY:
-                self._stopped.wait(self._poll_s)
-                continue
-            return _unit(response)
-        raise LinkError(f"{self._address}: no answer within {self._timeout_s:g} s, {TRIES} times in a row: {failure or 'always busy'}")
+            if not self._may_pass(response):
+                return _unit(response)
+            busy, asked_s = busy + 1, self._clock() - began_s
+            if busy >= TRIES and (asked_s >= self._timeout_s or watch.is_over(self._clock())):
+                what = f"exception {response.exception_code} ({EXCEPTIONS[response.exception_code]})"
+                raise LinkError(f"{self._address}: answers {what} for {asked_s:.1f} s, {busy} times in a row; is it free and connected?")
+            self._stopped.wait(min(self._poll_s * 2 ** min(busy, 10), LONGEST_PAUSE_S))
+        return None
+
+    def _may_pass(self, response: ModbusPDU) -> bool:
+        """Tell whether an answer is an exception that may be gone when the same is asked again."""
+        return response.isError() and (response.exception_code in PASSING or (response.exception_code == FAILURE and self._has_points))
 
     def _let_late_answers_pass(self, client: ModbusBaseSyncClient) -> None:
         _close(client)

@@ -1,16 +1,18 @@
 """Keeping a link up: what every source does when its link is lost.
 
 A lost link is opened again after 0.1 s, 0.2 s, ... up to 2 s between two tries, for as long as the plan allows;
-the run goes on with the gap marked. The link counts as up again with the first thing that arrives over it.
+the run goes on with the gap marked. The link counts as up again with the first news over it: bytes alone are none.
 """
 
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
+from math import inf
 from typing import TypeVar
 
 from drivers.errors import LinkError
-from drivers.source import Arrival, LinkDown, LinkUp
+from drivers.links.watch import is_news
+from drivers.source import Arrival, LinkDown, LinkUp, ScanOpened
 
 FIRST_WAIT_S = 0.1
 LONGEST_WAIT_S = 2.0
@@ -20,33 +22,42 @@ Link = TypeVar("Link")
 
 def keep_up(
     open_link: Callable[[], AbstractContextManager[Link]],
-    scan: Callable[[Link], Iterator[Arrival]],
+    scan: Callable[[Link, float], Iterator[Arrival]],
     *,
     reconnect_s: float,
     stopped: threading.Event,
     clock: Callable[[], float],
 ) -> Iterator[Arrival]:
-    """Yield what `scan` yields over the link that `opened` opens, again and again while either raises `LinkError`.
+    """Yield what `scan` yields over the link that `open_link` opens, again and again while either raises `LinkError`.
 
-    Give up, with the last `LinkError`, when nothing has arrived for `reconnect_s` seconds; 0: at the first one.
+    `scan` is told until when, by the clock, it may wait for news. Give up, with the last `LinkError`, when there were none for
+    `reconnect_s` seconds; 0: at the first one. What arrived over a link that brought no news is marked by a further `LinkDown`.
     """
     down_since_s: float | None = None
     wait_s = FIRST_WAIT_S
     while not stopped.is_set():
+        heard, opened = False, list[Arrival]()
         try:
             with open_link() as link:
-                for arrival in scan(link):
-                    if down_since_s is not None:
+                for arrival in scan(link, inf if down_since_s is None else down_since_s + reconnect_s):
+                    heard = True
+                    if down_since_s is not None and is_news(arrival):
                         yield LinkUp(clock() - down_since_s)
                         down_since_s, wait_s = None, FIRST_WAIT_S
-                    yield arrival
+                    if down_since_s is not None and isinstance(arrival, ScanOpened):
+                        yield from opened
+                        opened = [arrival]  # it belongs behind the link's being up, if news follow
+                        continue
+                    yield from (*opened, arrival) if down_since_s is None else (arrival,)
+                    opened = opened if down_since_s is not None else []
                 return
         except LinkError as error:
             if reconnect_s <= 0:
                 raise
-            if down_since_s is None:
-                down_since_s = clock()
+            yield from opened
+            if heard or down_since_s is None:
                 yield LinkDown(str(error))
+            down_since_s = clock() if down_since_s is None else down_since_s
             if clock() - down_since_s + wait_s > reconnect_s:
                 raise LinkError(f"{error}; tried again in vain for {reconnect_s:g} s") from error
         stopped.wait(wait_s)

@@ -8,7 +8,7 @@ import os
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import closing
+from contextlib import contextmanager, suppress
 
 import serial
 
@@ -16,7 +16,8 @@ from drivers.errors import DeviceError, LinkError, ProtocolError
 from drivers.links.address import HostPort, device_address, require_port
 from drivers.links.link_settings import LinkSettings
 from drivers.links.reconnect import keep_up
-from drivers.source import Arrival, Damaged, Decoder, ScanClosed, WireBytes
+from drivers.links.watch import Watch, explained
+from drivers.source import Arrival, Decoder, ScanClosed, WireBytes
 
 POLL_S = 0.05  # how long a read waits before it looks whether to stop
 LARGEST_READ = 1 << 16
@@ -54,39 +55,60 @@ class SerialScanner:
         self._stopped.set()
 
     def arrivals(self) -> Iterator[Arrival]:
-        """Open the link, yield what arrives, end after `ScanClosed`."""
-        return keep_up(
-            lambda: closing(self._open()), self._scan, reconnect_s=self._settings.reconnect_s, stopped=self._stopped, clock=self._clock
-        )
+        """Open the link, yield what arrives, end with `ScanClosed`."""
+        settings, stopped = self._settings, self._stopped
+        kept_up = keep_up(self._opened, self._scan, reconnect_s=settings.reconnect_s, stopped=stopped, clock=self._clock)
+        return explained(self._address, kept_up)
 
-    def _scan(self, port: serial.Serial) -> Iterator[Arrival]:
-        watch = _Watch(self._settings.silence_s, self._clock())
+    def _scan(self, port: serial.Serial, until_s: float) -> Iterator[Arrival]:
+        watch = Watch(self._settings.silence_s, until_s, self._clock())
         try:
             while not self._stopped.is_set():
                 self._write(port, self._decoder.request())
-                data = self._read(port)
-                found: list[Arrival] = []
-                if data:
+                if data := self._read(port):
                     yield WireBytes(self._clock(), data)
                     found = self._decoder.feed(data)
-                    yield from found
-                if any(isinstance(arrival, ScanClosed) for arrival in found):
-                    self._write(port, self._decoder.request())
-                    return
-                self._raise_if_dead(watch.note_read(data, found, self._clock()))
+                    for arrival in found:
+                        yield arrival
+                        if isinstance(arrival, ScanClosed):
+                            self._say_goodbye(port)
+                            return
+                    watch.note(found, self._clock())
+                self._raise_if_over(watch)
         except DeviceError:  # whatever ends the scan, the begun frame is accounted for
             yield from self._decoder.break_off()
             raise
 
-    def _raise_if_dead(self, state: str) -> None:
-        """Raise what the watch found."""
-        if state == "silent":
-            raise LinkError(f"{self._address}: silent for {self._settings.silence_s:g} s; is the device switched on and scanning?")
-        if state == "garbled":
+    def _say_goodbye(self, port: serial.Serial) -> None:
+        """Send what the device has to hear at the end of the scan; a device that is gone by then need not hear it."""
+        with suppress(LinkError):
+            self._write(port, self._decoder.request())
+
+    def _raise_if_over(self, watch: Watch) -> None:
+        """Raise what a link without news shows."""
+        now_s, silence_s = self._clock(), self._settings.silence_s
+        if not watch.is_over(now_s):
+            return
+        if watch.garbled and (not watch.heard_sound or now_s - watch.last_byte_s < silence_s / 2):
             raise ProtocolError(
-                f"{self._address}: bytes arrive but for {self._settings.silence_s:g} s not one valid frame; "
+                f"{self._address}: bytes arrive but for {silence_s:g} s not one valid frame; "
                 f"check baud rate ({self._settings.baud_rate}), parity ({self._settings.parity}) and the format of the device"
             )
+        if watch.told and not watch.garbled:
+            raise LinkError(f"{self._address}: bytes arrive, but for {silence_s:g} s no new point and no moving heartbeat; is it scanning?")
+        raise LinkError(f"{self._address}: silent for {silence_s:g} s; is the device switched on and scanning?")
+
+    @contextmanager
+    def _opened(self) -> Iterator[serial.Serial]:
+        """Open the port for as long as the context is entered."""
+        port = self._open()
+        held = getattr(port, "_socket", None)  # the library leaves it open where the other end was closed first
+        try:
+            yield port
+        finally:
+            port.close()
+            if held is not None:
+                held.close()
 
     def _open(self) -> serial.Serial:
         options = {"exclusive": True} if os.name == "posix" else {}
@@ -124,21 +146,3 @@ class SerialScanner:
             port.write(data)
         except (serial.SerialException, OSError) as error:
             raise LinkError(f"{self._address}: the link was lost: {error}") from error
-
-
-class _Watch:
-    """Tells a device that is silent, or sends nothing sound, from one that is only slow."""
-
-    def __init__(self, patience_s: float, now_s: float) -> None:
-        self._patience_s = patience_s
-        self._last_byte_s = self._last_sound_s = now_s
-
-    def note_read(self, data: bytes, found: list[Arrival], now_s: float) -> str:
-        """Take note of one read; return "silent", "garbled" or "" if all is well."""
-        if not data:
-            return "silent" if now_s - self._last_byte_s > self._patience_s else ""
-        self._last_byte_s = now_s
-        damaged = [isinstance(arrival, Damaged) for arrival in found]
-        if not all(damaged):
-            self._last_sound_s = now_s
-        return "garbled" if any(damaged) and now_s - self._last_sound_s > self._patience_s else ""

@@ -140,7 +140,7 @@ def test_garbage_without_a_line_end_is_counted_and_needs_no_memory() -> None:
     decoder = AsciiDecoder("mm")
     found = [arrival for _ in range(1000) for arrival in decoder.feed(b"x" * 1000)]
     assert set(found) == {Damaged(LONGEST_LINE, "no line end in time")}
-    assert 0 < 1_000_000 - account(found).total("Damaged") <= LONGEST_LINE  # that much and no more waits for its line end
+    assert 0 < 1_000_000 - account(found).total("Damaged") <= 2 * LONGEST_LINE  # that much and no more waits for its line end
     rest = decoder.feed(b"\n" + line("P,0,0,1,2,3,0"))
     assert account(found + rest).total("Damaged") == 1_000_001
     assert account(rest).points_mm == [(1.0, 2.0, 3.0)]
@@ -167,9 +167,49 @@ def test_a_device_that_begins_anew_opens_again() -> None:
     assert (book.sequence, book.lost) == ([0, 1, 0, 1, 2], 0)
 
 
-def test_points_after_the_end_are_rejected() -> None:
+def test_nothing_behind_the_end_is_of_the_scan() -> None:
     data, _ = stream(3)
-    assert decoded(AsciiDecoder(), data + line("P,3,0,1,2,3,0")).counts == {("Rejected", "sent after the end of the scan"): 1}
+    whole = decoded(AsciiDecoder(), data)
+    next_part = line("S,dev,2,furlong,9") + line("P,0,0,1,2,3,0") + b"junk"
+    assert any_cut_is_the_same(AsciiDecoder, data + line("E,3") + line("P,3,0,1,2,3,0") + next_part) == whole
+
+
+def test_an_opening_said_again_within_the_scan_loses_nothing() -> None:
+    data, xyz = stream(1500)
+    lines = data.splitlines(keepends=True)
+    book = any_cut_is_the_same(AsciiDecoder, b"".join([*lines[:701], lines[0], *lines[701:]]))
+    assert (book.sequence, book.lost) == (list(range(1500)), 0)
+    assert book.points_mm == xyz
+    assert book.others == [ScanOpened("dev", "1", 1500), ScanClosed(1500)]
+
+
+def test_another_opening_begins_anew() -> None:
+    data, _ = stream(3)
+    book = decoded(AsciiDecoder(), b"".join(data.splitlines(keepends=True)[:3]) + line("S,dev,2,mm,1") + line("P,0,0,1,2,3,0"))
+    assert (book.sequence, book.lost) == ([0, 1, 0], 0)
+
+
+@pytest.mark.parametrize("junk", [b"boot", b"*1234\r", b"P,7,S,S,", b"\x00\xff" * 300, b"P,0,1,2,3,4,0*0000\r"])
+@pytest.mark.parametrize("place", [0, 1, 5])
+def test_a_sound_line_is_found_behind_junk_in_the_same_line(junk: bytes, place: int) -> None:
+    data, xyz = stream(20)
+    lines = data.splitlines(keepends=True)
+    lines[place] = junk + lines[place]
+    book = any_cut_is_the_same(AsciiDecoder, b"".join(lines))
+    assert (book.points_mm, book.lost, book.total("Damaged"), book.total("Rejected")) == (xyz, 0, len(junk), 0)
+
+
+def test_line_ends_of_another_kind_are_named() -> None:
+    data, _ = stream(20)
+    data = data.replace(b"\r\n", b"\n")
+    reason = "line that ends with line feed alone, not with carriage return and line feed"
+    assert any_cut_is_the_same(AsciiDecoder, data).counts == {("Damaged", reason): len(data)}
+
+
+@pytest.mark.parametrize("unit", ["IN", "furlong", "", "Zoll 2"])
+def test_a_unit_that_is_none_is_named(unit: str) -> None:
+    with pytest.raises(ProtocolError, match=f"sends points in '{unit}'; set the device to one of mm, um"):
+        AsciiDecoder().feed(line(f"S,dev,1,{unit},3"))
 
 
 def test_a_million_points_with_flipped_bits_give_no_wrong_point_and_the_true_loss() -> None:

@@ -175,3 +175,35 @@ def test_a_point_marked_invalid_in_any_frame_is_rejected() -> None:
     assert book.sequence == [1, 2, 4, 5, 7, 8]
     assert book.points_mm == [(float(i), 0.0, 0.0) for i in book.sequence]
     assert (book.total("Rejected"), book.lost) == (4, 0)
+
+
+def heartbeat(total: int, t_us: int = 0) -> bytes:
+    head = struct.pack("<2sBBHI", b"\xa5\x5a", 2, 0, total % 65536, t_us) + struct.pack("<QI", total, 0)
+    return head + struct.pack("<H", crc_hqx(head, 0xFFFF))
+
+
+@pytest.mark.parametrize("total", [2**63, 2**64 - 1, 2**48 + 1])
+def test_a_count_that_no_scan_has_is_damage_and_costs_no_point(total: int) -> None:
+    data, _ = single(800)
+    book = any_cut_is_the_same(BinaryDecoder, data[:-72] + heartbeat(total) + data[-72:])
+    assert (len(book.sequence), book.lost) == (800, 0)
+    assert book.counts == {("Damaged", "count of points that no scan has"): 24}
+
+
+@pytest.mark.parametrize("total", [0, 1, 799])
+def test_a_device_has_sent_what_arrived_whatever_it_says(total: int) -> None:
+    data, _ = single(800)
+    book = any_cut_is_the_same(BinaryDecoder, data[:-72] + heartbeat(total, 5) + data[-72:])
+    assert (len(book.sequence), book.lost) == (800, 0)
+
+
+def test_an_opening_said_again_within_the_scan_loses_nothing() -> None:
+    data, _ = single(1500)
+    book = any_cut_is_the_same(BinaryDecoder, data[: 72 + 700 * 24] + data[:24] + data[72 + 700 * 24 :])
+    assert (book.sequence, book.lost) == (list(range(1500)), 0)
+    assert [type(arrival) for arrival in book.others] == [ScanOpened, ScanClosed]
+
+
+def test_nothing_behind_the_end_is_of_the_scan() -> None:
+    data, _ = single(30)
+    assert any_cut_is_the_same(BinaryDecoder, data + single(20)[0] + b"junk") == decoded(BinaryDecoder(), data)

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from drivers.codecs.register_decoder import RegisterDecoder
+from drivers.codecs.register_map import RegisterMap
 from drivers.errors import DeviceRefused, ProtocolError
 from drivers.maps import shipped_map
-from tests.drivers.codecs.register_tables import RING, Ring, turns
+from drivers.source import Arrival, PointBatch
+from tests.drivers.codecs.register_tables import RING, Ring, Table, turns
 from tests.drivers.codecs.streams import account
 
 
@@ -106,3 +108,80 @@ def test_the_record_is_read_the_same_however_it_is_cut(cut: str) -> None:
     replayed = account(arrival for a, b in pairwise(edges) for arrival in again.feed(record[a:b]))
     assert replayed == live
     assert len(live.sequence) == 633
+
+
+def test_an_answer_of_another_function_costs_itself_alone() -> None:
+    ring, decoder = Ring(), RegisterDecoder(RING)
+    ring.write(40)
+    arrivals: list[Arrival] = []
+    for strange in (b"\x04\x02\x00\x07", b"\x18\x00\x06\x00\x02\x01\xb8\x12\x84", b"\x84\x02", b"\x2b" + bytes(300)):
+        arrivals += decoder.feed(decoder.request() + strange)
+        arrivals += decoder.feed(ring.answer(decoder.request()))
+    book = account(arrivals + turns(decoder, ring))
+    assert book.sequence == list(range(40))
+    assert book.counts == {("Damaged", "answer of another function than asked for"): 4 * 5 + 4 + 9 + 2 + 301}
+
+
+FLOATS = {
+    "device": "d",
+    "pattern": "latest",
+    "points": {
+        "at": 0,
+        "fields": {"sequence": {"at": 0, "type": "uint16"}, "x": {"at": 1, "type": "float32"}, "y": {"at": 3, "type": "float32"}},
+    },
+}
+
+
+def test_swapped_words_are_named_when_most_points_make_no_sense() -> None:
+    table, decoder = Table(), RegisterDecoder(RegisterMap.model_validate(FLOATS | {"word_order": "low-first"}))
+    decoder.feed(table.answer(decoder.request()))
+    arrivals: list[Arrival] = []
+
+    def scan() -> None:
+        for number in range(1, 300):
+            table.registers[0] = number
+            table.put(1, "f", 303.8695 + 0.1 * number)
+            table.put(3, "f", 179.1953 - 0.1 * number)
+            arrivals.extend(decoder.feed(table.answer(decoder.request())))
+
+    with pytest.raises(ProtocolError, match=r"8 of \d+ points .* come swapped: set word_order: high-first in the map"):
+        scan()
+    for arrival in arrivals:
+        assert not isinstance(arrival, PointBatch) or np.abs(arrival.points_mm).max() <= 1e6
+
+
+@pytest.mark.parametrize("value", [1e9, 3.4e38, -1e7, 1e-41, float("inf"), float("nan")])
+def test_a_coordinate_that_no_part_can_have_is_rejected_and_counted(value: float) -> None:
+    table, decoder = Table(), RegisterDecoder(RegisterMap.model_validate(FLOATS))
+    arrivals = decoder.feed(table.answer(decoder.request()))
+    for number in range(1, 101):
+        table.registers[0] = number
+        table.put(1, "f", value if number % 10 == 0 else 1.0)
+        table.put(3, "f", 2.0)
+        arrivals += decoder.feed(table.answer(decoder.request()))
+    book = account(arrivals)
+    assert set(book.points_mm) == {(1.0, 2.0, 0.0)}
+    assert (len(book.sequence), book.total("Rejected"), book.lost) == (90, 10 + 1, 0)
+
+
+@pytest.mark.parametrize("value", [1e200, -1e308])
+def test_a_float64_no_part_can_have_is_no_defect(value: float) -> None:
+    document = {"device": "d", "pattern": "latest", "points": {"at": 0, "fields": {"x": {"at": 0, "type": "float64", "scale": 1e10}}}}
+    table, decoder = Table(), RegisterDecoder(RegisterMap.model_validate(document))
+    table.put(0, "d", value)
+    assert account(decoder.feed(table.answer(decoder.request()))).total("Rejected") == 1
+
+
+def test_counters_as_large_as_registers_hold_are_no_defect() -> None:
+    document = {
+        "device": "d",
+        "pattern": "latest",
+        "points": {"at": 0, "fields": {"sequence": {"at": 0, "type": "uint64"}, "x": {"at": 4, "type": "int16"}}},
+    }
+    table, decoder = Table(), RegisterDecoder(RegisterMap.model_validate(document))
+    arrivals: list[Arrival] = []
+    for sequence in (1, 5, 2**63, 2**64 - 1, 2**62, 2**61, 2**63 + 5, 6):
+        table.put(0, "Q", sequence)
+        table.registers[4] = 3
+        arrivals += decoder.feed(table.answer(decoder.request()))
+    assert 0 <= account(arrivals).lost <= 2**48

@@ -9,7 +9,7 @@ import pytest
 
 from drivers.codecs.register_decoder import RegisterDecoder
 from drivers.maps import shipped_map
-from drivers.source import Arrival, ScanClosed, ScanOpened
+from drivers.source import OLDER_THAN_THE_SCAN, Arrival, ScanClosed, ScanOpened
 from tests.drivers.codecs.register_tables import LATEST, RING, Gocator, Ring, Table, turns, without_sent
 from tests.drivers.codecs.streams import account, crc_bitwise
 
@@ -136,13 +136,38 @@ def test_old_points_read_once_more_at_the_end_do_not_stand_for_the_last_ones() -
 def test_the_latest_point_is_taken_once_and_gaps_are_counted() -> None:
     table, decoder = Table(), RegisterDecoder(LATEST)
     arrivals: list[Arrival] = []
-    for sequence in (5, 5, 6, 6, 9):
+    for sequence in (4, 4, 5, 5, 6, 6, 9):
         table.registers[10:12] = sequence, 2 * sequence
         arrivals += decoder.feed(table.answer(decoder.request()))
     book = account(arrivals)
     assert book.sequence == [5, 6, 9]
     assert book.points_mm == [(6.0, 0.0, 0.0), (7.0, 0.0, 0.0), (10.0, 0.0, 0.0)]
     assert book.lost == 2
+    assert book.counts["Rejected", OLDER_THAN_THE_SCAN] == 1
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_what_stood_in_the_registers_before_the_scan_is_no_point_of_it(first: int) -> None:
+    """Zeros until the device measures; its count may begin with 0 or 1."""
+    table, decoder = Table(), RegisterDecoder(LATEST, count=20)
+    arrivals = [arrival for _ in range(5) for arrival in decoder.feed(table.answer(decoder.request()))]
+    for number in range(20):
+        table.registers[10:12] = first + number, 100 + number
+        arrivals += decoder.feed(table.answer(decoder.request()))
+    book = account(arrivals)
+    assert book.sequence == list(range(first, first + 20))
+    assert (book.lost, book.counts) == (0, {("Rejected", OLDER_THAN_THE_SCAN): 1})
+    assert book.others[-1] == ScanClosed(None)
+
+
+def test_a_point_of_the_part_before_is_no_point_of_the_scan() -> None:
+    table, decoder = Table(), RegisterDecoder(LATEST)
+    arrivals: list[Arrival] = []
+    for sequence, x in ((299, 7), (299, 7), (299, 8), (0, 50), (1, 51)):
+        table.registers[10:12] = sequence, x
+        arrivals += decoder.feed(table.answer(decoder.request()))
+    book = account(arrivals)
+    assert (book.sequence, book.lost) == ([0, 1], 0)
 
 
 def test_a_queue_is_popped_before_it_is_read_and_never_read_twice() -> None:

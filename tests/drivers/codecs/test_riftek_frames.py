@@ -55,8 +55,8 @@ def test_the_stream_is_asked_for_once_and_stopped_at_the_end() -> None:
 
 def test_time_is_the_number_of_the_burst_over_the_rate() -> None:
     book = decoded(make(), bursts(list(range(100))))
-    assert book.sequence == list(range(99))
-    np.testing.assert_allclose(book.time_s, np.arange(99) / 1000.0)
+    assert book.sequence == list(range(100))
+    np.testing.assert_allclose(book.time_s, np.arange(100) / 1000.0)
 
 
 @pytest.mark.parametrize("lost", [1, 2, 3])
@@ -64,14 +64,14 @@ def test_lost_bursts_show_in_the_counter(lost: int) -> None:
     data = bursts(list(range(40)))
     book = any_cut_is_the_same(make, data[: 4 * 10] + data[4 * (10 + lost) :])
     assert book.lost == lost
-    assert book.sequence == [*range(10), *range(10 + lost, 39)]
+    assert book.sequence == [*range(10), *range(10 + lost, 40)]
 
 
 @pytest.mark.parametrize("at", range(40, 44))
 def test_a_lost_byte_costs_one_burst(at: int) -> None:
     data = bursts([1000 + i for i in range(30)])
     book = any_cut_is_the_same(make, data[:at] + data[at + 1 :])
-    assert (len(book.sequence), book.lost) == (28, 1)
+    assert (len(book.sequence), book.lost) == (29, 1)
     assert distances(book) == [(1000 + i) * 50 / 16384 for i in book.sequence]
 
 
@@ -116,11 +116,10 @@ def test_values_not_renewed_or_out_of_range_are_rejected() -> None:
     data = bytearray(bursts([5, 6, 20000, 8, 9]))
     data[4:8] = bytes(byte & ~0x40 for byte in data[4:8])
     book = any_cut_is_the_same(make, bytes(data))
-    assert book.sequence == [0, 3]
+    assert book.sequence == [0, 3, 4]
     assert dict(book.counts) == {
         ("Rejected", "not renewed since the last transmission"): 1,
         ("Rejected", "outside the measuring range"): 1,
-        ("Damaged", "burst cut off where the link ended"): 4,
     }
 
 
@@ -136,6 +135,18 @@ def test_ascii_lines() -> None:
     book = any_cut_is_the_same(lambda: RiftekAsciiDecoder(100.0), b"2.066\r\n-0.5\r\nOK\r\n3\r\n7.")
     assert distances(book) == [2.066, -0.5, 3.0]
     assert book.total("Damaged") == 4 + 2
+    assert (book.sequence, book.lost) == ([0, 1, 3], 1)  # the answer that is none was the third
+
+
+def test_an_ascii_line_too_long_is_no_distance_however_it_is_cut() -> None:
+    book = any_cut_is_the_same(lambda: RiftekAsciiDecoder(100.0), b"1.0\r\n" + 64 * b"x" + b"7.0\r\n2.0\r\n")
+    assert (distances(book), book.sequence) == ([1.0, 2.0], [0, 2])
+
+
+@pytest.mark.parametrize("count", [500, None])
+def test_the_last_burst_is_taken(count: int | None) -> None:
+    book = any_cut_is_the_same(lambda: RiftekDecoder(50.0, 1000.0, count=count), bursts(list(range(500))))
+    assert (len(book.sequence), book.others) == (500, [] if count is None else [ScanClosed(None)])
 
 
 def test_ascii_asks_again_after_each_answer_and_when_none_comes() -> None:

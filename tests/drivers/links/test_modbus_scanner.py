@@ -61,6 +61,20 @@ def test_a_busy_device_is_asked_again_and_a_refusal_is_passed_on(monkeypatch: py
         list(answers(monkeypatch, [ExceptionResponse(4, 2)]))
 
 
+@pytest.mark.parametrize("code", [4, 5, 6, 10, 11])
+def test_an_exception_that_passes_costs_no_point(monkeypatch: pytest.MonkeyPatch, code: int) -> None:
+    passing = ExceptionResponse(4, code)
+    arrivals = list(answers(monkeypatch, [value(1), passing, passing, value(2), value(3)]))
+    assert account(arrivals).sequence == [0, 1, 2]  # type: ignore[arg-type]
+    with pytest.raises(LinkError, match=rf"answers exception {code} \(.*\) for 0\.[0-9] s, 3 times in a row"):
+        list(answers(monkeypatch, [value(1), passing]))
+
+
+def test_a_failure_before_any_point_is_final(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(DeviceRefused, match=r"exception 4 \(device failure\)"):
+        list(answers(monkeypatch, [ExceptionResponse(4, 4)]))
+
+
 def test_function_24_over_rtu_has_its_true_length() -> None:
     """Modbus Application Protocol V1.1b3, 6.18, its example: two values 01B8h and 1284h; address and checksum make it an RTU frame."""
     unit = bytes.fromhex("18 0006 0002 01B8 1284")

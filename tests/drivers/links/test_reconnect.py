@@ -8,7 +8,7 @@ import pytest
 
 from drivers.errors import LinkError, ProtocolError
 from drivers.links.reconnect import keep_up
-from drivers.source import Arrival, LinkDown, LinkUp, ScanClosed, WireBytes
+from drivers.source import Arrival, Damaged, Heartbeat, LinkDown, LinkUp, Lost, Rejected, ScanClosed, ScanOpened, WireBytes
 
 
 class Waits(threading.Event):
@@ -33,7 +33,7 @@ def run(opens: list[bool], scans: list[list[Arrival | Exception]], reconnect_s: 
             raise LinkError("no such port")
         return nullcontext(1)
 
-    def scan(_: int) -> Iterator[Arrival]:
+    def scan(_: int, until_s: float) -> Iterator[Arrival]:
         for arrival in next(links):
             if isinstance(arrival, Exception):
                 raise arrival
@@ -56,9 +56,9 @@ def test_a_lost_link_comes_back_with_the_gap_marked() -> None:
     stopped = Waits()
     arrivals = list(run([True, False, False, True], [[DATA, LinkError("gone")], [DATA, END]], 60.0, stopped))
     assert stopped.waits_s == [0.1, 0.2, 0.4]
-    assert [type(arrival) for arrival in arrivals] == [WireBytes, LinkDown, LinkUp, WireBytes, ScanClosed]
-    assert isinstance(arrivals[2], LinkUp)
-    assert arrivals[2].gap_s == pytest.approx(0.7)
+    assert [type(arrival) for arrival in arrivals] == [WireBytes, LinkDown, WireBytes, LinkUp, ScanClosed]
+    assert isinstance(arrivals[3], LinkUp)
+    assert arrivals[3].gap_s == pytest.approx(0.7)
 
 
 def test_the_wait_grows_to_two_seconds_and_the_patience_ends() -> None:
@@ -91,3 +91,19 @@ def test_stop_ends_the_waiting() -> None:
 def test_a_wrong_protocol_is_not_tried_again() -> None:
     with pytest.raises(ProtocolError):
         list(run([True], [[ProtocolError("not this device")]], 60.0, Waits()))
+
+
+@pytest.mark.parametrize("chatter", [DATA, Damaged(1, "junk"), ScanOpened("d", "1", 3), Rejected(1, "frame repeated"), Lost(0, "gap")])
+def test_a_link_over_which_no_point_comes_is_given_up_whatever_else_does(chatter: Arrival) -> None:
+    stopped = Waits()
+    said: list[Arrival | Exception] = [chatter, LinkError("closed")]
+    arrivals = run(1000 * [True], 1000 * [said], 10.0, stopped)
+    with pytest.raises(LinkError, match="closed; tried again in vain for 10 s"):
+        list(arrivals)
+    assert stopped.now_s <= 10.0
+
+
+@pytest.mark.parametrize("news", [Heartbeat(), Rejected(1, "marked invalid by the device"), END])
+def test_news_ends_an_outage(news: Arrival) -> None:
+    arrivals = list(run([True, True], [[DATA, LinkError("gone")], [DATA, news]], 10.0, Waits()))
+    assert [type(arrival) for arrival in arrivals] == [WireBytes, LinkDown, WireBytes, LinkUp, type(news)]

@@ -1,5 +1,6 @@
 """What pyserial raises and returns, and what becomes of it: a port of our own plays the library's."""
 
+from binascii import crc_hqx
 from collections.abc import Iterator
 
 import pytest
@@ -9,7 +10,7 @@ from drivers.codecs.ascii_frames import AsciiDecoder
 from drivers.errors import DeviceError, LinkError, ProtocolError
 from drivers.links.link_settings import LinkSettings
 from drivers.links.serial_scanner import SerialScanner
-from drivers.source import Arrival, Damaged, WireBytes
+from drivers.source import Arrival, Damaged, PointBatch, ScanClosed, WireBytes
 
 
 class Port:
@@ -93,6 +94,38 @@ def test_silence_is_a_lost_link(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_nothing_but_garbage_is_a_wrong_protocol(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(ProtocolError, match="not one valid frame; check baud rate"):
         list(run(monkeypatch, Port([b"\x00\xff\n"] * 100)))
+
+
+def sealed(text: bytes) -> bytes:
+    return b"%b*%04X\r\n" % (text, crc_hqx(text, 0xFFFF))
+
+
+POINTS = [sealed(b"P,%d,%d,1,2,3,0" % (number, number)) for number in range(30)]
+
+
+def test_a_scan_without_one_usable_point_says_what_became_of_its_points(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(ProtocolError, match=r"COM1: not one point of the scan can be used: 30 points rejected \(no scan header arrived"):
+        list(run(monkeypatch, Port([*POINTS, sealed(b"E,30")])))
+
+
+def test_bytes_of_which_none_is_sound_are_not_called_silence(monkeypatch: pytest.MonkeyPatch) -> None:
+    lines = b"".join(POINTS).replace(b"\r\n", b"\n")
+    complaint = rf"not one valid frame; check baud rate.*{len(lines)} bytes damaged \(line that ends with line feed alone"
+    with pytest.raises(ProtocolError, match=complaint):
+        list(run(monkeypatch, Port([lines])))
+
+
+def test_a_device_that_only_says_the_same_again_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    opening = sealed(b"S,d,1,mm,3")
+    with pytest.raises(LinkError, match="for 3 s no new point and no moving heartbeat"):
+        list(run(monkeypatch, Port([opening, *POINTS[:3], *(1000 * [POINTS[2] + opening])])))
+
+
+def test_nothing_behind_the_end_is_handed_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    one = sealed(b"S,d,1,mm,3") + b"".join(POINTS[:3]) + sealed(b"E,3")
+    arrivals = list(run(monkeypatch, Port([one + sealed(b"S,d,2,mm,30") + b"".join(POINTS)])))
+    assert isinstance(arrivals[-1], ScanClosed)
+    assert sum(len(arrival) for arrival in arrivals if isinstance(arrival, PointBatch)) == 3
 
 
 def test_every_error_is_a_device_error() -> None:

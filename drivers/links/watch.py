@@ -1,0 +1,82 @@
+"""What shows that a scan goes on, how long is waited for it, and what is said of a scan in which it never came."""
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from math import inf
+
+from drivers.errors import LinkError, ProtocolError
+from drivers.source import HARMLESS_REASONS, Arrival, Damaged, Heartbeat, PointBatch, Rejected, ScanClosed
+
+
+def is_news(arrival: Arrival) -> bool:
+    """Tell whether an arrival shows that the scan goes on: a new point, though it may be rejected, a heartbeat, or the end."""
+    if isinstance(arrival, Rejected):
+        return arrival.count > 0 and arrival.reason not in HARMLESS_REASONS
+    return isinstance(arrival, PointBatch | Heartbeat | ScanClosed)
+
+
+class Watch:
+    """Waits for news over one opened link.
+
+    silence_s     how long nothing new may come
+    until_s       when the link is given up by the clock, if nothing new comes before
+    last_byte_s   when anything came at all
+    """
+
+    def __init__(self, silence_s: float, until_s: float, now_s: float) -> None:
+        self._silence_s = silence_s
+        self._until_s = until_s
+        self._last_news_s = self.last_byte_s = now_s
+        self.heard_sound = False  # over this link
+        self._sound = False  # since the last news
+        self.garbled = False  # since the last news damage came, and nothing sound
+        self.told = False  # since the last news anything came
+
+    def note(self, found: Iterable[Arrival], now_s: float) -> None:
+        """Take note of one read that brought bytes, and of what was decoded from it."""
+        found = list(found)
+        self.last_byte_s, self.told = now_s, True
+        sound = any(not isinstance(arrival, Damaged) for arrival in found)
+        self.heard_sound |= sound
+        self._sound |= sound
+        if any(map(is_news, found)):
+            self._last_news_s, self._until_s = now_s, inf
+            self._sound = self.told = self.garbled = False
+        else:
+            self.garbled = (self.garbled or bool(found)) and not self._sound
+
+    def is_over(self, now_s: float) -> bool:
+        """Tell whether the patience is at its end."""
+        return now_s - self._last_news_s > self._silence_s or now_s > self._until_s
+
+
+def explained(address: str, arrivals: Iterable[Arrival]) -> Iterator[Arrival]:
+    """Pass on what arrives. Where a scan ends without one usable point, say what became of those that came.
+
+    Raises ProtocolError at the end of such a scan, and the link's own error with the explanation behind it.
+    """
+    points, rejected, damaged = 0, Counter[str](), Counter[str]()
+    try:
+        for arrival in arrivals:
+            if isinstance(arrival, PointBatch):
+                points += len(arrival)
+            elif isinstance(arrival, Rejected) and arrival.reason not in HARMLESS_REASONS:
+                rejected[arrival.reason] += arrival.count
+            elif isinstance(arrival, Damaged):
+                damaged[arrival.reason] += arrival.byte_count
+            yield arrival
+            if isinstance(arrival, ScanClosed) and not points and (rejected or damaged):
+                raise ProtocolError(f"{address}: not one point of the scan can be used: {_became(rejected, damaged)}")
+    except (LinkError, ProtocolError) as error:
+        if points or not (rejected or damaged) or isinstance(arrival, ScanClosed):
+            raise
+        raise type(error)(f"{error}; not one usable point came: {_became(rejected, damaged)}") from error
+
+
+def _became(rejected: Counter[str], damaged: Counter[str]) -> str:
+    parts = []
+    if rejected:
+        parts.append(f"{rejected.total():,} points rejected ({rejected.most_common(1)[0][0]})")
+    if damaged:
+        parts.append(f"{damaged.total():,} bytes damaged ({damaged.most_common(1)[0][0]})")
+    return ", ".join(parts)
