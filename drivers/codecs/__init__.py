@@ -4,6 +4,8 @@ import importlib
 import inspect
 import pkgutil
 from collections.abc import Callable, Mapping
+from math import isfinite
+from typing import get_args
 
 from drivers.source import Decoder
 
@@ -17,6 +19,18 @@ def decoders() -> Mapping[str, Callable[..., Decoder]]:
     return found
 
 
+def _require_kind(name: str, option: inspect.Parameter, given: object) -> None:
+    """Raise ValueError unless an option is what its annotation says: text, a whole number, or any finite number."""
+    kinds = set(get_args(option.annotation) or (option.annotation,))
+    if float in kinds:
+        kinds.add(int)
+    fits = type(given) in kinds or (given is None and type(None) in kinds)
+    if fits and not (isinstance(given, float) and not isfinite(given)):
+        return
+    expected = "a number" if float in kinds else "a whole number" if int in kinds else "text"
+    raise ValueError(f"format {name}: {option.name} is {given!r:.80}; it takes {expected}")
+
+
 def decoder(name: str, **options: object) -> Decoder:
     """Make the decoder of a format; raise `ValueError` naming what is missing, unknown or out of range."""
     known = decoders()
@@ -27,4 +41,6 @@ def decoder(name: str, **options: object) -> Decoder:
     except TypeError as error:
         expected = ", ".join(inspect.signature(known[name]).parameters) or "nothing"
         raise ValueError(f"format {name}: {error}; it takes {expected}") from None
+    for option, given in options.items():
+        _require_kind(name, inspect.signature(known[name]).parameters[option], given)
     return known[name](**options)

@@ -63,6 +63,7 @@ POP_FIELDS = {
     "y": "the coordinate y; mm = scale * value + offset",
     "z": "the coordinate z, or the distance of a distance sensor; mm = scale * value + offset",
 }
+MEASURED = ("time", "x", "y", "z")  # every other field counts or marks
 POINTS_FIELDS = {
     "sequence": "the counter of the point, which wraps; gaps in it are counted as lost",
     "time": "the time of the point; seconds = scale * value; an integer wraps",
@@ -158,6 +159,9 @@ class Block(_Part):
             raise ValueError(f"at most {MOST_REGISTERS} registers in one entry, which is what one answer carries, not {self.size}")
         if self.at + self.size * self.entries > 65536:
             raise ValueError(f"an end by register 65535, after which {self.entries} entries of {self.size} registers from {self.at} on end")
+        for name, field in self.fields.items():
+            if field.type.startswith("float") and name not in MEASURED:
+                raise ValueError(f"whole numbers for the field {name}, which counts or marks, not {field.type}")
         return self
 
 

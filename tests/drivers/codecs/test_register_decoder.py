@@ -185,3 +185,15 @@ def test_counters_as_large_as_registers_hold_are_no_defect() -> None:
         table.registers[4] = 3
         arrivals += decoder.feed(table.answer(decoder.request()))
     assert 0 <= account(arrivals).lost <= 2**48
+
+
+@pytest.mark.parametrize("kind", ["float32", "float64"])
+def test_a_counter_that_is_no_whole_number_is_refused_with_the_map(kind: str) -> None:
+    """Not a number has no whole number: a reading of it must not end in a traceback."""
+    document = {
+        "device": "d",
+        "pattern": "latest",
+        "points": {"at": 0, "fields": {"sequence": {"at": 0, "type": kind}, "x": {"at": 4, "type": "int16"}}},
+    }
+    with pytest.raises(ValueError, match=f"whole numbers for the field sequence, which counts or marks, not {kind}"):
+        RegisterMap.model_validate(document)
