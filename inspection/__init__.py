@@ -8,7 +8,7 @@ from inspection.coarse import register_coarse
 from inspection.curve import NurbsCurve
 from inspection.curve_check import CurveCheck, Hollow, check_curve
 from inspection.deviations import Deviations, deviations, profile_error_mm
-from inspection.errors import InspectionError, NominalError, RegistrationError
+from inspection.errors import InspectionError, NominalError, NotMeasured, RegistrationError
 from inspection.fine import register, register_fine
 from inspection.kernels import compiled_code_folder, while_compiling
 from inspection.live import LiveInspection, LiveUpdate, State, rehearse
@@ -40,6 +40,7 @@ __all__ = [
     "MinimumZone",
     "NominalError",
     "NominalProfile",
+    "NotMeasured",
     "NurbsCurve",
     "Registration",
     "RegistrationError",

@@ -3,6 +3,7 @@
 InspectionError
   NominalError        the nominal profile cannot be used
   RegistrationError   the points cannot be brought onto the nominal
+  NotMeasured         the set-up contradicts the points: there is no verdict, but something to mend
 """
 
 
@@ -16,3 +17,7 @@ class NominalError(InspectionError):
 
 class RegistrationError(InspectionError):
     """The points cannot be brought onto the nominal."""
+
+
+class NotMeasured(InspectionError):  # noqa: N818 - the name that users know it by
+    """The set-up contradicts the points: nothing was measured, and the message names the likely mend."""

@@ -10,7 +10,7 @@ from inspection.deviations import feet_on
 from inspection.kernels import judge_rows, take_in
 from inspection.result import NOT_JUDGED, Rejection
 from inspection.rigid import RigidTransform
-from inspection.section import SectionPlane
+from inspection.section import XY_PLANE, SectionPlane
 from inspection.terms import Terms
 
 Array = NDArray[np.float64]
@@ -22,15 +22,19 @@ class ScanRows:
     """Rows of a scan; the arrays have room for more rows than `count`.
 
     points       : (n, 2) in section coordinates
+    height       : (n,) above the plane of the section
     actual, foot, normal : (n, 2) surface point, nominal point and direction of the deviation; NaN where there is no verdict
     station, deviation   : (n,) likewise
     verdicts     : (n,) codes of `Verdict`, NOT_JUDGED where there is none
     rejection    : (n,) codes of `Rejection`
+    plane        : the plane of the section
     """
 
-    def __init__(self, capacity: int = 4096) -> None:
+    def __init__(self, capacity: int = 4096, plane: SectionPlane = XY_PLANE) -> None:
         self.count = 0
         self.points, self.actual, self.foot, self.normal = (np.full((capacity, 2), np.nan) for _ in range(4))
+        self.height = np.zeros(capacity)
+        self.plane = plane
         self.station, self.deviation = np.full(capacity, np.nan), np.full(capacity, np.nan)
         self.verdicts = np.full(capacity, NOT_JUDGED, dtype=np.int8)
         self.rejection = np.zeros(capacity, dtype=np.int8)
@@ -38,7 +42,9 @@ class ScanRows:
     def take_in(self, points_mm: Array, plane: SectionPlane, off_section_max_mm: float) -> None:
         """Write points (m, 2) or (m, 3) behind the rows so far, as section points. They count once `count` is raised."""
         self._reserve(self.count + len(points_mm))
+        self.plane = plane
         take_in(points_mm, plane.packed, off_section_max_mm, self.points, self.rejection, self.count)
+        self.height[self.count : self.count + len(points_mm)] = plane.heights(points_mm)
 
     def judge(self, first: int, stop: int, pose: RigidTransform, terms: Terms) -> None:
         """Fill in rows first .. stop - 1 as they are with the points at this pose."""
@@ -52,14 +58,22 @@ class ScanRows:
 
     def copy(self) -> "ScanRows":
         """The rows so far, in arrays of just their number."""
-        same = ScanRows(self.count)
+        same = ScanRows(self.count, self.plane)
         same._take_over(self, same)
         return same
+
+    def without(self, outliers: NDArray[np.int64]) -> "ScanRows":
+        """The rows so far, with these rejected as outliers; the very same where there are none."""
+        if not len(outliers):
+            return self
+        rest = self.copy()
+        rest.rejection[outliers] = Rejection.OUTLIER
+        return rest
 
     def _reserve(self, capacity: int) -> None:
         """Make room for so many rows, at least doubling it."""
         if capacity > len(self.verdicts):
-            self._take_over(self, ScanRows(max(capacity, 2 * len(self.verdicts))))
+            self._take_over(self, ScanRows(max(capacity, 2 * len(self.verdicts)), self.plane))
 
     def _take_over(self, old: "ScanRows", larger: "ScanRows") -> None:
         """Hold the arrays of `larger`, with the rows of `old` in them."""

@@ -39,8 +39,18 @@ class SectionPlane:
             value.setflags(write=False)
             object.__setattr__(self, name, value)
 
+    def heights(self, points_mm: Array) -> Array:
+        """Heights (m,) of machine points (m, 3) above the plane; section points (m, 2) lie in it. NaN where a point is none."""
+        if points_mm.shape[1] == 2:
+            return np.zeros(len(points_mm))
+        with np.errstate(over="ignore", invalid="ignore"):
+            return np.asarray((points_mm - self.origin_mm) @ self.normal)
+
     def to_machine(self, points_mm: ArrayLike, height_mm: float = 0.0) -> Array:
         """Machine points (m, 3) of section points (m, 2) at a height above the plane. The way there is `kernels.take_in`."""
         p = np.asarray(points_mm, dtype=np.float64)
         y = np.cross(self.normal, self.x_axis)
         return np.asarray(self.origin_mm + p[:, :1] * self.x_axis + p[:, 1:] * y + height_mm * self.normal)
+
+
+XY_PLANE = SectionPlane(np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))

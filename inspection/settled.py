@@ -5,19 +5,16 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from inspection.coarse import FEWEST_POINTS
-from inspection.errors import RegistrationError
-from inspection.fine import MISFIT, register
+from inspection.fine import register
 from inspection.minimum_zone import fit_minimum_zone
 from inspection.registration import Registration, datum_registration
 from inspection.result import NOT_JUDGED, InspectionResult, Rejection, coverage, stretches
 from inspection.scan_rows import ScanRows
+from inspection.setup_check import check_fit, check_points
 from inspection.terms import Terms
 from inspection.tolerance import Verdict
 
 Array = NDArray[np.float64]
-
-_MIRROR_HINT = 0.2  # a mirrored fit must be better by this factor to be named as the cause
 
 
 def settle(rows: ScanRows, terms: Terms, complete: bool) -> InspectionResult:
@@ -25,30 +22,21 @@ def settle(rows: ScanRows, terms: Terms, complete: bool) -> InspectionResult:
 
     complete : the scan came to its end; conformity of one that was cut short is not proven
 
-    Raises RegistrationError when the points cannot be brought onto the nominal.
+    Raises RegistrationError when the points cannot be brought onto the nominal, NotMeasured when the set-up contradicts them.
     """
+    rows = rows.without(check_points(rows, terms))
     usable = rows.usable_rows()
     if terms.known_pose is None:
-        _check_section(rows, len(usable), terms.off_section_max_mm)
         registration = _register_points(rows.points[usable], terms)
         # rounded, so that a replay on another processor judges at the very same pose
         registration = replace(registration, nominal_from_section=registration.nominal_from_section.snap_to_grid())
     else:
         registration = datum_registration(terms.known_pose, len(usable))
+        check_fit(rows.points[usable], registration, terms)
     judged = rows.copy()
     judged.rejection[usable[registration.outliers]] = Rejection.OUTLIER
     judged.judge(0, judged.count, registration.nominal_from_section, terms)
     return _result(judged, registration, terms, complete)
-
-
-def _check_section(rows: ScanRows, usable: int, off_section_max_mm: float) -> None:
-    """Raise RegistrationError where hardly any point lies in the section, naming the likely cause."""
-    off = int(np.count_nonzero(rows.rejection[: rows.count] == Rejection.OFF_SECTION))
-    if usable < FEWEST_POINTS <= off:
-        raise RegistrationError(
-            f"{off} of {rows.count} points lie farther than {off_section_max_mm:g} mm from the plane of the section: "
-            "are its origin and its normal right?"
-        )
 
 
 def _register_points(points_mm: Array, terms: Terms) -> Registration:
@@ -56,7 +44,7 @@ def _register_points(points_mm: Array, terms: Terms) -> Registration:
     nominal, zone, tip_radius_mm = terms.nominal, terms.zone, terms.tip_radius_mm
     gross_mm = (zone.upper_mm - zone.lower_mm) / 2  # nearer points are form, however exact the others are
     registration = register(points_mm, nominal, tip_radius_mm=tip_radius_mm, robust=terms.reject_outliers, gross_mm=gross_mm)
-    _check_fit(points_mm, registration, terms)
+    check_fit(points_mm, registration, terms)
     if terms.fit != "minimum-zone":
         return registration
     kept = points_mm[~registration.outliers]
@@ -65,32 +53,13 @@ def _register_points(points_mm: Array, terms: Terms) -> Registration:
     return replace(registration, nominal_from_section=pose, iterations=programs, converged=converged)
 
 
-def _check_fit(points_mm: Array, registration: Registration, terms: Terms) -> None:
-    """Raise RegistrationError for points that are not of this part, naming the likely cause."""
-    size = terms.nominal.size_mm
-    spread = float(np.abs(terms.zone.upper_mm) + np.abs(terms.zone.lower_mm))
-    if registration.rms_mm <= min(MISFIT * size, 3 * spread):
-        return
-    mirrored = register(points_mm[:, ::-1], terms.nominal, tip_radius_mm=terms.tip_radius_mm)
-    if mirrored.rms_mm < _MIRROR_HINT * registration.rms_mm:
-        raise RegistrationError(
-            f"the points fit the nominal only mirrored (rms {mirrored.rms_mm:.4g} mm instead of {registration.rms_mm:.4g} mm): "
-            "are the x and y columns swapped, or does the section's normal point the other way?"
-        )
-    if registration.rms_mm > MISFIT * size:
-        raise RegistrationError(
-            f"the points do not fit the nominal: rms {registration.rms_mm:.4g} mm after the best registration; they span "
-            f"{np.hypot(*np.ptp(points_mm, axis=0)):.4g} mm, the nominal {size:.4g} mm. Check the unit, the scale and the nominal"
-        )
-
-
 def _result(rows: ScanRows, registration: Registration, terms: Terms, complete: bool) -> InspectionResult:
     """What the judged rows say about the profile."""
     judged = rows.verdicts != NOT_JUDGED
     station, deviation, verdicts = rows.station[judged], rows.deviation[judged], rows.verdicts[judged]
     covered = coverage(station, terms.nominal)
     verdict = terms.zone.verdict(deviation)
-    proven = complete and covered >= terms.coverage_min and not registration.outliers.any()
+    proven = complete and covered >= terms.coverage_min and not (rows.rejection == Rejection.OUTLIER).any()
     return InspectionResult(
         actual_mm=rows.actual,
         foot_mm=rows.foot,

@@ -1,0 +1,317 @@
+"""Whether the set-up contradicts the points: then nothing was measured, and the likely mend is named in a sentence.
+
+A part that merely fails is none of this file's business: every check asks for a signature that no defect leaves. Sizes differ by a
+quarter; the points lie in another plane or in several; a few lie where no part is; all are out by the same; the mirror image fits far
+better; or the pose that was given lies far off although the points fit.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
+
+from inspection.coarse import FEWEST_POINTS
+from inspection.deviations import deviations
+from inspection.errors import NotMeasured
+from inspection.fine import MISFIT, register
+from inspection.kernels.layout import OFF_SECTION
+from inspection.nominal import NominalProfile
+from inspection.registration import Registration
+from inspection.scan_rows import ScanRows
+from inspection.section import SectionPlane
+from inspection.terms import Terms
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.int64]
+
+_FAR_SIZES = 2.0  # of the nominal's size from the middle of the points: no point of the part lies there
+_FAR_SPREADS = 4.0  # and so many times the distance within which nine of ten points lie
+_FEW = 0.1  # of the points: more than these are not a few
+_NAMED_ROWS = 5
+_PLANE_LIMIT = 0.01  # of the nominal's size: heights that differ by less leave one section
+_THIN = 0.1  # of the heights' range: points nearer to a plane lie in it
+_LEVEL_MM = 0.5  # between two heights that are two sections
+_STRAIGHT = 1e-3  # of the length: narrower points lie on a line, through which many planes go
+_SIZES_APART = 1.25
+_FACTOR_NEAR = 1.05
+_NEARLY_CLOSED = 3.0  # steps between the last point and the first
+_IN_ORDER = 3.0  # times the length round the points: a longer way leaps to and fro
+_MIRROR_FAR_BETTER = 0.35  # of the rms: no defect makes the mirror image fit so much better
+_MIRROR_BETTER = 0.5  # and this with every point inside the zone
+_SHIFT_ZONES, _SHIFT_MM, _SHIFT_SCATTERS = 3.0, 0.2, 10.0  # widths of the zone, mm, and scatters by which all points are out
+_SHIFT_HINT = 3.0  # scatters at a fit about 0, which spoils a shift
+_NINE_OF_TEN = 3.29  # standard deviations of a normal distribution between its quantiles of 5 % and 95 %
+_RADIUS_NEAR = 0.05
+_FITS_INSTEAD = 0.2  # of the rms at the known pose
+
+_FACTORS = (
+    (25.4, "are the points in inches? Say so: unit inch (--unit inch), a factor of 25.4"),
+    (1 / 25.4, "is the nominal in inches? Say so: unit inch (--nominal-unit inch), a factor of 25.4"),
+    (1000.0, "are the points in metres? Give their scale: a factor of 1000"),
+    (0.001, "are the points in micrometres? Say so: unit um (--unit um), a factor of 0.001"),
+    (10.0, "are the points in centimetres? Give their scale: a factor of 10"),
+    (0.1, "is the nominal in centimetres? Give its scale: a factor of 10"),
+)
+
+
+def check_points(rows: ScanRows, terms: Terms) -> Rows:
+    """Raise NotMeasured where the points cannot be a scan of this section, whatever their pose.
+
+    Returns the rows of points that lie far from all others; there are none unless outliers are to be rejected.
+    """
+    usable = rows.usable_rows()
+    _check_section(rows, len(usable), terms.off_section_max_mm)
+    if len(usable) < FEWEST_POINTS:
+        return usable[:0]
+    space = np.column_stack([rows.points[usable], rows.height[usable]])
+    far = _far_points(space, terms.nominal)
+    if far.any() and not terms.reject_outliers:
+        raise NotMeasured(_words_of_far(space, usable, far))
+    _check_plane(space[~far], rows.plane, terms)
+    _check_size(space[~far, :2], terms)
+    return usable[far]
+
+
+def check_fit(points_mm: Array, registration: Registration, terms: Terms) -> None:
+    """Raise NotMeasured where the points (m, 2), at the pose that was found or is known, are not of this part as it was set up."""
+    kept = points_mm[~registration.outliers]
+    found = _Found.at(kept, registration, terms)
+    if found is None or found.worst_mm <= terms.zone.uncertainty_mm:
+        return
+    _check_ball(kept, found, terms)
+    direct = _fit(kept, terms) if terms.known_pose is not None else registration
+    if direct is None:
+        return
+    size = terms.nominal.size_mm
+    if found.rms_mm > MISFIT * size and direct.rms_mm < _FITS_INSTEAD * found.rms_mm:
+        raise NotMeasured(_words_of_pose(found.rms_mm, direct, registration))
+    _check_mirrored(kept, direct, terms)
+    if max(direct.rms_mm, found.rms_mm) > MISFIT * size:
+        raise NotMeasured(
+            f"the points do not fit the nominal: rms {direct.rms_mm:.4g} mm after the best registration; they span "
+            f"{np.hypot(*np.ptp(kept, axis=0)):.4g} mm, the nominal {size:.4g} mm. Check the unit, the scale and the nominal"
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Found:
+    """What the points are at a pose: deviations (k,) in mm, their rms, and how far the worst lies outside the zone."""
+
+    deviation_mm: Array
+    rms_mm: float
+    worst_mm: float
+
+    @classmethod
+    def at(cls, points_mm: Array, registration: Registration, terms: Terms) -> "_Found | None":
+        """The deviations of points (m, 2), without those beyond an end; None where no point is left."""
+        found = deviations(registration.nominal_from_section.apply(points_mm), terms.nominal, "exact", terms.tip_radius_mm)
+        deviation = found.deviation_mm[~found.beyond_end]
+        if not len(deviation):
+            return None
+        middle, half = terms.zone.middle_mm, (terms.zone.upper_mm - terms.zone.lower_mm) / 2
+        away = np.abs(deviation - middle)
+        return cls(deviation, float(np.sqrt((away**2).mean())), float(away.max()) - half)
+
+
+def _check_section(rows: ScanRows, usable: int, off_section_max_mm: float) -> None:
+    off = int(np.count_nonzero(rows.rejection[: rows.count] == OFF_SECTION))
+    if usable < FEWEST_POINTS <= off:
+        raise NotMeasured(
+            f"{off} of {rows.count} points lie farther than {off_section_max_mm:g} mm from the plane of the section: "
+            "are its origin and its normal right?"
+        )
+
+
+def _far_points(space_mm: Array, nominal: NominalProfile) -> NDArray[np.bool_]:
+    """Which points (m, 3) are a few that lie far from all others: farther than any point of the part can."""
+    away = np.linalg.norm(space_mm - np.median(space_mm, axis=0), axis=1)
+    far = away > max(_FAR_SIZES * nominal.size_mm, _FAR_SPREADS * float(np.quantile(away, 1 - _FEW)))
+    return far if np.count_nonzero(far) <= _FEW * len(far) else np.zeros(len(far), dtype=bool)
+
+
+def _words_of_far(space_mm: Array, usable: Rows, far: NDArray[np.bool_]) -> str:
+    which = np.flatnonzero(far)
+    rows = ", ".join(str(row + 1) for row in usable[which[:_NAMED_ROWS]]) + (" ..." if len(which) > _NAMED_ROWS else "")
+    x, y, _ = space_mm[which[0]]
+    few = f"{len(which)} of {len(far)} points lie" if len(which) > 1 else f"1 of {len(far)} points lies"
+    return (
+        f"{few} far from all others (row{'s' if len(which) > 1 else ''} {rows}; the first at x {x:g}, y {y:g} mm): are these samples "
+        "that mean no point? Give the value that marks them (invalid), or fit without them (--reject-outliers)"
+    )
+
+
+def _check_plane(space_mm: Array, plane: SectionPlane, terms: Terms) -> None:
+    """Raise NotMeasured where the points (m, 3: x and y in the section, height above it) lie in another plane, or in several."""
+    low, high = np.quantile(space_mm[:, 2], [0.02, 0.98])
+    spread = float(high - low)
+    limit = _PLANE_LIMIT * terms.nominal.size_mm if not np.isfinite(terms.off_section_max_mm) else float("inf")
+    if spread <= min(limit, _LEVEL_MM):
+        return
+    centred = space_mm - np.median(space_mm, axis=0)
+    _, singular, axes = np.linalg.svd(centred, full_matrices=False)
+    off = np.quantile(centred @ axes[2], [0.02, 0.98])
+    if spread > limit and off[1] - off[0] < _THIN * spread and singular[1] > _STRAIGHT * singular[0]:
+        raise NotMeasured(_words_of_plane(space_mm, axes[2], plane))
+    levels = _levels(space_mm[:, 2])
+    if len(levels) > 1:
+        *first, last = (f"{_machine_height(plane, level):.4g}" for level in levels)
+        raise NotMeasured(
+            f"the points lie at several heights, {', '.join(first)} and {last} mm: this is more than one section. Give one at a time, or "
+            "name the height (section.origin_mm with section.off_plane_max_mm)"
+        )
+    if spread > limit:
+        raise NotMeasured(
+            f"the points lie at heights from {_machine_height(plane, low):.4g} to {_machine_height(plane, high):.4g} mm, not in one plane "
+            f"(within {limit:.3g} mm): is the section's plane right (--plane), or its height (section.off_plane_max_mm)?"
+        )
+
+
+def _machine_height(plane: SectionPlane, height_mm: float) -> float:
+    """The height of a section point along the normal, from the machine's origin, rounded for people."""
+    return round(float(plane.origin_mm @ plane.normal) + height_mm, 3) + 0.0
+
+
+def _words_of_plane(space_mm: Array, normal: Array, plane: SectionPlane) -> str:
+    """Name the plane that the points (m, 3) lie in, by its normal in the section's coordinates, and how to say so."""
+    turn = np.array([plane.x_axis, np.cross(plane.normal, plane.x_axis), plane.normal])  # (3, 3) the section's axes, a row each
+    direction = normal @ turn
+    direction = direction * np.sign(direction[np.argmax(np.abs(direction))])
+    axis = int(np.argmax(np.abs(direction)))
+    place = float(np.median((plane.origin_mm + space_mm @ turn) @ direction))
+    if abs(direction[axis]) > 0.9999:
+        return f"the points lie in the plane {'xyz'[axis]} = {place:.5g}: say --plane {('yz', 'xz', 'xy')[axis]} (section.normal)"
+    told = ", ".join(f"{round(value, 4) + 0.0:g}" for value in direction)
+    tilt = np.degrees(np.arccos(min(1.0, abs(float(normal[2])))))
+    return f"the points lie in a plane that is tilted by {tilt:.3g} deg against the section: say section.normal [{told}]"
+
+
+def _levels(heights_mm: Array) -> list[float]:
+    """Heights at which many points lie, each apart from the next; fewer than two where heights run on."""
+    ordered = np.sort(heights_mm)
+    groups = np.split(ordered, np.flatnonzero(np.diff(ordered) > _LEVEL_MM) + 1)
+    many = [group for group in groups if len(group) >= max(FEWEST_POINTS, 0.05 * len(ordered))]
+    gaps = [after[0] - before[-1] for before, after in pairwise(many)]
+    return [float(np.median(group)) for group in many] if gaps and min(gaps) > max(np.ptp(group) for group in many) else []
+
+
+def _check_size(points_mm: Array, terms: Terms) -> None:
+    """Raise NotMeasured where a scan that goes round is not of the nominal's size, or where a known factor would make all of it fit."""
+    nominal = terms.nominal
+    scan, want = _across(points_mm), _across(nominal.points_mm)
+    if not scan > 0 or 1 / _SIZES_APART < want / scan < _SIZES_APART:
+        return
+    factor = want / scan
+    known = next((each for each in _FACTORS if 1 / _FACTOR_NEAR < factor / each[0] < _FACTOR_NEAR), None)
+    closed = nominal.curve.closed and (factor < 1 or _goes_round(points_mm))
+    if not closed and not (known and _fits_whole(points_mm * known[0], terms)):
+        return
+    if known:
+        mend = f", a factor of {factor:.4g}: {known[1]}"
+    elif want <= 2.0 or scan <= 2.0:
+        which, size = ("is the nominal", scan / want) if want <= 2.0 else ("are the points", factor)
+        mend = f", a factor of {factor:.4g}: {which} in chord units? Give the scale, about {size:.4g}"
+    else:
+        mend = ". Check the unit, the scale and the nominal"
+    raise NotMeasured(f"the points do not fit the nominal: they are {scan:.4g} mm across, the nominal {want:.4g} mm{mend}")
+
+
+def _across(points_mm: Array) -> float:
+    """The largest distance between two of the points (m, 2), in mm."""
+    try:
+        corners = points_mm[ConvexHull(points_mm).vertices]
+    except QhullError:  # all on a line
+        return float(np.hypot(*np.ptp(points_mm, axis=0)))
+    return float(np.hypot(*(corners[:, None, :] - corners[None, :, :]).transpose(2, 0, 1)).max())
+
+
+def _goes_round(points_mm: Array) -> bool:
+    """Tell whether the points (m, 2), in the order of the scan, end where they begin and go round something."""
+    steps = np.hypot(*np.diff(points_mm, axis=0).T)
+    try:
+        hull = ConvexHull(points_mm)
+    except QhullError:
+        return False
+    gap = float(np.hypot(*(points_mm[-1] - points_mm[0])))
+    in_order = float(steps.sum()) < _IN_ORDER * hull.area  # of a hull in the plane, the area is its circumference
+    return in_order and gap <= _NEARLY_CLOSED * float(np.quantile(steps, 0.95)) and gap < 0.1 * hull.area
+
+
+def _fits_whole(points_mm: Array, terms: Terms) -> bool:
+    """Tell whether the points (m, 2) would fit the nominal and reach all round it."""
+    fitted = _fit(points_mm, terms)
+    if fitted is None or fitted.rms_mm > 0.25 * MISFIT * terms.nominal.size_mm:
+        return False
+    station = np.sort(deviations(fitted.nominal_from_section.apply(points_mm), terms.nominal).station_mm)
+    return bool(np.diff(station, prepend=0.0, append=terms.nominal.length_mm).max() < 0.1 * terms.nominal.length_mm)
+
+
+def _fit(points_mm: Array, terms: Terms) -> Registration | None:
+    """The best fit of points (m, 2), about the middle of the zone; None where there are too few for one."""
+    if len(points_mm) < FEWEST_POINTS:
+        return None
+    return register(points_mm, terms.nominal, tip_radius_mm=terms.tip_radius_mm)
+
+
+def _check_ball(points_mm: Array, found: _Found, terms: Terms) -> None:
+    """Raise NotMeasured where all points (m, 2) are out by the same, far above their scatter, as ball centres are."""
+    width, radius = terms.zone.upper_mm - terms.zone.lower_mm, terms.tip_radius_mm
+    shift, scatter = _shift(found.deviation_mm)
+    away = abs(shift - terms.zone.middle_mm)
+    if away <= width or away <= _SHIFT_HINT * scatter:
+        return
+    if terms.known_pose is None:  # fitted about the shift, for a fit about 0 shares a part of it out among the points
+        shift, scatter = _fitted_shift(points_mm, shift, terms)
+        away = abs(shift - terms.zone.middle_mm)
+    if away <= width or away <= _SHIFT_SCATTERS * scatter:
+        return
+    if radius and any(abs(shift + times * radius) < _RADIUS_NEAR * radius for times in (1, 2)):
+        if abs(shift + radius) < _RADIUS_NEAR * radius:
+            mend = f"was the radius of the ball taken off twice? Leave out the tip radius of {radius:g} mm (--tip-radius)"
+        else:
+            mend = "is the ball on the other side of the material (--material)?"
+    elif away < max(_SHIFT_ZONES * width, _SHIFT_MM):
+        return
+    elif shift > 0:
+        mend = f"ball centres? Give the radius of the tip (--tip-radius {shift:.3g}). Or is the material on the other side (--material)?"
+    else:
+        mend = "was the radius of a ball taken off twice? Or is the material on the other side (--material)?"
+    raise NotMeasured(f"all points are {abs(shift):.3f} mm {'out' if shift > 0 else 'inside'} (scatter {scatter:.3f} mm): {mend}")
+
+
+def _shift(deviation_mm: Array) -> tuple[float, float]:
+    """By how much all deviations (k,) are out, and their scatter: the standard deviation that nine of ten of them suggest."""
+    low, middle, high = np.quantile(deviation_mm, [0.05, 0.5, 0.95])
+    return float(middle), float(high - low) / _NINE_OF_TEN
+
+
+def _fitted_shift(points_mm: Array, shift_mm: float, terms: Terms) -> tuple[float, float]:
+    """The same of points (m, 2) at the best fit to the profile that lies so far out."""
+    fitted = register(points_mm, terms.nominal, tip_radius_mm=terms.tip_radius_mm + shift_mm)
+    found = _Found.at(points_mm, fitted, terms)
+    return _shift(found.deviation_mm) if found is not None else (0.0, 0.0)
+
+
+def _words_of_pose(rms_mm: float, fitted: Registration, known: Registration) -> str:
+    moved = fitted.centre_mm - known.nominal_from_section.apply(fitted.nominal_from_section.inverse().apply(fitted.centre_mm[None, :]))[0]
+    turned = np.degrees(fitted.nominal_from_section.rotation_rad - known.nominal_from_section.rotation_rad)
+    return (
+        f"the points lie {rms_mm:.4g} mm (rms) from the nominal where they are, but fit it to {fitted.rms_mm:.4g} mm when moved by "
+        f"x {moved[0]:.4g}, y {moved[1]:.4g} mm and turned by {(turned + 180) % 360 - 180:.4g} deg: is the datum right? Or let them be "
+        "fitted (--fit best-fit)"
+    )
+
+
+def _check_mirrored(points_mm: Array, direct: Registration, terms: Terms) -> None:
+    """Raise NotMeasured where the mirror image of points (m, 2) fits far better."""
+    image = points_mm[:, ::-1]
+    mirrored = _fit(image, terms)
+    if mirrored is None or mirrored.rms_mm >= _MIRROR_BETTER * direct.rms_mm:
+        return
+    found = _Found.at(image, mirrored, terms)
+    if mirrored.rms_mm < _MIRROR_FAR_BETTER * direct.rms_mm or (found is not None and found.worst_mm <= 0):
+        raise NotMeasured(
+            f"the points fit the nominal only mirrored (rms {mirrored.rms_mm:.4g} mm instead of {direct.rms_mm:.4g} mm): "
+            "are the x and y columns swapped, or does the section's normal point the other way?"
+        )
