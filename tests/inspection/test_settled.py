@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from inspection import LiveInspection, RegistrationError, Rejection, SectionPlane, Verdict, fit_minimum_zone, register
+from inspection import LiveInspection, NotMeasured, Rejection, SectionPlane, Verdict, fit_minimum_zone, register
 from tests.inspection import profiles
 from tests.inspection.oracle import closest_point
 from tests.inspection.profiles import curve_of, nominal_of
@@ -95,7 +95,7 @@ def test_half_a_scan_is_judged_but_proves_no_conformity() -> None:
 def refusal(points: profiles.Array, **options: Any) -> str:
     live = LiveInspection(nominal_of("P1"), ZONE, **options)
     live.add(points)
-    with pytest.raises(RegistrationError) as caught:
+    with pytest.raises(NotMeasured) as caught:
         live.finish()
     return str(caught.value)
 
