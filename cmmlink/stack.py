@@ -1,7 +1,7 @@
 """Sections of a CT surface, inspected one after the other by the path that every scan takes.
 
-Surface -> slices -> a contour source each -> the pipeline -> verdicts. The outline of a section is its longest outer contour;
-where that is open, all open pieces together. Contours beside it are counted and reported, never judged.
+Surface -> slices -> a contour source each -> the pipeline -> verdicts. Which contours are the outline of a section, outline.py tells.
+Contours beside it are counted and reported, never judged.
 """
 
 import logging
@@ -19,7 +19,8 @@ from cmmlink.buffer import CAPACITY_POINTS
 from cmmlink.errors import PlanError
 from cmmlink.events import Counts
 from cmmlink.from_plan import discretize_file, run_started, section_inspection_of
-from cmmlink.nominal_files import goes_round, load_nominal
+from cmmlink.nominal_files import load_nominal
+from cmmlink.outline import Outline, outline_of
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan import CtPlan, Discretisation
 from cmmlink.result_folder import folder_of
@@ -46,7 +47,6 @@ _log = logging.getLogger(__name__)
 _FEW_SECTIONS = 50  # up to here Open3D costs less than half a second; numpy gives the same points, a stack of 200 twice as fast
 _MOST_SECTIONS = 100_000
 _SAME_HEIGHT_MM = 1e-9
-_LENGTHS_APART = 1.5  # a noisy surface lengthens an outline by a tenth at most
 _LEAST_POINTS = 400  # over the length of a profile; on a coarser surface, points on the facets are judged as well as the corners
 
 
@@ -279,13 +279,12 @@ def _cutter(plan: CtPlan, sections: int, open3d: Callable[[], Open3DProcess], no
 def _inspect(plan: CtPlan, cut: SurfaceSection, profiles: _Profiles, clock: Callable[[], float], stop: threading.Event) -> SectionOutcome:
     """Send one section through the pipeline. An outline that cannot be this profile is refused before anything is fitted."""
     path, profile = profiles.at(cut.asked_mm)
-    outline = _outline(cut)
+    outline = outline_of(cut, profile)
     spacing_mm = profile.length_mm / _LEAST_POINTS
-    judged = tuple(add_points_between(contour, spacing_mm) for contour in outline)
-    other_part = _other_part(cut, outline, profile)
-    run = _refuse_outline(judged, other_part) if other_part else _run(plan, cut, judged, profile, clock, stop)
+    judged = tuple(add_points_between(contour, spacing_mm) for contour in outline.contours)
+    run = _refuse_outline(judged, outline.refusal) if outline.refusal else _run(plan, cut, judged, profile, clock, stop)
     warnings = list(_warnings(cut, outline, run))
-    if _points_in(judged) > _points_in(outline):
+    if _points_in(judged) > _points_in(outline.contours):
         warnings.append(f"a coarse surface: points were set between its corners, no farther apart than {spacing_mm:.3f} mm")
     return SectionOutcome(cut, judged, path, profile, run, tuple(warnings))
 
@@ -305,19 +304,6 @@ def _run(
     return run_inspection(source, live, [], started, buffer_points=CAPACITY_POINTS, clock=clock, stop=stop)
 
 
-def _other_part(cut: SurfaceSection, outline: tuple[Contour, ...], profile: NominalProfile) -> RegistrationError | None:
-    """The reason when a closed outline cannot be a section of its nominal: their lengths differ too much. None otherwise."""
-    if not (outline and outline[0].closed and goes_round(profile.curve)):
-        return None
-    share = outline[0].length_mm / profile.length_mm
-    if 1 / _LENGTHS_APART < share < _LENGTHS_APART:
-        return None
-    return RegistrationError(
-        f"the outline at height {cut.asked_mm:g} mm is {outline[0].length_mm:.2f} mm long, the nominal {profile.length_mm:.2f} mm: "
-        "this is no section of the part. Check the height, the normal, the unit of the surface and the scale of the nominal"
-    )
-
-
 def _refuse_outline(judged: tuple[Contour, ...], refusal: RegistrationError) -> RunOutcome:
     count = _points_in(judged)
     counts = Counts(received=count, rejected=count, rejected_by_reason={"not registered": count})
@@ -328,17 +314,10 @@ def _points_in(contours: tuple[Contour, ...]) -> int:
     return sum(len(contour.points_mm) for contour in contours)
 
 
-def _outline(cut: SurfaceSection) -> tuple[Contour, ...]:
-    """The contours that make the section's outline."""
-    outer = cut.outer()
-    if not outer or outer[0].closed:
-        return outer[:1]
-    return tuple(contour for contour in outer if not contour.closed)
-
-
-def _warnings(cut: SurfaceSection, outline: tuple[Contour, ...], run: RunOutcome) -> Iterator[str]:
+def _warnings(cut: SurfaceSection, outline: Outline, run: RunOutcome) -> Iterator[str]:
     yield from cut.warnings
-    beside = [contour for contour in cut.contours if not any(contour is part for part in outline)]
+    yield from outline.notes
+    beside = [contour for contour in cut.contours if not any(contour is part for part in outline.contours)]
     if beside:
         holes = sum(contour.hole for contour in beside)
         longest = beside[0].length_mm

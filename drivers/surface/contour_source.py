@@ -55,6 +55,7 @@ class SurfaceSection:
     set_aside  : pieces below the limit (dust, noise shells), counted; set_aside_mm (k,) their lengths, longest first
     gaps       : one for each open contour
     branches_mm : (b, 3) where more than two segments meet
+    overlaps_mm : (k, 3) one place for each pair of closed contours that cross or coincide
     triangles  : how many the plane cuts
     cutter     : what cut them: "open3d 0.20.0" or "numpy"
     warnings   : everything that is not as it should be, in sentences
@@ -68,12 +69,13 @@ class SurfaceSection:
     set_aside_mm: NDArray[np.float64]
     gaps: tuple[Gap, ...]
     branches_mm: NDArray[np.float64]
+    overlaps_mm: NDArray[np.float64]
     triangles: int
     cutter: str
     warnings: tuple[str, ...]
 
     def __post_init__(self) -> None:
-        for array in (self.set_aside_mm, self.branches_mm):
+        for array in (self.set_aside_mm, self.branches_mm, self.overlaps_mm):
             array.setflags(write=False)
 
     def outer(self) -> tuple[Contour, ...]:

@@ -1,7 +1,8 @@
 """Loose segments of many sections to ordered contours: welded, chained, told apart, and nothing closed in silence.
 
 All sections of a batch are chained at once, by array operations and three passes of scipy's compiled graph routines.
-Where more than two segments meet (a branch) the chain is cut and the place reported; where a chain ends (a gap) it stays open.
+Where more than two segments meet (a branch) the place is reported, and the lines go on as branches.py says; where a chain ends
+(a gap) it stays open. Which closed chains are holes, nesting.py tells.
 """
 
 from dataclasses import dataclass
@@ -12,6 +13,10 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, depth_first_order
 from scipy.spatial import KDTree
 
+from drivers.surface.branches import ends_that_go_on
+from drivers.surface.nesting import nest
+
+_ROUNDED = 4.0  # steps of float32, in which surfaces are stored: shells that touch may reach so far into each other by rounding
 _DUST_SHARE = 0.05  # of the longest piece; specks of a few voxels and the shells that noise makes stay well below
 
 
@@ -21,7 +26,7 @@ class Chain:
 
     section_mm : (m, 2); a closed one does not repeat its first point. Closed outer contours run counter-clockwise, holes
                  clockwise; open chains have no sense of direction.
-    hole       : closed, and inside an odd number of other closed contours
+    hole       : closed, inside an odd number of other closed contours, and crossing none
     length_mm  : with the closing piece, where it is closed
     """
 
@@ -39,6 +44,7 @@ class ChainedSection:
     set_aside_mm         : lengths of the closed and open pieces below the limit (dust, noise shells), longest first
     set_aside_open       : how many of them are open
     branches_mm          : (b, 2) where more than two segments meet
+    overlaps_mm          : (k, 2) one place for each pair of closed chains that cross or coincide: neither is a hole
     zero_length, repeated : segments left out because they were shorter than the weld, or there twice
     """
 
@@ -46,6 +52,7 @@ class ChainedSection:
     set_aside_mm: NDArray[np.float64]
     set_aside_open: int
     branches_mm: NDArray[np.float64]
+    overlaps_mm: NDArray[np.float64]
     zero_length: int
     repeated: int
 
@@ -81,16 +88,19 @@ def chain_sections(
     zero = np.bincount(plane[~moved], minlength=planes)
     kept = np.bincount(plane_of[edges[:, 0]], minlength=planes)
     repeated = np.bincount(plane[moved], minlength=planes) - kept + np.bincount(pieces.doubled_plane, minlength=planes)
+    tie_mm = max(weld_mm, _ROUNDED * float(np.spacing(np.float32(np.abs(nodes_mm).max(initial=0.0)))))
+    nested = [_nest([(nodes, closed) for at, nodes, closed in pieces.kept if at == index], tie_mm) for index in range(planes)]
     return [
         ChainedSection(
-            chains=_nest([(nodes, closed) for at, nodes, closed in pieces.kept if at == index]),
+            chains=chains,
             set_aside_mm=np.sort(pieces.aside_mm[pieces.aside_plane == index])[::-1],
             set_aside_open=int(np.count_nonzero(pieces.aside_open[pieces.aside_plane == index])),
             branches_mm=nodes_mm[branches[plane_of[branches] == index]],
+            overlaps_mm=overlaps_mm,
             zero_length=int(zero[index]),
             repeated=int(repeated[index]),
         )
-        for index in range(planes)
+        for index, (chains, overlaps_mm) in enumerate(nested)
     ]
 
 
@@ -137,13 +147,17 @@ def _join_ends(nodes_mm: NDArray[np.float64], plane: NDArray[np.intp], edges: ND
 
 
 def _split_branches(graph: _Graph, degree: NDArray[np.intp]) -> _Graph:
-    """Give every edge that ends in a branch its own copy of the node, so that only lines and rings remain."""
+    """Give every edge that ends in a branch its own copy of the node, and one copy to two that go on: only lines and rings remain."""
     at = np.flatnonzero(degree[graph.edges.ravel()] > 2)
     if not len(at):
         return graph
     ends = graph.edges.flatten()
-    old = ends[at]
-    ends[at] = len(graph.nodes_mm) + np.arange(len(at))
+    old, copies = ends[at], len(graph.nodes_mm) + np.arange(len(at))
+    direction = graph.nodes_mm[ends[at ^ 1]] - graph.nodes_mm[old]  # at ^ 1 is the other end of the same edge
+    ends[at] = copies
+    _, label = connected_components(_adjacency(ends.reshape(-1, 2), len(graph.nodes_mm) + len(at)), directed=False)
+    for one, other in ends_that_go_on(old, label[copies].astype(np.intp), direction):
+        ends[at[other]] = copies[one]
     nodes_mm = np.concatenate([graph.nodes_mm, graph.nodes_mm[old]])
     return _Graph(nodes_mm, np.concatenate([graph.plane, graph.plane[old]]), ends.reshape(-1, 2))
 
@@ -182,9 +196,8 @@ def _order(graph: _Graph, planes: int, shortest_mm: float | None) -> _Pieces:
     aside = there & ~keep
     kept = []
     for walk in _walk(graph, label, keep):
-        piece, nodes = label[walk[0]], np.take(graph.nodes_mm, walk, axis=0)
-        through_branch = len(nodes) > 3 and np.array_equal(nodes[0], nodes[-1])  # closed in truth, at a place that is reported
-        kept.append((int(section[piece]), nodes[:-1] if through_branch else nodes, bool(ring[piece]) or through_branch))
+        piece = label[walk[0]]
+        kept.append((int(section[piece]), np.take(graph.nodes_mm, walk, axis=0), bool(ring[piece])))
     return _Pieces(kept, length[aside], section[aside], ~ring[aside], section[doubled])
 
 
@@ -213,13 +226,13 @@ def _walk(graph: _Graph, label: NDArray[np.int32], keep: NDArray[np.bool_]) -> l
     return np.split(walk, np.flatnonzero(np.diff(label[walk])) + 1)
 
 
-def _nest(pieces: list[tuple[NDArray[np.float64], bool]]) -> tuple[Chain, ...]:
-    """Tell holes from outer contours, turn each the agreed way round, longest first."""
+def _nest(pieces: list[tuple[NDArray[np.float64], bool]], tie_mm: float) -> tuple[tuple[Chain, ...], NDArray[np.float64]]:
+    """Tell holes from outer contours, turn each the agreed way round; return them longest first, and where they overlap (k, 2)."""
     rings = [nodes for nodes, closed in pieces if closed]
-    holes = [sum(_encloses(other, nodes[0]) for other in rings if other is not nodes) % 2 == 1 for nodes in rings]
-    chains = [_ring(nodes, hole) for nodes, hole in zip(rings, holes, strict=True)]
+    nesting = nest(rings, tie_mm)
+    chains = [_ring(nodes, hole) for nodes, hole in zip(rings, nesting.hole.tolist(), strict=True)]
     chains += [_line(nodes) for nodes, closed in pieces if not closed]
-    return tuple(sorted(chains, key=lambda chain: -chain.length_mm))
+    return tuple(sorted(chains, key=lambda chain: -chain.length_mm)), nesting.overlaps_mm
 
 
 def _ring(nodes: NDArray[np.float64], hole: bool) -> Chain:
@@ -237,12 +250,3 @@ def _line(nodes: NDArray[np.float64]) -> Chain:
     """Start a line at the end with the larger x."""
     nodes = nodes[::-1].copy() if tuple(nodes[0]) < tuple(nodes[-1]) else nodes
     return Chain(nodes, False, False, float(_distances(nodes[:-1], nodes[1:]).sum()))
-
-
-def _encloses(ring: NDArray[np.float64], point: NDArray[np.float64]) -> bool:
-    """Tell whether the ring runs round the point: a ray towards +x then crosses it an odd number of times."""
-    x, y = (ring - point).T
-    next_x, next_y = np.roll(x, -1), np.roll(y, -1)
-    crosses = (y >= 0) != (next_y >= 0)
-    side = x[crosses] * next_y[crosses] - next_x[crosses] * y[crosses]
-    return bool(np.count_nonzero((side > 0) == (next_y[crosses] > y[crosses])) % 2)

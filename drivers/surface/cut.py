@@ -282,6 +282,7 @@ def _section(chained: ChainedSection, axes: SectionAxes, asked: float, height: f
         set_aside_mm=chained.set_aside_mm,
         gaps=gaps,
         branches_mm=branches,
+        overlaps_mm=axes.machine_mm(chained.overlaps_mm, height),
         triangles=triangles,
         cutter=cutter,
         warnings=(),
@@ -295,7 +296,7 @@ def _gap(points_mm: NDArray[np.float64]) -> Gap:
 
 
 def _warnings(chained: ChainedSection, section: SurfaceSection) -> Iterator[str]:
-    gaps, branches = section.gaps, section.branches_mm
+    gaps, branches, overlaps = section.gaps, section.branches_mm, section.overlaps_mm
     if section.height_mm != section.asked_mm:
         yield f"facets lie in the plane at {section.asked_mm:g} mm: it was moved by {section.height_mm - section.asked_mm:+.2g} mm"
     if not section.contours:
@@ -306,6 +307,9 @@ def _warnings(chained: ChainedSection, section: SurfaceSection) -> Iterator[str]
     if len(branches):
         places = "; ".join(_place(branch) for branch in branches[:_NAMED])
         yield f"more than two segments meet at {len(branches)} place(s): {places}{_rest_of(len(branches))}"
+    if len(overlaps):
+        places = "; ".join(_place(overlap) for overlap in overlaps[:_NAMED])
+        yield f"{len(overlaps)} pair(s) of contours overlap, and none of them is taken for a hole: at {places}{_rest_of(len(overlaps))}"
     if chained.repeated:
         yield f"{chained.repeated} segment(s) were there twice (facets given twice, or folded): one of each was kept"
     if chained.set_aside_open:

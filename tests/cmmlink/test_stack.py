@@ -25,7 +25,7 @@ from tests.drivers.surface.ct_phantom import (
     write_spline,
     write_stl,
 )
-from tests.drivers.surface.meshes import binary_stl, box, tube, write
+from tests.drivers.surface.meshes import Triangles, binary_stl, box, tube, write
 
 VOXEL = 0.1
 DEFECT = Defect(height_mm=0.1, station_mm=40.0, part_height_mm=2.0)
@@ -165,6 +165,72 @@ def test_a_surface_of_another_part_is_refused(tmp_path: Path, blade: tuple[Path,
     mesh = write(tmp_path / "box.stl", binary_stl(box((0, 0, 0), (60, 60, 20))))
     with pytest.raises(RegistrationError, match=r"240\.00 mm long, the nominal 124\.\d+ mm: this is no section of the part"):
         inspect(plan_of(mesh, blade[1], {"heights_mm": (5.0, 10.0)}))
+
+
+def blade_with(tmp_path: Path, spline: BSpline, *others: Triangles) -> SectionOutcome:
+    mesh = write(tmp_path / "mesh.stl", binary_stl(np.concatenate([*others, tube(outline_points(spline), np.array([0.0, 20.0]))])))
+    (section,) = inspect(plan_of(mesh, write_spline(spline, tmp_path / "n.yaml"), {"heights_mm": (5.0,)})).sections
+    return section
+
+
+def outline_points(spline: BSpline, points: int = 600) -> NDArray[np.float64]:
+    return np.asarray(spline(np.linspace(0, 1, points)))
+
+
+def length_mm(points_mm: NDArray[np.float64]) -> float:
+    return float(np.linalg.norm(points_mm - np.roll(points_mm, 1, axis=0), axis=1).sum())
+
+
+def circle(radius: float, centre: NDArray[np.float64], points: int = 120) -> NDArray[np.float64]:
+    angle = 2 * np.pi * np.arange(points) / points
+    return np.asarray(centre + radius * np.column_stack([np.cos(angle), np.sin(angle)]))
+
+
+def test_a_part_in_a_tube_is_judged_and_the_tube_is_not(tmp_path: Path, spline: BSpline) -> None:
+    middle = outline_points(spline).mean(axis=0)
+    heights = np.array([0.0, 20.0])
+    walls = [tube(circle(50.0, middle), heights), tube(circle(48.0, middle), heights)]
+    section = blade_with(tmp_path, spline, *walls)
+    assert section.verdict is Verdict.CONFORM
+    (outline,) = section.judged
+    assert outline.length_mm == pytest.approx(length_mm(outline_points(spline)), abs=1e-3)
+    assert [contour.hole for contour in section.slice.contours] == [False, True, False]
+
+
+@pytest.mark.parametrize("corner", [0, 1, 300, 599])
+def test_a_pin_that_touches_the_blade_at_a_corner_does_not_hide_it(tmp_path: Path, spline: BSpline, corner: int) -> None:
+    blade = outline_points(spline)
+    out = blade[corner] - blade.mean(axis=0)
+    away = out / np.linalg.norm(out)
+    side = np.array([-away[1], away[0]])
+    pin = blade[corner] + np.array([[0, 0], [6, -6], [12, 0], [6, 6]]) @ np.array([away, side])
+    section = blade_with(tmp_path, spline, tube(pin, np.array([0.0, 20.0])))
+    assert section.verdict is Verdict.CONFORM
+    assert section.judged[0].length_mm == pytest.approx(length_mm(blade), abs=1e-3)
+    assert not any(contour.hole for contour in section.slice.contours)
+
+
+def test_a_shell_that_overlaps_the_blade_is_told_and_the_blade_is_judged(tmp_path: Path, spline: BSpline) -> None:
+    top = outline_points(spline)[150]
+    section = blade_with(tmp_path, spline, box((top[0] - 1, top[1] - 1, -1), (top[0] + 1, top[1] + 9, 21)))
+    assert section.verdict is Verdict.CONFORM
+    assert section.judged[0].length_mm == pytest.approx(length_mm(outline_points(spline)), abs=1e-3)
+    assert any("1 pair(s) of contours overlap, and none of them is taken for a hole" in text for text in section.warnings)
+
+
+def test_a_round_bar_as_long_around_as_the_blade_is_not_taken_for_it(tmp_path: Path, spline: BSpline) -> None:
+    around = length_mm(outline_points(spline))
+    bar = tube(circle(1.02 * around / (2 * np.pi), np.array([200.0, 0.0])), np.array([0.0, 20.0]))
+    section = blade_with(tmp_path, spline, bar)
+    assert section.verdict is Verdict.CONFORM
+    assert section.judged[0].length_mm == pytest.approx(around, abs=1e-3)
+
+
+def test_two_parts_on_one_surface_are_told(tmp_path: Path, spline: BSpline) -> None:
+    second = tube(outline_points(spline) + np.array([0.0, 100.0]), np.array([0.0, 20.0]))
+    section = blade_with(tmp_path, spline, second)
+    assert len(section.judged) == 1
+    assert any("2 contours at height 5 mm can be the section of the part" in text for text in section.warnings)
 
 
 def test_one_section_that_fits_nothing_does_not_spoil_the_others(tmp_path: Path, spline: BSpline) -> None:

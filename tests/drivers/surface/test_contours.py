@@ -111,6 +111,94 @@ def test_two_rings_that_touch_are_two_rings_and_a_reported_place() -> None:
     assert [chain.closed for chain in found.chains] == [True, True]
 
 
+def rectangle(x: tuple[float, float], y: tuple[float, float]) -> Array:
+    return np.array([[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]])
+
+
+def kinds(found: ChainedSection) -> list[tuple[bool, bool, float]]:
+    return [(chain.closed, chain.hole, round(chain.length_mm, 6)) for chain in found.chains]
+
+
+@pytest.mark.parametrize("turn_deg", [0, 90, 180, 270, 33])
+@pytest.mark.parametrize("seed", range(3))
+def test_squares_that_touch_at_a_corner_are_two_outer_contours(turn_deg: int, seed: int) -> None:
+    turn = np.radians(turn_deg)
+    rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    segments = np.concatenate([closed(rectangle((0, 4), (0, 4))), closed(rectangle((4, 5), (-1, 0)))]) @ rotation.T
+    found = chain(shuffled(segments, seed))
+    assert kinds(found) == [(True, False, 16.0), (True, False, 4.0)]
+    assert len(found.branches_mm) == 1
+    assert len(found.overlaps_mm) == 0
+
+
+def test_a_square_that_touches_a_side_of_another_is_outer_outside_and_a_hole_inside() -> None:
+    large, beside, within = rectangle((0, 4), (0, 4)), rectangle((4, 5), (1, 2)), rectangle((3, 4), (1, 2))
+    assert kinds(chain(np.concatenate([closed(large), closed(beside)]))) == [(True, False, 16.0), (True, False, 4.0)]
+    assert kinds(chain(np.concatenate([closed(large), closed(within)]))) == [(True, False, 16.0), (True, True, 4.0)]
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        (((0, 4), (0, 4)), ((3, 5), (1, 2))),  # a corner within
+        (((0, 4), (0, 4)), ((0.5, 4.5), (1, 2))),  # most of it within
+        (((0, 4), (1, 2)), ((1, 2), (0, 3))),  # a cross: no corner lies in the other
+        (((0, 4), (0, 4)), ((0, 4), (2, 6))),  # sides on one another
+    ],
+)
+def test_contours_that_overlap_are_told_and_are_no_holes(
+    one: tuple[tuple[float, float], tuple[float, float]], other: tuple[tuple[float, float], tuple[float, float]]
+) -> None:
+    first, second = rectangle(*one), rectangle(*other)
+    found = chain(np.concatenate([closed(first), closed(second)]))
+    assert [(chain.closed, chain.hole) for chain in found.chains] == [(True, False)] * 2
+    assert len(found.overlaps_mm) == 1
+    assert np.all(found.overlaps_mm[0] >= np.maximum(first.min(axis=0), second.min(axis=0)))
+    assert np.all(found.overlaps_mm[0] <= np.minimum(first.max(axis=0), second.max(axis=0)))
+
+
+def test_a_small_overlap_of_fine_rings_is_found_and_a_touch_within_rounding_is_none() -> None:
+    left = ring(10.0, points=2000)
+    for depth, overlaps in ((1e-3, 1), (1e-6, 0), (-1e-3, 0)):
+        right = ring(5.0, points=2000, centre=(15.0 - depth, 0.0))
+        found = chain(np.concatenate([closed(left), closed(right)]))
+        assert [chain.hole for chain in found.chains] == [False, False]
+        assert len(found.overlaps_mm) == overlaps
+
+
+@pytest.mark.parametrize("corner", range(0, 40, 7))
+def test_a_ring_touched_by_pins_at_any_of_its_corners_stays_one_ring(corner: int) -> None:
+    part = ring(10.0)
+    pins = []
+    for at in (corner, (corner + 13) % 40):  # two touches cut the ring in two
+        pin = ring(2.0, points=12, centre=tuple(1.2 * part[at]))
+        pin[int(np.argmin(np.linalg.norm(pin, axis=1)))] = part[at]
+        pins.append(pin)
+    found = chain(shuffled(np.concatenate([closed(part), *map(closed, pins)]), corner))
+    assert [chain.closed for chain in found.chains] == [True] * 3
+    assert not any(chain.hole for chain in found.chains)
+    assert found.chains[0].length_mm == pytest.approx(40 * 2 * 10 * np.sin(np.pi / 40), abs=1e-9)
+    assert len(found.chains[0].section_mm) == 40
+
+
+def test_a_part_that_touches_the_tube_around_it_at_two_places_keeps_its_outline() -> None:
+    tube_in, tube_out = ring(20.0, points=80), ring(22.0, points=80)
+    angle = 2 * np.pi * np.arange(60) / 60
+    part = np.column_stack([20.0 * np.cos(angle), 6.0 * np.sin(angle)])  # corners 0 and 30 are corners 0 and 40 of the tube
+    part[0], part[30] = tube_in[0], tube_in[40]
+    found = chain(shuffled(np.concatenate([closed(part), closed(tube_in), closed(tube_out)]), 7))
+    lengths = [np.linalg.norm(each - np.roll(each, 1, axis=0), axis=1).sum() for each in (tube_out, tube_in, part)]
+    assert [(chain.closed, chain.hole) for chain in found.chains] == [(True, False), (True, True), (True, False)]
+    assert [chain.length_mm for chain in found.chains] == pytest.approx(lengths, abs=1e-9)
+    assert len(found.branches_mm) == 2
+
+
+def test_a_ring_with_all_its_corners_on_another_is_told_by_the_middles_of_its_sides() -> None:
+    outer = ring(10.0, points=16)
+    found = chain(np.concatenate([closed(outer), closed(0.999999 * outer[::4])]))
+    assert [chain.hole for chain in found.chains] == [False, True]
+
+
 def test_repeated_segments_count_once_and_are_told() -> None:
     segments = closed(ring(10.0))
     found = chain(np.concatenate([segments, segments[5:8], segments[5:6, ::-1]]))
