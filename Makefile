@@ -20,8 +20,9 @@ test: .venv/test-installed
 
 # The lowest versions that pyproject.toml allows, on Python 3.11 and without the extras, must pass the fast tests.
 LOWEST_PYTHON ?= python3.11
+SLOW_TESTS := tests/integration tests/docs tests/cmmlink/console/test_console_browser.py
 lowest: .venv/lowest/installed
-	.venv/lowest/bin/python -m pytest -n 2 $(FAST_TESTS)
+	.venv/lowest/bin/python -m pytest -n 2 $(SLOW_TESTS:%=--ignore=%)
 
 # For every system of the README the versions of constraints.txt must exist as wheels.
 platforms: .venv/test-installed

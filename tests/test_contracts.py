@@ -13,6 +13,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 import cmmlink
 import inspection
@@ -149,6 +151,19 @@ def test_every_library_that_is_imported_is_declared() -> None:
         if (found := {name for name in imported_by(path) if name and brought.get(name, name) not in known})
     }
     assert undeclared == {}
+
+
+@pytest.mark.parametrize(("file", "extras"), [("constraints.txt", ("open3d", "test", "bench")), (".ci/lowest.txt", ("test",))])
+def test_the_versions_that_are_installed_lie_within_the_ranges_that_are_declared(file: str, extras: tuple[str, ...]) -> None:
+    """`make upgrade` writes both files anew."""
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    project = settings["project"]
+    lines = [*settings["build-system"]["requires"], *settings["dependency-groups"]["build"], *project["dependencies"]]
+    lines += [line for extra in extras for line in project["optional-dependencies"][extra]]
+    pinned = [Requirement(line) for line in (ROOT / file).read_text(encoding="utf-8").splitlines()]
+    here = {one.name: str(one.specifier).removeprefix("==") for one in pinned if one.marker is None or one.marker.evaluate()}
+    wanted = [one for one in map(Requirement, lines) if one.marker is None or one.marker.evaluate()]
+    assert [str(one) for one in wanted if not one.specifier.contains(here[canonicalize_name(one.name)], prereleases=True)] == []
 
 
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
