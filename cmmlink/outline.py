@@ -11,6 +11,7 @@ from inspection import NominalProfile, RegistrationError
 
 _LENGTHS_APART = 1.5  # a noisy surface lengthens an outline by a tenth at most
 _LEAST_OPEN = 0.5  # of the nominal's length: open pieces that make less are whiskers beside a part, not a torn part
+_LONGEST = 20.0  # times the nominal: open pieces, or the outline of a whole part whose nominal is one side of it, stay well below
 _DIRECTIONS = 180
 
 
@@ -45,7 +46,7 @@ def outline_of(cut: SurfaceSection, profile: NominalProfile) -> Outline:
     outer = cut.outer()
     open_pieces = tuple(contour for contour in outer if not contour.closed)
     if not goes_round(profile.curve):
-        return Outline(open_pieces if outer and not outer[0].closed else outer[:1])
+        return _unless_endless(cut, open_pieces if outer and not outer[0].closed else outer[:1], profile)
     nominal = _shape(_points_on(profile), profile.length_mm)
     closed = [(_shape(contour.section_mm, contour.length_mm).apart(nominal), contour) for contour in outer if contour.closed]
     closed.sort(key=lambda candidate: candidate[0])
@@ -54,8 +55,15 @@ def outline_of(cut: SurfaceSection, profile: NominalProfile) -> Outline:
         return Outline((alike[0],), _several(cut, alike))
     longest_is_open = bool(outer) and not outer[0].closed
     if longest_is_open or _LEAST_OPEN < sum(piece.length_mm for piece in open_pieces) / profile.length_mm < _LENGTHS_APART:
-        return Outline(open_pieces)
+        return _unless_endless(cut, open_pieces, profile)
     return Outline(outer[:1], refusal=_other_part(cut, outer[0], profile) if outer else None)
+
+
+def _unless_endless(cut: SurfaceSection, contours: tuple[Contour, ...], profile: NominalProfile) -> Outline:
+    """Refuse what is far longer than the nominal: a corner far off draws a contour out beyond all bounds."""
+    if sum(contour.length_mm for contour in contours) <= _LONGEST * profile.length_mm:
+        return Outline(contours)
+    return Outline(contours, refusal=_other_part(cut, contours[0], profile))
 
 
 def _several(cut: SurfaceSection, alike: list[Contour]) -> tuple[str, ...]:

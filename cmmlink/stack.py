@@ -38,6 +38,7 @@ from drivers.surface import (
     add_points_between,
     cut_surface,
     height_range_mm,
+    read_obj,
     read_stl,
 )
 from inspection import NominalProfile, RegistrationError, SectionPlane, Verdict
@@ -187,12 +188,14 @@ def _read(plan: CtPlan, open3d: Callable[[], Open3DProcess]) -> SurfaceMesh:
     suffix = path.suffix.lower()
     if suffix == ".stl":
         return read_stl(path, scale)
-    if suffix not in (".ply", ".obj"):
+    if suffix == ".obj":
+        return read_obj(path, scale)
+    if suffix != ".ply":
         raise PlanError(f"{path}: no surface file is known by the suffix '{suffix}'; expected .stl, .ply or .obj")
     try:
         return open3d().read(path, scale)
     except Open3DMissing as error:
-        raise PlanError(f"{path}: {suffix[1:].upper()} is read by Open3D. {error}. Or export the surface as STL") from None
+        raise PlanError(f"{path}: PLY is read by Open3D. {error}. Or export the surface as STL") from None
 
 
 def _heights(plan: CtPlan, mesh: SurfaceMesh) -> list[float]:
@@ -281,7 +284,9 @@ def _inspect(plan: CtPlan, cut: SurfaceSection, profiles: _Profiles, clock: Call
     path, profile = profiles.at(cut.asked_mm)
     outline = outline_of(cut, profile)
     spacing_mm = profile.length_mm / _LEAST_POINTS
-    judged = tuple(add_points_between(contour, spacing_mm) for contour in outline.contours)
+    judged = outline.contours
+    if outline.refusal is None:  # what cannot be the part may be long beyond all bounds
+        judged = tuple(add_points_between(contour, spacing_mm) for contour in judged)
     run = _refuse_outline(judged, outline.refusal) if outline.refusal else _run(plan, cut, judged, profile, clock, stop)
     warnings = list(_warnings(cut, outline, run))
     if _points_in(judged) > _points_in(outline.contours):

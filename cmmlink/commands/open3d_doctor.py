@@ -23,7 +23,7 @@ def look_after_open3d(
         found = status()
     say(found.sentence())
     if found.version is None:
-        say("surfaces are cut by numpy, with the same points; PLY and OBJ files need Open3D")
+        say("surfaces are cut by numpy, with the same points; PLY files need Open3D")
     return found.version is not None or not found.installed
 
 

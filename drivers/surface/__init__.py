@@ -5,6 +5,7 @@ Open3D itself is loaded only by the child process of `Open3DProcess`.
 
 from drivers.surface.contour_source import Contour, ContourSource, Gap, SurfaceSection, add_points_between
 from drivers.surface.cut import Cutter, NumpyCutter, cut_surface, height_range_mm
+from drivers.surface.obj_file import read_obj
 from drivers.surface.open3d_process import Open3DMissing, Open3DProcess, Open3DStatus, mend_open3d, open3d_status
 from drivers.surface.section_axes import SectionAxes
 from drivers.surface.stl_file import SurfaceMesh, read_stl, surface_of
@@ -26,6 +27,7 @@ __all__ = [
     "height_range_mm",
     "mend_open3d",
     "open3d_status",
+    "read_obj",
     "read_stl",
     "surface_of",
 ]

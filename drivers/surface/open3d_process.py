@@ -1,8 +1,8 @@
-"""Open3D in a process of its own: it cuts selected triangles and reads PLY and OBJ files.
+"""Open3D in a process of its own: it cuts selected triangles and reads PLY files.
 
 Why a process: importing Open3D stops every thread of a program for a tenth of a second at a time, and `slice_plane` holds the
-interpreter for as long as it runs; acquisition must never wait for either. And a file on which Open3D crashes (a text that is
-no OBJ does it) costs a message and not the run. This is the only file that imports open3d, and only the child does.
+interpreter for as long as it runs; acquisition must never wait for either. And a file on which Open3D crashes
+costs a message and not the run. This is the only file that imports open3d, and only the child does.
 
 The two speak through pipes: a line of JSON, then the bytes of the arrays it announces.
 """
@@ -17,7 +17,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Lock
 from types import ModuleType, TracebackType
@@ -27,7 +27,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.errors import MeshError
-from drivers.surface.stl_file import SurfaceMesh, surface_of
+from drivers.surface.ply_header import faces_announced, header_of, readable
+from drivers.surface.stl_file import SurfaceMesh, rounding_note, surface_of
 
 # Shared libraries that Open3D needs and wheels do not bring, with the package that holds each on Debian/Ubuntu and Fedora.
 LIBRARIES: Final = {
@@ -71,7 +72,7 @@ class Open3DStatus:
 
 
 class Open3DProcess:
-    """A running child with Open3D in it: a `Cutter` for cut.py, and the reader of PLY and OBJ.
+    """A running child with Open3D in it: a `Cutter` for cut.py, and the reader of PLY.
 
     Use as a context manager. Starting returns at once; the first call waits until Open3D is there.
     """
@@ -114,13 +115,12 @@ class Open3DProcess:
         return np.asarray(points[lines][:, :, :2], dtype=np.float64)
 
     def read(self, path: Path, scale: float = 1.0) -> SurfaceMesh:
-        """Read PLY or OBJ, whatever Open3D reads; raises `MeshError` where it yields no triangles or breaks."""
-        if not path.is_file():
-            raise MeshError(f"{path}: there is no such file; check the path")
-        with self._turn:
+        """Read PLY, whatever Open3D reads; raises `MeshError` where it yields no triangles or breaks."""
+        header = header_of(path)
+        with readable(path, header) as file, self._turn:
             loaded = self.status().version is not None
             try:
-                answer, arrays = self._ask({"do": "read", "path": str(path)}, [])
+                answer, arrays = self._ask({"do": "read", "path": str(file)}, [])
             except Open3DMissing as error:
                 if not loaded:
                     raise
@@ -128,7 +128,8 @@ class Open3DProcess:
         if "error" in answer:
             raise MeshError(f"{path}: Open3D cannot read it ({answer['error']}); export the surface again, or as STL")
         vertices, triangles = arrays
-        return surface_of(_corners(vertices * scale, triangles, path), str(path), path.suffix[1:].upper())
+        mesh = surface_of(_corners(vertices * scale, triangles, path, faces_announced(header)), str(path), "PLY")
+        return replace(mesh, warnings=rounding_note(mesh, scale) if vertices.dtype == np.float32 else ())
 
     def _ask(self, request: dict[str, Any], arrays: list[NDArray[Any]]) -> tuple[dict[str, Any], list[NDArray[Any]]]:
         status = self.status()
@@ -220,9 +221,14 @@ def _mending_command(missing: tuple[str, ...], which: Callable[[str], str | None
     return None
 
 
-def _corners(vertices: NDArray[np.floating], triangles: NDArray[np.integer], path: Path) -> NDArray[np.floating]:
+def _corners(vertices: NDArray[np.floating], triangles: NDArray[np.integer], path: Path, faces: int) -> NDArray[np.floating]:
     if not len(triangles):
-        raise MeshError(f"{path}: no triangle was found in it; is it a point cloud, or truncated? Export the surface again, or as STL")
+        if faces == 0:
+            raise MeshError(f"{path}: a point cloud: its header announces no faces. Export the surface as triangles")
+        raise MeshError(
+            f"{path}: its header announces {faces} faces, but Open3D reads no triangle from it: is it truncated? "
+            "Export the surface again, or as STL"
+        )
     if triangles.min() < 0 or triangles.max() >= len(vertices):
         bad = int(np.flatnonzero((triangles < 0).any(axis=1) | (triangles >= len(vertices)).any(axis=1))[0])
         raise MeshError(

@@ -7,7 +7,7 @@ the count at byte 80, whatever its header says: many binary files begin with the
 
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import FileIO
 from pathlib import Path
 from typing import Final
@@ -29,6 +29,10 @@ _KEYWORDS: Final = {
 }  # fmt: skip
 _CORNER_WORDS: Final = (8, 9, 10, 12, 13, 14, 16, 17, 18)
 _SOLID_LINES: Final = re.compile(rb"^[ \t]*(?:end[ \t]*)?solid\b[^\r\n]*", re.MULTILINE)
+_COMMENTS: Final = re.compile(rb"^[ \t]*(?:#|//|;|!|%)[^\r\n]*", re.MULTILINE)
+_FIRST_SOLID: Final = re.compile(rb"^[ \t]*solid\b", re.MULTILINE | re.IGNORECASE)
+_START_BYTES: Final = 4096  # words before `solid` are looked for so far
+_STEP_TOLD_MM: Final = 1e-3  # steps of float32 are that long from 16,384 mm on
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,25 +66,70 @@ def read_stl(path: Path, scale: float = 1.0) -> SurfaceMesh:
 
     Raises `MeshError` for a file that is empty, truncated, no STL, or holds numbers that cannot be a part in mm.
     """
-    if not (np.isfinite(scale) and scale > 0):
-        raise MeshError(f"scale {scale}: how many mm one unit of the file is must be a positive number")
-    try:
-        with path.open("rb") as file:
-            size = file.seek(0, 2)
-            file.seek(0)
-            head = file.read(HEADER_BYTES)
-            text = file.seek(0) == 0 and _looks_like_text(head)
-    except OSError as error:
-        raise MeshError(f"{path}: cannot be read ({error.strerror or error}); check the path and its permissions") from error
+    checked_scale(scale)
+    size, start = _size_and_start(path)
+    head = start[:HEADER_BYTES]
     if size == 0:
         raise MeshError(f"{path}: the file is empty (0 bytes); export the surface again")
     promised = int.from_bytes(head[80:84], "little") if size >= HEADER_BYTES else None
     if promised is not None and size == HEADER_BYTES + RECORD.itemsize * promised:
-        return _check(lambda: _binary_pieces(path, promised, scale), str(path), "binary STL")
-    if text:
+        mesh = _check(lambda: _binary_pieces(path, promised, scale), str(path), "binary STL")
+        return replace(mesh, warnings=rounding_note(mesh, scale))
+    if _looks_like_text(start):
         corners, warnings = _text_corners(path)
         return surface_of(corners * scale, str(path), "ASCII STL", warnings)
     raise MeshError(_why_no_stl(path, size, promised))
+
+
+def checked_scale(scale: float) -> None:
+    """Raise `MeshError` for a scale that is no positive number."""
+    if not (np.isfinite(scale) and scale > 0):
+        raise MeshError(f"scale {scale}: how many mm one unit of the file is must be a positive number")
+
+
+def refuse_endless(path: Path) -> None:
+    """Raise `MeshError` for what is there and is no file on disk: opening a pipe waits for ever, a device never ends."""
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise MeshError(f"{path}: a pipe or a device, not a file; copy the surface into a file first")
+
+
+def read_whole(path: Path) -> bytes:
+    """Return the bytes of a file. Raises `MeshError` for what cannot be read, and for an empty file."""
+    try:
+        refuse_endless(path)
+        content = path.read_bytes()
+    except OSError as error:
+        raise _unreadable(path, error) from error
+    if not content:
+        raise MeshError(f"{path}: the file is empty (0 bytes); export the surface again")
+    return content
+
+
+def _unreadable(path: Path, error: OSError) -> MeshError:
+    return MeshError(f"{path}: cannot be read ({error.strerror or error}); check the path and its permissions")
+
+
+def _size_and_start(path: Path) -> tuple[int, bytes]:
+    try:
+        refuse_endless(path)
+        with path.open("rb") as file:
+            size = file.seek(0, 2)
+            file.seek(0)
+            return size, file.read(_START_BYTES)
+    except OSError as error:
+        raise _unreadable(path, error) from error
+
+
+def rounding_note(mesh: SurfaceMesh, scale: float) -> tuple[str, ...]:
+    """Say by how much float32 rounds coordinates so far from the origin, where that is no longer small beside a tolerance."""
+    largest_mm = float(max(np.abs(mesh.lower_mm).max(), np.abs(mesh.upper_mm).max()))
+    step_mm = float(np.spacing(np.float32(largest_mm / scale))) * scale
+    if step_mm < _STEP_TOLD_MM:
+        return ()
+    return (
+        f"coordinates reach {largest_mm:.6g} mm, and float32, in which they were stored, knows only steps of {step_mm:.2g} mm there: "
+        "every corner may be rounded by so much. Export the surface near the origin",
+    )
 
 
 def surface_of(corners_mm: NDArray[np.floating], source: str, kind: str, warnings: tuple[str, ...] = ()) -> SurfaceMesh:
@@ -131,8 +180,14 @@ def _complaint(corners: NDArray[np.floating], first: int, source: str, binary: b
     )
 
 
-def _looks_like_text(head: bytes) -> bool:
-    return head.removeprefix(b"\xef\xbb\xbf").lstrip()[:5].lower() == b"solid" and b"\0" not in head
+def _looks_like_text(start: bytes) -> bool:
+    """Tell an ASCII file by a line that begins with `solid`; comments, a title or empty lines may stand before it."""
+    return b"\0" not in start and _FIRST_SOLID.search(_without_mark(start)) is not None
+
+
+def _without_mark(text: bytes) -> bytes:
+    """Overwrite the byte order mark of UTF-8 with blanks."""
+    return text.replace(b"\xef\xbb\xbf", b"   ")
 
 
 def _why_no_stl(path: Path, size: int, promised: int | None) -> str:
@@ -176,10 +231,12 @@ def _read_all(file: FileIO, buffer: memoryview, path: Path) -> None:
 def _text_corners(path: Path) -> tuple[NDArray[np.float64], tuple[str, ...]]:
     """Read an ASCII file in pieces that end at an `endfacet`; return corners (n, 3, 3), and warnings of what was odd."""
     pieces: list[NDArray[np.float64]] = [np.empty((0, 3, 3))]
-    count, offset, rest, commas = 0, 0, b"", False
+    count, offset, rest, commas, before = 0, 0, b"", False, 0
     with path.open("rb") as file:
         while chunk := file.read(_TEXT_CHUNK_BYTES):
             text = rest + chunk.lower()
+            if not pieces[1:] and not rest:
+                text, before = _blank_start(text)
             cut = text.rfind(b"endfacet")
             cut = 0 if cut < 0 else cut + len(b"endfacet")
             if cut:
@@ -192,15 +249,29 @@ def _text_corners(path: Path) -> tuple[NDArray[np.float64], tuple[str, ...]]:
         place = offset + len(left.rstrip()) - len(left.split()[-1])
         raise MeshError(f"{path}: the text breaks off in triangle {count + 1} (byte {place}); export or copy the file again")
     warnings: tuple[str, ...] = ("decimal commas were read as decimal points",) if commas else ()
+    if before:
+        warnings += (f"{before} line(s) before `solid` are no triangles and were left out",)
     if b"endsolid" not in rest.replace(b" ", b""):
         warnings += ("the text ends without endsolid; every triangle in it is whole",)
     return np.concatenate(pieces), warnings
 
 
+def _blank_start(text: bytes) -> tuple[bytes, int]:
+    """Overwrite what stands before the first `solid` with blanks; return how many lines of words that were as well."""
+    text = _without_mark(text)
+    solid = _FIRST_SOLID.search(text)
+    start = solid.start() if solid else 0
+    return b" " * start + text[start:], sum(bool(line.strip()) for line in text[:start].splitlines())
+
+
 def _blank_solid_lines(text: bytes) -> bytes:
-    """Overwrite `solid NAME` and `endsolid NAME` with blanks, so that every other byte keeps its place."""
-    text = text.replace(b"\xef\xbb\xbf", b"   ")
-    return _SOLID_LINES.sub(lambda line: b" " * len(line.group()), text) if b"solid" in text else text
+    """Overwrite `solid NAME`, `endsolid NAME` and comments with blanks, so that every other byte keeps its place."""
+    text = _without_mark(text)
+    if b"solid" in text:
+        text = _SOLID_LINES.sub(lambda line: b" " * len(line.group()), text)
+    if any(mark in text for mark in (b"#", b"//", b";", b"!", b"%")):
+        text = _COMMENTS.sub(lambda line: b" " * len(line.group()), text)
+    return text
 
 
 def _facets(text: bytes, first: int, offset: int, source: str) -> NDArray[np.float64]:

@@ -226,6 +226,32 @@ def test_a_round_bar_as_long_around_as_the_blade_is_not_taken_for_it(tmp_path: P
     assert section.judged[0].length_mm == pytest.approx(around, abs=1e-3)
 
 
+@pytest.mark.parametrize("torn", [False, True])
+def test_a_corner_far_off_costs_no_points_out_of_proportion(tmp_path: Path, spline: BSpline, torn: bool) -> None:
+    triangles = tube(circle(20.0, np.zeros(2)), np.array([0.0, 20.0]))
+    if torn:
+        triangles = triangles[4:]
+    triangles[10 if torn else 0, 0, 0] = 9e5
+    mesh = write(tmp_path / "far.stl", binary_stl(triangles))
+    plan = plan_of(mesh, write_spline(spline, tmp_path / "n.yaml"), {"heights_mm": (5.0,)})
+    with pytest.raises(RegistrationError, match="this is no section of the part"):
+        inspect(plan)
+
+
+def test_a_blade_as_obj_is_judged_as_the_same_blade_as_stl_and_needs_no_open3d(
+    tmp_path: Path, spline: BSpline, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cmmlink.stack.Open3DProcess", None)
+    triangles = tube(outline_points(spline), np.array([0.0, 20.0]))
+    rows = [f"v {x!r} {y!r} {z!r}" for x, y, z in triangles.reshape(-1, 3).tolist()]
+    rows += ["l 1 900", "p 1", *(f"f {3 * i + 1} {3 * i + 2} {3 * i + 3}" for i in range(len(triangles)))]
+    mesh = write(tmp_path / "blade.obj", "\n".join(rows))
+    stack = inspect(plan_of(mesh, write_spline(spline, tmp_path / "n.yaml"), {"heights_mm": (5.0,)}))
+    assert stack.verdict is Verdict.CONFORM
+    assert stack.sections[0].judged[0].length_mm == pytest.approx(length_mm(outline_points(spline)), abs=1e-9)
+    assert "only faces are a surface; left out: 1 lines (l), 1 points (p)" in stack.result_json()["notes"]
+
+
 def test_two_parts_on_one_surface_are_told(tmp_path: Path, spline: BSpline) -> None:
     second = tube(outline_points(spline) + np.array([0.0, 100.0]), np.array([0.0, 20.0]))
     section = blade_with(tmp_path, spline, second)

@@ -1,11 +1,13 @@
 """STL files, good and bad: each bad kind gives one error with its place, or a stated warning; none gives an empty surface."""
 
+import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from drivers.errors import MeshError
+from drivers.surface.obj_file import read_obj
 from drivers.surface.stl_file import SurfaceMesh, read_stl
 from tests.drivers.surface.meshes import Triangles, ascii_stl, binary_stl, box, write
 
@@ -74,6 +76,30 @@ def test_the_scale_turns_the_files_unit_into_mm(tmp_path: Path) -> None:
             read_stl(path, scale)
 
 
+@pytest.mark.parametrize(
+    "before", ["# exported by a test\n", "\n\n; made by hand\n", "// one\n// two\n", "A title of any words\n", "\ufeff# marked\n"]
+)
+def test_lines_before_solid_are_left_out_and_told(tmp_path: Path, before: str) -> None:
+    text = ascii_stl(CUBE).replace("\n  outer loop", "\n# a comment\n  outer loop", 1) + "# the end\n"
+    mesh = read_stl(write(tmp_path / "cube.stl", before + text))
+    assert np.array_equal(corners_of(mesh), CUBE)
+    lines = len([line for line in before.split("\n") if line.strip()])
+    assert mesh.warnings == (f"{lines} line(s) before `solid` are no triangles and were left out",)
+
+
+@pytest.mark.parametrize(
+    ("far", "scale", "step"), [(1e5, 1.0, 2.0**-7), (9e5, 1.0, 2.0**-4), (4000.0, 25.4, 25.4 * 2.0**-12), (16384.0, 1.0, 2.0**-9)]
+)
+def test_the_rounding_of_float32_far_from_the_origin_is_told(tmp_path: Path, far: float, scale: float, step: float) -> None:
+    moved = CUBE + np.array([far - 10, 0, 0])  # float32 has 24 bits: the step at 2**16 to 2**17 is 2**-7
+    (note,) = read_stl(write(tmp_path / "far.stl", binary_stl(moved)), scale).warnings
+    assert f"knows only steps of {step:.2g} mm there" in note
+
+
+def test_near_the_origin_nothing_is_said_of_rounding(tmp_path: Path) -> None:
+    assert read_stl(write(tmp_path / "near.stl", binary_stl(CUBE + 8000.0))).warnings == ()
+
+
 # The kinds of bad files -----------------------------------------------------------------------------------------------
 
 
@@ -83,6 +109,14 @@ def test_a_missing_file(tmp_path: Path) -> None:
 
 def test_a_folder(tmp_path: Path) -> None:
     assert "cannot be read" in refusal(tmp_path)
+
+
+def test_a_pipe_is_refused_at_once(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.stl")
+    assert "a pipe or a device, not a file" in refusal(tmp_path / "pipe.stl")
+    os.mkfifo(tmp_path / "pipe.obj")
+    with pytest.raises(MeshError, match="a pipe or a device, not a file"):
+        read_obj(tmp_path / "pipe.obj")
 
 
 def test_an_empty_file(tmp_path: Path) -> None:
