@@ -11,8 +11,8 @@ import numpy as np
 from cmmlink.errors import PlanError
 from cmmlink.events import RunStarted
 from cmmlink.nominal_files import NominalFile, load_nominal, material_side
-from cmmlink.plan import CtPlan, Datum, Discretisation, Nominal, Plan, Registration, place_of
-from inspection import FitName, LiveInspection, Method, NominalProfile, RigidTransform, SectionPlane, discretize
+from cmmlink.plan import CtPlan, Datum, Discretisation, Nominal, Plan, place_of
+from inspection import FitName, LiveInspection, Method, NominalProfile, RigidTransform, RuleName, SectionPlane, WeightName, discretize
 
 
 def check_plan(plan: Plan, plan_file: Path) -> NominalProfile:
@@ -63,7 +63,7 @@ def inspection_of(plan: Plan, profile: NominalProfile) -> LiveInspection:
     return LiveInspection(
         profile,
         plan.tolerance.zone,
-        **_fitting(plan.registration),
+        **_fitting(plan),
         tip_radius_mm=plan.probe.tip_radius_mm,
         section=SectionPlane(np.array(section.origin_mm), np.array(section.x_axis), np.array(section.normal)),
         off_section_max_mm=section.off_plane_max_mm,
@@ -72,26 +72,37 @@ def inspection_of(plan: Plan, profile: NominalProfile) -> LiveInspection:
 
 def section_inspection_of(plan: CtPlan, profile: NominalProfile, plane: SectionPlane) -> LiveInspection:
     """A fresh inspection of one section of a surface, whose points are all there from the start."""
-    return LiveInspection(profile, plan.tolerance.zone, **_fitting(plan.registration), section=plane, provisional=False)
+    return LiveInspection(profile, plan.tolerance.zone, **_fitting(plan), section=plane, provisional=False)
 
 
 class _Fitting(TypedDict):
-    """What a plan says of the registration, as LiveInspection takes it."""
+    """What a plan says of the registration and of the verdict, as LiveInspection takes it."""
 
     datum: RigidTransform | None
     fit: FitName
     method: Method
     coverage_min: float
     reject_outliers: bool
+    rule: RuleName
+    weights: WeightName
+    gap_max_mm: float | None
+    end_allowance_mm: float | None
+    allow_unseen_mm: float | None
 
 
-def _fitting(registration: Registration) -> _Fitting:
+def _fitting(plan: Plan | CtPlan) -> _Fitting:
+    registration = plan.registration
     return {
         "datum": pose_of(registration.datum),
         "fit": registration.fit,
         "method": registration.method,
         "coverage_min": registration.coverage_min,
         "reject_outliers": registration.reject_outliers,
+        "rule": plan.rule,
+        "weights": plan.weights,
+        "gap_max_mm": plan.gap_max_mm,
+        "end_allowance_mm": plan.end_allowance_mm,
+        "allow_unseen_mm": plan.allow.unseen_mm,
     }
 
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from cmmlink.buffer import Buffer
 from cmmlink.events import Arrived, Counts, Ending, Event, Judged, RunFinished, RunStarted, Sink
-from drivers import Arrival, Damaged, DeviceError, Lost, PointBatch, Rejected, ScanSource
-from inspection import InspectionError, InspectionResult, LiveInspection, Rejection, Verdict
+from drivers import HARMLESS_REASONS, Arrival, Damaged, DeviceError, Lost, PointBatch, Rejected, ScanClosed, ScanOpened, ScanSource
+from inspection import InspectionError, InspectionResult, LiveInspection, Missing, Rejection, Verdict
 
 _LOOK_S = 0.05  # how often the run looks whether it was asked to stop
 _MOST_AT_ONCE = 4096  # points judged at once when many wait; more would keep the sinks waiting for news
@@ -44,6 +44,7 @@ class _Tally:
     rejected_by_driver: Counter[str] = field(default_factory=Counter)
     lost: int = 0
     damaged_bytes: int = 0
+    announced: int | None = None
 
     def add(self, arrival: Arrival) -> None:
         if isinstance(arrival, PointBatch):
@@ -55,6 +56,16 @@ class _Tally:
             self.lost += arrival.count
         elif isinstance(arrival, Damaged):
             self.damaged_bytes += arrival.byte_count
+        elif isinstance(arrival, ScanOpened) and arrival.expected is not None:
+            self.announced = max(self.announced or 0, arrival.expected)
+        elif isinstance(arrival, ScanClosed) and arrival.sent is not None:
+            self.announced = max(self.announced or 0, arrival.sent)
+
+    def missing(self) -> Missing:
+        """What is known to be missing of the scan. A point that came twice, or is not of the scan, is not."""
+        harmless = sum(count for reason, count in self.rejected_by_driver.items() if reason in HARMLESS_REASONS)
+        rejected = {reason: count for reason, count in self.rejected_by_driver.items() if reason not in HARMLESS_REASONS}
+        return Missing(self.lost, self.damaged_bytes, rejected, self.announced, self.received - harmless)
 
     def counts(self, judged: int, rejected_by_reason: dict[str, int], buffer: "Buffer[tuple[float, Arrival]]") -> Counts:
         reasons = Counter(self.rejected_by_driver)
@@ -101,7 +112,7 @@ def run_inspection(
             reader.join()
     failure = failures[0] if failures else None
     ending: Ending = "interrupted" if failure else "aborted" if stop.is_set() else "complete"
-    result, refusal = _finish(live, ending)
+    result, refusal = _finish(live, ending, tally.missing())
     judged, reasons = (result.judged, result.rejected_by_reason) if result else (0, _reasons_without_pose(live))
     counts = tally.counts(judged, reasons, buffer)
     _publish(sinks, RunFinished(ending, result, counts, str(failure or refusal or "")))
@@ -179,10 +190,10 @@ def _reasons_without_pose(live: LiveInspection) -> dict[str, int]:
     return reasons | ({"not registered": left} if left else {})
 
 
-def _finish(live: LiveInspection, ending: Ending) -> tuple[InspectionResult | None, InspectionError | None]:
+def _finish(live: LiveInspection, ending: Ending, missing: Missing) -> tuple[InspectionResult | None, InspectionError | None]:
     """The result of a run. What the operator aborted proves nothing, whatever was out by then: the part may have slipped."""
     try:
-        result = live.finish(complete=ending == "complete")
+        result = live.finish(complete=ending == "complete", missing=missing)
     except InspectionError as error:
         return None, error
     return (replace(result, verdict=Verdict.UNCERTAIN) if ending == "aborted" else result), None

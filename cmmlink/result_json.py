@@ -22,17 +22,27 @@ def result_json(result: InspectionResult | None, counts: Counts) -> dict[str, An
         "min_deviation_mm": number(result.min_deviation_mm),
         "rms_mm": number(result.rms_mm),
         "profile_error_mm": number(result.profile_error_mm),
+        "zone_error_mm": number(result.zone_error_mm),
+        "best_fit_error_mm": number(result.best_fit_error_mm),
+        "minimum_zone_mm": number(result.minimum_zone_mm),
         "worst": _worst(result),
+        "reasons": [{"kind": reason.kind, "words": reason.words} for reason in result.reasons],
+        "rule": result.rule,
         "fit": result.fit,
+        "target_mm": result.zone.middle_mm,
+        "weights": result.weights,
         "method": result.method,
         "registration": _registration(result.registration),
         "stretches": [{"from_mm": s.from_mm, "to_mm": s.to_mm, "worst_mm": s.worst_mm} for s in result.stretches],
         "coverage": result.coverage,
+        "largest_gap_mm": result.gap.length_mm,
+        "largest_gap": _gap(result),
         "complete": result.complete,
         "tolerance": {
             "lower_mm": result.zone.lower_mm,
             "upper_mm": result.zone.upper_mm,
             "uncertainty_mm": result.zone.uncertainty_mm,
+            "decision_rule": result.zone.decision_rule,
         },
         **tail,
     }
@@ -55,12 +65,21 @@ _NOTHING: Mapping[str, Any] = {
     "min_deviation_mm": None,
     "rms_mm": None,
     "profile_error_mm": None,
+    "zone_error_mm": None,
+    "best_fit_error_mm": None,
+    "minimum_zone_mm": None,
     "worst": None,
+    "reasons": [],
+    "rule": None,
     "fit": None,
+    "target_mm": None,
+    "weights": None,
     "method": None,
     "registration": None,
     "stretches": [],
     "coverage": 0.0,
+    "largest_gap_mm": None,
+    "largest_gap": None,
     "complete": False,
     "tolerance": None,
 }
@@ -69,6 +88,11 @@ _NOTHING: Mapping[str, Any] = {
 def number(value: float) -> float | None:
     """A number as JSON can hold it: None when it is not finite."""
     return float(value) if math.isfinite(value) else None
+
+
+def _gap(result: InspectionResult) -> dict[str, float]:
+    gap = result.gap
+    return {"from_mm": gap.from_mm, "to_mm": gap.to_mm, "allowed_mm": result.gap_max_mm, "could_hide_mm": gap.could_hide_mm}
 
 
 def _worst(result: InspectionResult) -> dict[str, float] | None:

@@ -56,6 +56,23 @@ class Zone(_Json):
     lower_mm: float = Field(description="the lower limit of the deviation")
     upper_mm: float = Field(description="the upper limit of the deviation")
     uncertainty_mm: float = Field(description="the expanded uncertainty of one deviation")
+    decision_rule: str = Field(description="how the uncertainty counts, in words; simple acceptance where none was stated")
+
+
+class LargestGap(_Json):
+    """The longest stretch of the profile without a judged point."""
+
+    from_mm: float = Field(description="the station at which it begins")
+    to_mm: float = Field(description="the station at which it ends; below from_mm where it crosses the seam of a closed profile")
+    allowed_mm: float = Field(description="the longest gap that counts as measured")
+    could_hide_mm: float = Field(description="how far the nominal stands off the straight line across it: so much could be missing unseen")
+
+
+class VerdictReason(_Json):
+    """One reason of the verdict."""
+
+    kind: str = Field(description="what kind of reason it is, like missing or gap; these words never change")
+    words: str = Field(description="the reason as a sentence")
 
 
 class Inspected(_Json):
@@ -71,12 +88,21 @@ class Inspected(_Json):
     min_deviation_mm: float | None = Field(description="the smallest deviation")
     rms_mm: float | None = Field(description="the root mean square of the deviations")
     profile_error_mm: float | None = Field(description="2 * max |deviation|; not the range from smallest to largest")
+    zone_error_mm: float | None = Field(description="2 * max |deviation - middle of the zone|; inside the zone up to the zone's width")
+    best_fit_error_mm: float | None = Field(description="zone_error_mm at the best fit; null where nothing was fitted so")
+    minimum_zone_mm: float | None = Field(description="zone_error_mm at the minimum zone; null where it was not needed")
     worst: Worst | None = Field(description="the point farthest from the middle of the zone")
+    reasons: list[VerdictReason] = Field(description="why the verdict is what it is, the most important first; none for conform")
+    rule: str | None = Field(description="what decided: minimum-zone, best-fit, or datum where the pose was known")
+    target_mm: float | None = Field(description="the deviation that every fit aims at: the middle of the zone")
+    weights: str | None = Field(description="how points counted in the best fit: arc-length or points")
     fit: str | None = Field(description="how the pose was found: best-fit, minimum-zone, or none")
     method: str | None = Field(description="how deviations were found, like exact")
     registration: Registered | None = Field(description="how the section lies on the nominal")
     stretches: list[OutStretch] = Field(description="the contiguous stretches out of tolerance, in the order of their stations")
     coverage: float = Field(description="the share of the nominal's length that was measured, from 0 to 1")
+    largest_gap_mm: float | None = Field(description="the longest stretch of the profile without a judged point")
+    largest_gap: LargestGap | None = Field(description="where that stretch is, and what it could hide")
     complete: bool = Field(description="whether the scan came to its end")
     tolerance: Zone | None = Field(description="the tolerance that was applied")
     rejected_by_reason: dict[str, int] = Field(description="the number of rejected points for each reason that occurred")

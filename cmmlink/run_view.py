@@ -367,13 +367,7 @@ def _reason_of(ended: Ended, verdict: Verdict | None, coverage_min: float) -> st
         return f"{_points(result['out_of_tolerance'])} out of tolerance{places}"
     if verdict is Verdict.CONFORM:
         return f"all {_points(result['judged'])} within tolerance"
-    if not result["judged"]:
-        return "no point could be judged"
-    if result["coverage"] < coverage_min:
-        return f"only {result['coverage']:.1%} measured, {coverage_min:.1%} needed"
-    if outliers := result["rejected_by_reason"].get("outlier"):
-        return f"{_points(outliers)} rejected as outliers, not judged"
-    return "too close to a limit for the uncertainty"
+    return result["reasons"][0]["words"] if result["reasons"] else "the scan was cut short"
 
 
 def _points(count: int) -> str:

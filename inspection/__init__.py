@@ -5,22 +5,25 @@ This is the front door: an application imports what `__all__` lists and none of 
 
 from inspection import synthetic
 from inspection.coarse import register_coarse
+from inspection.conclusion import Missing, Reason
 from inspection.curve import NurbsCurve
 from inspection.curve_check import CurveCheck, Hollow, check_curve
 from inspection.deviations import Deviations, deviations, profile_error_mm
 from inspection.errors import InspectionError, NominalError, NotMeasured, RegistrationError
 from inspection.fine import register, register_fine
+from inspection.gaps import Gap, coverage, default_gap_max_mm
 from inspection.kernels import compiled_code_folder, while_compiling
 from inspection.live import LiveInspection, LiveUpdate, State, rehearse
-from inspection.methods import Method
+from inspection.methods import Method, WeightName
 from inspection.minimum_zone import MinimumZone, fit_minimum_zone
 from inspection.nominal import Material, NominalProfile, discretize
+from inspection.placements import PlacementProof, PlacementSearch
 from inspection.registration import Registration
-from inspection.result import NOT_JUDGED, InspectionResult, JudgedRows, Rejection, Stretch, coverage
+from inspection.result import NOT_JUDGED, InspectionResult, JudgedRows, Rejection, Stretch
 from inspection.rigid import RigidTransform
 from inspection.section import SectionPlane
 from inspection.self_crossings import Crossing, find_crossings
-from inspection.terms import FitName
+from inspection.terms import FitName, RuleName
 from inspection.tolerance import ToleranceZone, Verdict
 
 __all__ = [
@@ -29,6 +32,7 @@ __all__ = [
     "CurveCheck",
     "Deviations",
     "FitName",
+    "Gap",
     "Hollow",
     "InspectionError",
     "InspectionResult",
@@ -38,22 +42,29 @@ __all__ = [
     "Material",
     "Method",
     "MinimumZone",
+    "Missing",
     "NominalError",
     "NominalProfile",
     "NotMeasured",
     "NurbsCurve",
+    "PlacementProof",
+    "PlacementSearch",
+    "Reason",
     "Registration",
     "RegistrationError",
     "Rejection",
     "RigidTransform",
+    "RuleName",
     "SectionPlane",
     "State",
     "Stretch",
     "ToleranceZone",
     "Verdict",
+    "WeightName",
     "check_curve",
     "compiled_code_folder",
     "coverage",
+    "default_gap_max_mm",
     "deviations",
     "discretize",
     "find_crossings",

@@ -1,15 +1,16 @@
 """Algorithm 3 of Hari Ganesh & Samuel (2022), and what a partial scan needs beyond it.
 
 Published: the oriented bounding boxes are brought together, their diagonal points choose between the two ways round, and the
-result is tuned on dominant points. Added: arc-length weights, so that the axes do not depend on how densely points lie. Added
-for scans that cover only a part of the profile: their turning angle as a function of arc length is slid along that of the
-nominal, in both scan directions (Arkin et al. 1991; Wolfson 1990).
+result is tuned on dominant points. Added: a walk along the contour with arc-length weights, so that neither the order of the
+points nor how densely they lie changes a pose. Added for scans that cover only a part of the profile: their turning angle as a
+function of arc length is slid along that of the nominal, in both directions (Arkin et al. 1991; Wolfson 1990).
 """
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike, NDArray
 
+from inspection.contour_order import Contour, trace_contour
 from inspection.deviations import check_points
 from inspection.errors import RegistrationError
 from inspection.frame import Frame, arc_length_weights, dominant_points, principal_frame
@@ -24,7 +25,8 @@ FEWEST_POINTS = 8  # three unknowns, and something left to judge
 _SIGNATURE_STEPS = 400  # of the nominal's length; a chord of the signature spans four of them
 _CHORD_STEPS = 4
 _SIGNATURE_POSES = 4  # best shifts kept for each scan direction
-_MOST_POINTS = 4000  # more are thinned: a coarse pose does not need them
+_CELLS_A_STEP = 4  # the points in a cell of this share of a step are one point of the walk
+_NEAR = 2.0  # sizes of the nominal from the median of the points: no point of the same part lies farther away
 _SCORED_POINTS = 500
 
 
@@ -61,19 +63,29 @@ def check_registrable(points_mm: ArrayLike) -> Array:
 
 def coarse_poses(points_mm: Array, nominal: NominalProfile) -> list[RigidTransform]:
     """Candidate poses: those of the boxes, the published one first, then those at the best shifts of the turning angle."""
-    points = points_mm[:: max(1, len(points_mm) // _MOST_POINTS)]
-    scanned = is_in_scan_order(points)
-    weights = arc_length_weights(points, nominal.curve.closed) if scanned else None
+    return poses_of_contour(contour_of(points_mm, nominal), nominal)
+
+
+def poses_of_contour(contour: Contour, nominal: NominalProfile) -> list[RigidTransform]:
+    """Candidate poses of a measured contour."""
     nominal_frame = principal_frame(nominal.points_mm, arc_length_weights(nominal.points_mm, nominal.curve.closed))
-    poses = list(align_boxes(principal_frame(points, weights), nominal_frame))
-    poses[0] = tune_on_dominant_points(points, poses[0], nominal)
-    return poses + (_signature_poses(points, nominal) if scanned else [])
+    poses = list(align_boxes(principal_frame(contour.points_mm, contour.weights_mm), nominal_frame))
+    poses[0] = tune_on_dominant_points(contour.points_mm, poses[0], nominal)
+    return poses + _signature_poses(contour.walk_mm, nominal)
 
 
-def is_in_scan_order(points_mm: Array) -> bool:
-    """Whether neighbours in the sequence are neighbours in space, as on a scan. Points in any other order have no arc length."""
-    steps = np.hypot(*np.diff(points_mm, axis=0).T)
-    return bool(np.median(steps) < 0.1 * np.hypot(*np.ptp(points_mm, axis=0)))
+def contour_of(points_mm: Array, nominal: NominalProfile) -> Contour:
+    """A bounded number of points that stand for the scan in any order and density.
+
+    Points that are too far from the others to be of the same part are left out, so that no single number costs memory or time.
+    """
+    away = np.abs(points_mm - np.median(points_mm, axis=0)).max(axis=1)
+    near = points_mm[away <= _NEAR * nominal.size_mm]
+    contour = trace_contour(near, nominal.length_mm / (_SIGNATURE_STEPS * _CELLS_A_STEP))
+    if len(contour.points_mm) >= FEWEST_POINTS:
+        return contour
+    few = points_mm[np.lexsort(points_mm.T)][:: max(1, len(points_mm) // FEWEST_POINTS)]  # all in a few cells
+    return Contour(few, np.ones(len(few)), np.arange(len(few)))
 
 
 def align_boxes(measured: Frame, nominal: Frame) -> tuple[RigidTransform, RigidTransform]:

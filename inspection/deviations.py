@@ -68,7 +68,9 @@ def deviations(points_mm: ArrayLike, nominal: NominalProfile, method: Method = "
     """Signed deviations of points (m, 2) given in the nominal's coordinates.
 
     tip_radius_mm : the points are centres of a probing ball of this radius; deviation = distance of the centre - radius
-                    along the normal at the foot. Raises ValueError when the ball does not fit into the profile's hollows.
+                    along the normal at the foot. Where a hollow of the profile is tighter than the ball, no centre has its foot
+                    on the bottom: that stretch stays unmeasured. Raises ValueError for a radius that no ball has,
+                    and for a ball that fits nowhere.
     """
     points = check_points(points_mm)
     check_tip_radius(tip_radius_mm, nominal)
@@ -113,9 +115,11 @@ def check_points(points_mm: ArrayLike) -> Array:
 
 
 def check_tip_radius(tip_radius_mm: float, nominal: NominalProfile) -> None:
-    """Raise ValueError when a ball of this radius cannot touch the whole profile."""
-    if not 0 <= tip_radius_mm < nominal.smallest_concave_radius_mm:
+    """Raise ValueError for a radius that no ball has, or one that fits nowhere into the profile."""
+    if not 0 <= tip_radius_mm < np.inf:
+        raise ValueError(f"tip radius {tip_radius_mm:g} mm: must be a finite number, zero or more")
+    widest = float((nominal.curvature * nominal.outward).min())  # the least hollow place
+    if widest * tip_radius_mm >= 1:
         raise ValueError(
-            f"tip radius {tip_radius_mm:g} mm: must be zero or more and below the nominal's smallest concave radius, "
-            f"{nominal.smallest_concave_radius_mm:.4g} mm"
+            f"tip radius {tip_radius_mm:g} mm: the ball touches the profile nowhere, whose widest hollow has {1 / widest:.4g} mm"
         )

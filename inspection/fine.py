@@ -12,11 +12,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inspection.coarse import check_registrable, coarse_poses, trimmed_mean_square
+from inspection.coarse import check_registrable, contour_of, poses_of_contour, trimmed_mean_square
+from inspection.contour_order import Contour
 from inspection.deviations import feet_on
+from inspection.gaps import station_weights
 from inspection.kernels import OutlierLimit, PoseEstimate, PoseFit, project
 from inspection.kernels.layout import OPEN_END
-from inspection.methods import Method
+from inspection.methods import Method, WeightName
 from inspection.nominal import NominalProfile
 from inspection.registration import Registration
 from inspection.rigid import RigidTransform, best_motion
@@ -31,7 +33,8 @@ _ICP_TOLERANCE = 1e-6  # relative change of the mean square; the paper states no
 _OUTLIER_MADS = 6.0  # median absolute deviations beyond which Tukey's weight is zero and a point an outlier
 _ROBUST_STEPS = 40
 _SETTLED_WEIGHTS_MM = 1e-6
-_SCOUTS = 400  # points that rank coarse poses
+_WEIGHINGS = 2  # the weights follow from the pose, and the pose from them: after the second time they stay within rounding
+_SCOUTS = 400  # points of the walk along the contour that rank coarse poses
 _CLOSE_RMS = 3.0  # poses within this factor of the best rms are compared on all points: the trimmed score of 400 points can miss an edge
 _SCOUT_STEPS = 12  # a pose from which more are needed is not the one sought
 _EQUAL_RMS = 1.1  # other poses within this factor of the best rms are rivals
@@ -46,17 +49,20 @@ def register(
     tip_radius_mm: float = 0.0,
     robust: bool = False,
     gross_mm: float = 0.0,
+    target_mm: float = 0.0,
+    weights: WeightName = "points",
 ) -> Registration:
     """Coarse then fine registration of section points (m, 2).
 
     Every coarse pose is refined on a few points; those near the best of them are refined on all points. Poses of symmetric parts
-    that fit equally well are reported as `rivals`. `robust` finds gross outliers first and leaves them out, see register_fine.
-    Raises RegistrationError for too few points.
+    that fit equally well are reported as `rivals`. `robust` finds gross outliers first and leaves them out; `target_mm` and `weights`
+    say what the fit aims at and how points count in it: see register_fine. Raises RegistrationError for too few points.
     """
     points = check_registrable(points_mm)
-    ranked = ranked_poses(points, nominal, tip_radius_mm)
+    ranked = ranked_poses(points, nominal, tip_radius_mm + target_mm)
     close = [pose for rms, pose in ranked if rms <= _CLOSE_RMS * ranked[0][0]]
-    refined = [register_fine(points, nominal, pose, method, scheme, tip_radius_mm, robust, gross_mm) for pose in close]
+    settings = (method, scheme, tip_radius_mm, robust, gross_mm, target_mm, weights)
+    refined = [register_fine(points, nominal, pose, *settings) for pose in close]
     best = min(refined, key=lambda fit: fit.rms_mm)
     others = _drop_equal_poses([(fit.rms_mm, fit.nominal_from_section) for fit in refined], points)[1:]
     return replace(best, rivals=tuple(pose for rms, pose in others if rms <= _EQUAL_RMS * best.rms_mm))
@@ -68,8 +74,10 @@ def ranked_poses(points_mm: ArrayLike, nominal: NominalProfile, tip_radius_mm: f
     The ratio of the first two says how clearly the points determine the pose.
     """
     points = check_registrable(points_mm)
-    few = points[:: max(1, len(points) // _SCOUTS)]
-    return _drop_equal_poses([_scout_pose(few, nominal, pose, tip_radius_mm) for pose in _promising_poses(few, points, nominal)], points)
+    contour = contour_of(points, nominal)
+    few = contour.points_mm[:: max(1, len(contour.points_mm) // _SCOUTS)]
+    poses = _promising_poses(few, contour, nominal)
+    return _drop_equal_poses([_scout_pose(few, nominal, pose, tip_radius_mm) for pose in poses], points)
 
 
 def _drop_equal_poses(scored: list[tuple[float, RigidTransform]], points: Array) -> list[tuple[float, RigidTransform]]:
@@ -83,9 +91,9 @@ def _drop_equal_poses(scored: list[tuple[float, RigidTransform]], points: Array)
     return distinct
 
 
-def _promising_poses(few: Array, points: Array, nominal: NominalProfile) -> list[RigidTransform]:
+def _promising_poses(few: Array, contour: Contour, nominal: NominalProfile) -> list[RigidTransform]:
     """The six best coarse poses."""
-    poses = coarse_poses(points, nominal)
+    poses = poses_of_contour(contour, nominal)
     scores = np.array([trimmed_mean_square(few, pose, nominal) for pose in poses])
     order = np.argsort(scores, kind="stable")[:6]
     return [poses[i] for i in order]
@@ -107,6 +115,8 @@ def register_fine(
     tip_radius_mm: float = 0.0,
     robust: bool = False,
     gross_mm: float = 0.0,
+    target_mm: float = 0.0,
+    weights: WeightName = "points",
 ) -> Registration:
     """Fine registration of section points (m, 2) from a coarse pose. Points beyond open ends take no part.
 
@@ -115,19 +125,34 @@ def register_fine(
     robust : find points farther than 6 median absolute deviations by Tukey weights, then fit the others by least squares, because
              weights alone would bias the pose where form error is systematic; `outliers` of the result says which were found
     gross_mm : points nearer than this are no outliers, however small the deviations of the others are
+    target_mm : the deviation that the fit aims at: the middle of a tolerance zone that is not equally disposed
+    weights : "points" counts every point alike; "arc-length" counts it by how much of the profile it stands for, so that neither
+              dwelling nor a dense side moves the pose (Gauss-Newton only)
     """
     points = check_registrable(points_mm)
     pose = start.nominal_from_section if isinstance(start, Registration) else start
     if scheme == "icp":
-        return _icp(points, nominal, pose, method, tip_radius_mm)
+        return _icp(points, nominal, pose, method, tip_radius_mm + target_mm)
     if scheme != "gauss-newton":
         raise ValueError(f"scheme must be gauss-newton or icp, not {scheme!r}")
-    fit, outliers = _pose_fit(points, nominal, method, tip_radius_mm), np.zeros(len(points), dtype=bool)
+    fit, outliers = _pose_fit(points, nominal, method, tip_radius_mm + target_mm), np.zeros(len(points), dtype=bool)
     if robust:
         outliers = fit.find_outliers(_pose_numbers(pose), OutlierLimit(_OUTLIER_MADS, float(gross_mm), _SETTLED_WEIGHTS_MM), _ROBUST_STEPS)
-        fit = _pose_fit(points[~outliers], nominal, method, tip_radius_mm)
+        fit = _pose_fit(points[~outliers], nominal, method, tip_radius_mm + target_mm)
     found = fit.settle(_pose_numbers(pose), _MOST_STEPS)
+    if weights == "arc-length":
+        for _ in range(_WEIGHINGS):
+            _weigh_by_arc_length(fit, points[~outliers], found, nominal)
+            again = fit.settle(found.pose, _MOST_STEPS)
+            found = again._replace(steps=found.steps + again.steps)
     return _registration(found, found.steps, found.settled, outliers)
+
+
+def _weigh_by_arc_length(fit: PoseFit, points: Array, found: PoseEstimate, nominal: NominalProfile) -> None:
+    """Let every point count by how much of the profile it stands for at the pose found so far."""
+    feet = project(_pose_of(found).apply(points), nominal.grid)
+    counts = fit.weights > 0
+    fit.weights[:] = np.where(counts, station_weights(feet.station_mm, counts & (feet.vertex != OPEN_END), nominal), 0.0)
 
 
 def _icp(points: Array, nominal: NominalProfile, pose: RigidTransform, method: Method, tip_radius_mm: float) -> Registration:

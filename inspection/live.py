@@ -14,7 +14,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inspection.methods import Method
+from inspection.conclusion import Missing
+from inspection.methods import Method, WeightName
 from inspection.nominal import NominalProfile
 from inspection.pose_track import PoseTrack, seek_pose
 from inspection.registration import Registration
@@ -23,7 +24,7 @@ from inspection.rigid import RigidTransform
 from inspection.scan_rows import ScanRows
 from inspection.section import SectionPlane
 from inspection.settled import settle
-from inspection.terms import FitName, Terms
+from inspection.terms import FitName, RuleName, Terms
 from inspection.tolerance import ToleranceZone
 
 Array = NDArray[np.float64]
@@ -67,6 +68,9 @@ class LiveInspection:
     reject_outliers : find gross outliers in the final registration, farther off than six median deviations and half the zone, and
                       reject them. What was rejected was not judged, and from far off a defect looks like dust: conformity is
                       then not proven
+    rule, weights   : what decides where there is no datum, and how points count in the best fit (see `Terms`)
+    gap_max_mm, end_allowance_mm, allow_unseen_mm : what may be unmeasured, lie beyond an open end, or be missing before conformity is
+                      not proven any more (see `Terms`)
     provisional     : False seeks no pose before `finish`, for points that are all there from the start; the result is the same
     """
 
@@ -83,6 +87,11 @@ class LiveInspection:
         off_section_max_mm: float | None = None,
         coverage_min: float = 0.0,
         reject_outliers: bool = False,
+        rule: RuleName = "minimum-zone",
+        weights: WeightName = "arc-length",
+        gap_max_mm: float | None = None,
+        end_allowance_mm: float | None = None,
+        allow_unseen_mm: float | None = None,
         provisional: bool = True,
     ) -> None:
         self._terms = Terms(
@@ -95,6 +104,11 @@ class LiveInspection:
             off_section_max_mm=float("inf") if off_section_max_mm is None else off_section_max_mm,
             coverage_min=coverage_min,
             reject_outliers=reject_outliers,
+            rule=rule,
+            weights=weights,
+            gap_max_mm=gap_max_mm,
+            end_allowance_mm=end_allowance_mm,
+            allow_unseen_mm=allow_unseen_mm,
         )
         self._known_pose = self._terms.known_pose
         self._plane = section or SectionPlane(np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
@@ -149,12 +163,15 @@ class LiveInspection:
         self._judge(0, self._rows.count)
         return self._update(0)
 
-    def finish(self, complete: bool = True) -> InspectionResult:
-        """Register all points together and judge every one at that pose; `complete` is False when the scan was cut short.
+    def finish(self, complete: bool = True, missing: Missing | None = None) -> InspectionResult:
+        """Register all points together, judge every one at that pose, and say the verdict on the part.
+
+        complete : False when the scan was cut short
+        missing  : points that are known to be missing before they came here; None for none
 
         Raises RegistrationError when the points cannot be brought onto the nominal.
         """
-        return settle(self._rows, self._terms, complete)
+        return settle(self._rows, self._terms, complete, missing or Missing())
 
     def _judge(self, first: int, stop: int) -> None:
         """Deviations and verdicts of rows first .. stop - 1 at the pose of this moment, if there is one."""

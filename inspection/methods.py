@@ -11,3 +11,4 @@ inversion  point inversion started at the nearest sample, the published method's
 from typing import Literal
 
 Method = Literal["exact", "circle", "chord", "pcp", "veaw", "inversion"]
+WeightName = Literal["arc-length", "points"]

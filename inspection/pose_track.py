@@ -36,7 +36,7 @@ class PoseTrack:
         self._sums = GrowingSums(self._centre, reach, nominal.length_mm)
         d = deviations(self.pose.apply(points_mm), nominal, tip_radius_mm=terms.tip_radius_mm)
         part = np.where(d.beyond_end, np.int8(NOT_JUDGED), np.int8(0))
-        self._sums.add(d.foot_mm, d.normal, d.deviation_mm, d.station_mm, part)
+        self._sums.add(d.foot_mm, d.normal, d.deviation_mm - terms.target_mm, d.station_mm, part)
         self._can_move_mm: float | None = None  # asked for at most once a batch, and only batches that end a block change it
 
     @property
@@ -47,7 +47,8 @@ class PoseTrack:
     def refine(self, rows: ScanRows, first: int, stop: int) -> None:
         """Take in a block of rows judged at this track's pose."""
         block = slice(first, stop)
-        self._sums.add(rows.foot[block], rows.normal[block], rows.deviation[block], rows.station[block], rows.verdicts[block])
+        off = rows.deviation[block] - self._terms.target_mm
+        self._sums.add(rows.foot[block], rows.normal[block], off, rows.station[block], rows.verdicts[block])
         self._sums.move()
         x, y, angle = self._sums.motion.tolist()
         pose = rotation_about(self._centre, angle, np.array([x, y])).after(self._start)
@@ -78,7 +79,7 @@ class PoseTrack:
 def seek_pose(points_mm: Array, terms: Terms) -> PoseTrack | None:
     """A track from the one pose that fits the points (m, 2) clearly better than any other, None where there is no such pose."""
     try:
-        poses = ranked_poses(points_mm, terms.nominal, terms.tip_radius_mm)
+        poses = ranked_poses(points_mm, terms.nominal, terms.tip_radius_mm + terms.target_mm)
     except RegistrationError:
         return None
     largest_rms = MISFIT * terms.nominal.size_mm
@@ -91,5 +92,5 @@ def seek_pose(points_mm: Array, terms: Terms) -> PoseTrack | None:
 
 
 def _fit_track(points_mm: Array, start: RigidTransform, terms: Terms) -> PoseTrack:
-    registration = register_fine(points_mm, terms.nominal, start, tip_radius_mm=terms.tip_radius_mm)
+    registration = register_fine(points_mm, terms.nominal, start, tip_radius_mm=terms.tip_radius_mm, target_mm=terms.target_mm)
     return PoseTrack(registration, points_mm, terms)

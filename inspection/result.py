@@ -6,6 +6,8 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from inspection.conclusion import Reason
+from inspection.gaps import Gap, gap_lengths
 from inspection.kernels import layout
 from inspection.methods import Method
 from inspection.nominal import NominalProfile
@@ -15,9 +17,6 @@ from inspection.tolerance import ToleranceZone, Verdict
 Array = NDArray[np.float64]
 
 NOT_JUDGED = layout.NOT_JUDGED  # in place of a verdict where a point was rejected, or is not judged yet
-_GAP = 3.0  # a gap of more than this many median spacings is not measured
-_FINEST_GAP = 0.02  # share of the length; gaps below it always count as measured
-_WIDEST_GAP = 0.1  # share of the length; gaps above it never do, however few the points
 
 
 class Rejection(IntEnum):
@@ -28,6 +27,7 @@ class Rejection(IntEnum):
     OFF_SECTION = layout.OFF_SECTION
     BEYOND_END = layout.BEYOND_END
     OUTLIER = layout.OUTLIER
+    IN_HOLLOW = layout.IN_HOLLOW
 
     @property
     def words(self) -> str:
@@ -81,17 +81,32 @@ class JudgedRows:
 class InspectionResult(JudgedRows):
     """The judged profile: its rows, and what they say as a whole.
 
-    verdict  : on the profile; not better than uncertain where the scan was incomplete or outliers were rejected
-    coverage : share of the nominal's length that has points
-    complete : the scan came to its end
+    verdict      : on the part
+    reasons      : why it is that verdict, the most important first; none where the part conforms
+    coverage     : share of the nominal's length that was measured
+    gap          : the longest stretch without a judged point
+    gap_max_mm   : the longest gap that counted as measured
+    complete     : the scan came to its end
+    rule         : what decided: "minimum-zone", "best-fit", or "datum" where the pose was known
+    fit          : the fit at whose pose the deviations are given
+    weights      : how points counted in the best fit
+    best_fit_error_mm : 2 * max |deviation - middle of the zone| at the best fit; NaN where there was none
+    minimum_zone_mm   : width of the minimum zone about the middle of the tolerance zone; NaN where it was not needed
     """
 
     verdict: Verdict
+    reasons: tuple[Reason, ...]
     coverage: float
+    gap: Gap
+    gap_max_mm: float
     complete: bool
     zone: ToleranceZone
     registration: Registration
+    rule: str
     fit: str
+    weights: str
+    best_fit_error_mm: float
+    minimum_zone_mm: float
     method: Method
     stretches: tuple[Stretch, ...]
 
@@ -142,6 +157,12 @@ class InspectionResult(JudgedRows):
         """2 * max |deviation|, not the range; NaN when nothing was judged."""
         return 2 * max(abs(self.max_deviation_mm), abs(self.min_deviation_mm)) if self.judged else float("nan")
 
+    @property
+    def zone_error_mm(self) -> float:
+        """2 * max |deviation - middle of the zone|: the part is inside the zone where this is at most the zone's width."""
+        middle = self.zone.middle_mm
+        return 2 * max(self.max_deviation_mm - middle, middle - self.min_deviation_mm) if self.judged else float("nan")
+
 
 def rejections_by_reason(rejection: NDArray[np.int8]) -> dict[str, int]:
     """Number of points for each reason among the codes of `Rejection` (m,)."""
@@ -149,28 +170,8 @@ def rejections_by_reason(rejection: NDArray[np.int8]) -> dict[str, int]:
     return {reason.words: int(counts[reason]) for reason in Rejection if reason != Rejection.NONE and counts[reason]}
 
 
-def coverage(station_mm: Array, nominal: NominalProfile) -> float:
-    """Share of the nominal's length that judged points at these stations (j,) cover.
-
-    The stretch between two neighbours counts as measured if it is no longer than three median spacings. That limit is never
-    below 2 % of the length and never above 10 % of it.
-    """
-    if not len(station_mm):
-        return 0.0
-    gaps, limit = _gaps(np.sort(station_mm), nominal)
-    return float(np.where(gaps <= limit, gaps, 0.0).sum() / nominal.length_mm)
-
-
-def _gaps(sorted_mm: Array, nominal: NominalProfile) -> tuple[Array, float]:
-    """Distances between neighbouring stations, across the seam or to both ends as well, and the longest that counts as measured."""
-    length = nominal.length_mm
-    closed = nominal.curve.closed
-    gaps = np.diff(np.append(sorted_mm, sorted_mm[0] + length)) if closed else np.diff(np.concatenate([[0.0], sorted_mm, [length]]))
-    return gaps, float(np.clip(_GAP * np.median(gaps), _FINEST_GAP * length, _WIDEST_GAP * length))
-
-
 def stretches(
-    station_mm: Array, deviation_mm: Array, verdicts: NDArray[np.int8], zone: ToleranceZone, nominal: NominalProfile
+    station_mm: Array, deviation_mm: Array, verdicts: NDArray[np.int8], zone: ToleranceZone, nominal: NominalProfile, gap_max_mm: float
 ) -> tuple[Stretch, ...]:
     """Contiguous stretches out of tolerance, in station order, from the stations, deviations and verdicts (j,) of judged points.
 
@@ -181,8 +182,8 @@ def stretches(
     if not out.any():
         return ()
     closed = nominal.curve.closed
-    gaps, limit = _gaps(station_mm[order], nominal)
-    joined = (gaps if closed else gaps[1:]) <= limit  # each with the next; the last of a closed profile with the first
+    gaps = gap_lengths(station_mm[order], nominal)
+    joined = (gaps if closed else gaps[1:]) <= gap_max_mm  # each with the next; the last of a closed profile with the first
     starts = np.flatnonzero(out & ~np.concatenate([[False], out[:-1] & joined[: len(out) - 1]]))
     ends = np.flatnonzero(out & ~np.concatenate([out[1:] & joined[: len(out) - 1], [False]]))
     runs = [order[first : last + 1] for first, last in zip(starts, ends, strict=True)]

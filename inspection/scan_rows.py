@@ -15,7 +15,7 @@ from inspection.terms import Terms
 
 Array = NDArray[np.float64]
 
-_USABLE = (Rejection.NONE, Rejection.BEYOND_END)  # BEYOND_END is among them because it depends on the pose still being sought
+_USABLE = (Rejection.NONE, Rejection.BEYOND_END, Rejection.IN_HOLLOW)  # the last two depend on the pose that is still being sought
 
 
 class ScanRows:

@@ -3,14 +3,17 @@
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
+from inspection.conclusion import Limits
 from inspection.deviations import check_method, check_tip_radius
+from inspection.gaps import default_gap_max_mm
 from inspection.kernels import Judgement
-from inspection.methods import Method
+from inspection.methods import Method, WeightName
 from inspection.nominal import NominalProfile
 from inspection.rigid import RigidTransform
 from inspection.tolerance import ToleranceZone
 
 FitName = Literal["best-fit", "minimum-zone", "none"]
+RuleName = Literal["minimum-zone", "best-fit"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,6 +28,14 @@ class Terms:
     off_section_max_mm : points farther from the plane of the section are rejected; infinite for no limit
     coverage_min       : share of the nominal's length below which conformity is not proven
     reject_outliers    : leave gross outliers out of the fit, and reject them
+    rule               : what decides where there is no datum: "minimum-zone" (a part conforms when any placement passes, ISO 1101),
+                         or "best-fit" (when it passes at the best fit)
+    weights            : how points count in the best fit
+    gap_max_mm         : the longest gap that counts as measured; None for `default_gap_max_mm`, or for no limit where no coverage is
+                         asked for either
+    end_allowance_mm   : how far a point may lie beyond an open end; None for half the zone's width, the circle about the end in which
+                         the zone ends
+    allow_unseen_mm    : the longest stretch that may be unseen although points are known to be missing; None allows none
     judgement          : what of this turns a foot into a verdict, as the compiled loops take it
     """
 
@@ -37,6 +48,11 @@ class Terms:
     off_section_max_mm: float
     coverage_min: float
     reject_outliers: bool
+    rule: RuleName = "minimum-zone"
+    weights: WeightName = "arc-length"
+    gap_max_mm: float | None = None
+    end_allowance_mm: float | None = None
+    allow_unseen_mm: float | None = None
     judgement: Judgement = field(init=False)
 
     def __post_init__(self) -> None:
@@ -44,6 +60,14 @@ class Terms:
         if self.fit not in get_args(FitName):
             raise ValueError(f"fit must be one of {', '.join(get_args(FitName))}, not {self.fit!r}")
         check_method(self.method)
+        if self.rule not in get_args(RuleName):
+            raise ValueError(f"rule must be one of {', '.join(get_args(RuleName))}, not {self.rule!r}")
+        if self.weights not in get_args(WeightName):
+            raise ValueError(f"weights must be one of {', '.join(get_args(WeightName))}, not {self.weights!r}")
+        for name in ("gap_max_mm", "end_allowance_mm", "allow_unseen_mm"):
+            value = getattr(self, name)
+            if value is not None and not value >= 0:
+                raise ValueError(f"{name} must be zero or more, not {value:g}")
         zone = self.zone
         limits = (float(self.tip_radius_mm), float(zone.lower_mm), float(zone.upper_mm), float(zone.uncertainty_mm))
         object.__setattr__(self, "judgement", (self.nominal.outward, *limits))
@@ -52,3 +76,17 @@ class Terms:
     def known_pose(self) -> RigidTransform | None:
         """Where the points lie if that is known beforehand: by the datum, or because none is to be fitted."""
         return RigidTransform.identity() if self.datum is None and self.fit == "none" else self.datum
+
+    @property
+    def target_mm(self) -> float:
+        """The deviation that every fit aims at: the middle of the zone."""
+        return self.zone.middle_mm
+
+    @property
+    def limits(self) -> Limits:
+        """What may be missing before conformity is not proven any more."""
+        stated = self.gap_max_mm is not None
+        measured = self.gap_max_mm if self.gap_max_mm is not None else max(default_gap_max_mm(self.nominal), self.allow_unseen_mm or 0.0)
+        gap = measured if stated or self.coverage_min > 0 else float("inf")
+        end = (self.zone.upper_mm - self.zone.lower_mm) / 2 if self.end_allowance_mm is None else self.end_allowance_mm
+        return Limits(self.coverage_min, measured, gap, end, self.allow_unseen_mm)

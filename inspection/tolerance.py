@@ -49,6 +49,13 @@ class ToleranceZone:
         """Deviation in the middle of the zone."""
         return (self.lower_mm + self.upper_mm) / 2
 
+    @property
+    def decision_rule(self) -> str:
+        """How the uncertainty counts, in words."""
+        if not self.uncertainty_mm:
+            return "U not stated: simple acceptance"
+        return f"ISO 14253-1: conform inside the zone less U, nonconform outside the zone plus U, U = {self.uncertainty_mm:g} mm"
+
     def verdicts(self, deviation_mm: ArrayLike) -> NDArray[np.int8]:
         """Verdict (m,) of each deviation (m,), as the codes of `Verdict`. A limit itself belongs to the zone; NaN is UNCERTAIN."""
         deviation = np.asarray(deviation_mm, dtype=np.float64)

@@ -13,7 +13,10 @@ from rich.console import Console
 
 from cmmlink.commands.console import run_on_page
 from cmmlink.commands.options import (
+    AllowUnseen,
     Closed,
+    EndAllowance,
+    GapMax,
     Headless,
     Json,
     NoBrowser,
@@ -23,7 +26,9 @@ from cmmlink.commands.options import (
     PlanFile,
     Records,
     RejectOutliers,
+    Rule,
     Uncertainty,
+    Weights,
     plan_from_options,
     records_folder,
 )
@@ -48,6 +53,9 @@ _OPTION_OF = {
     "tolerance": "--tolerance",
     "probe.tip_radius_mm": "--tip-radius",
     "registration.coverage_min": "--coverage-min",
+    "gap_max_mm": "--gap-max",
+    "end_allowance_mm": "--end-allowance",
+    "allow.unseen_mm": "--allow-unseen",
     "registration.reject_outliers": "--reject-outliers",
 }
 
@@ -137,6 +145,11 @@ def inspect(
         float, typer.Option(min=0, max=1, metavar="SHARE", help="Share of the nominal to be measured before conform is proven.")
     ] = 0.95,
     reject_outliers: RejectOutliers = False,
+    rule: Rule = "minimum-zone",
+    weights: Weights = "arc-length",
+    gap_max: GapMax = None,
+    end_allowance: EndAllowance = None,
+    allow_unseen: AllowUnseen = None,
     out: Out = None,
     records: Records = None,
     no_record: NoRecord = False,
@@ -150,6 +163,11 @@ def inspect(
         "device": {"type": "file", "file": points},
         "probe": {"tip_radius_mm": tip_radius},
         "registration": {"fit": fit, "method": method, "coverage_min": coverage_min, "reject_outliers": reject_outliers},
+        "rule": rule,
+        "weights": weights,
+        "gap_max_mm": gap_max,
+        "end_allowance_mm": end_allowance,
+        "allow": {"unseen_mm": allow_unseen},
     }
     plan = plan_from_options(Plan, settings, _OPTION_OF)
     profile = profile_of(plan)

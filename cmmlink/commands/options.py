@@ -10,11 +10,31 @@ from pydantic import BaseModel, ValidationError
 from cmmlink.errors import PlanError
 from cmmlink.plan import words_of_allowed
 from cmmlink.record import default_folder
+from inspection import RuleName, WeightName
 
 PlanFile = Annotated[Path, typer.Argument(metavar="PLAN.yaml", help="The inspection plan.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of words.")]
 RejectOutliers = Annotated[
     bool, typer.Option("--reject-outliers", help="Fit without gross outliers and reject them; conform is then not proven.")
+]
+Rule = Annotated[RuleName, typer.Option(help="What decides without a datum: any placement that passes, or the best fit.")]
+Weights = Annotated[WeightName, typer.Option(help="How points count in the best fit.")]
+GapMax = Annotated[
+    float | None,
+    typer.Option(min=0, metavar="MM", help="Longest stretch without a point that counts as measured.", show_default="1 % of the length"),
+]
+EndAllowance = Annotated[
+    float | None,
+    typer.Option(min=0, metavar="MM", help="How far points may lie beyond an open end.", show_default="half the zone"),
+]
+AllowUnseen = Annotated[
+    float | None,
+    typer.Option(
+        min=0,
+        metavar="MM",
+        help="Longest stretch that may be unseen where points were lost, damaged or rejected.",
+        show_default="none may be",
+    ),
 ]
 Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for deviations.csv, result.json and profile.png.")]
 Records = Annotated[Path | None, typer.Option("--records", metavar="DIR", help="Folder of the run records.")]

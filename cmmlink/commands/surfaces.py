@@ -14,7 +14,20 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from typer.core import TyperCommand
 
 from cmmlink.commands.exit_codes import EXIT_OF
-from cmmlink.commands.options import Closed, Json, NominalScale, Out, RejectOutliers, Uncertainty, plan_from_options
+from cmmlink.commands.options import (
+    AllowUnseen,
+    Closed,
+    EndAllowance,
+    GapMax,
+    Json,
+    NominalScale,
+    Out,
+    RejectOutliers,
+    Rule,
+    Uncertainty,
+    Weights,
+    plan_from_options,
+)
 from cmmlink.commands.output import Output, print_json, stop_on_ctrl_c, terminal
 from cmmlink.errors import PlanError
 from cmmlink.plan import CtPlan, CutterName, NominalAt, load_ct_plan
@@ -39,6 +52,9 @@ _OPTION_OF = {
     "cut.weld_mm": "--weld",
     "cut.shortest_mm": "--shortest",
     "registration.coverage_min": "--coverage-min",
+    "gap_max_mm": "--gap-max",
+    "end_allowance_mm": "--end-allowance",
+    "allow.unseen_mm": "--allow-unseen",
     "registration.reject_outliers": "--reject-outliers",
 }
 
@@ -86,6 +102,11 @@ def ct(
     material: Annotated[Material | None, typer.Option(help="Side of the material, seen along the nominal.")] = None,
     coverage_min: Annotated[float, typer.Option(help="Share of a nominal to be there before conform is proven.")] = 0.95,
     reject_outliers: RejectOutliers = False,
+    rule: Rule = "minimum-zone",
+    weights: Weights = "arc-length",
+    gap_max: GapMax = None,
+    end_allowance: EndAllowance = None,
+    allow_unseen: AllowUnseen = None,
     cutter: Annotated[CutterName, typer.Option(help="auto: Open3D, and numpy for more than 50 sections; same points.")] = "auto",
     weld: Annotated[float, typer.Option(metavar="MM", help="Loose ends no farther apart are one point.")] = 1e-6,
     shortest: Annotated[float | None, typer.Option(metavar="MM", help="Shorter pieces are dust; 5 % of the longest if not given.")] = None,
@@ -116,6 +137,11 @@ def ct(
         },
         "cut": {"cutter": cutter, "weld_mm": weld, "shortest_mm": shortest},
         "registration": {"fit": fit, "method": method, "coverage_min": coverage_min, "reject_outliers": reject_outliers},
+        "rule": rule,
+        "weights": weights,
+        "gap_max_mm": gap_max,
+        "end_allowance_mm": end_allowance,
+        "allow": {"unseen_mm": allow_unseen},
     }
     return _inspect_stack(plan_from_options(CtPlan, settings, _OPTION_OF), Output(False, as_json, out), pictures)
 

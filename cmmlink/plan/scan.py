@@ -17,7 +17,7 @@ from cmmlink.errors import PlanError, YamlError
 from cmmlink.plan.yaml_model import Positive, Settings, line_of, read_model
 from cmmlink.result_folder import check_placeholders
 from drivers import PointFileError, device_address, read_text, shipped_maps
-from inspection import FitName, Material, Method, ToleranceZone
+from inspection import FitName, Material, Method, RuleName, ToleranceZone, WeightName
 
 Vector = tuple[float, float, float]
 Text = Annotated[str, Field(min_length=1)]
@@ -256,6 +256,35 @@ class Registration(Settings):
         return reject
 
 
+class Allow(Settings):
+    """What may be missing although conformity is to be proven."""
+
+    unseen_mm: float | None = Field(
+        default=None,
+        ge=0,
+        description="the longest stretch of the profile that may be unseen where points were lost, damaged or rejected; null: none may be",
+    )
+
+
+class Deciding(Settings):
+    """How the verdict on the part is reached: what every plan may say."""
+
+    rule: RuleName = Field(
+        default="minimum-zone",
+        description="what decides without a datum: minimum-zone (a part conforms when any placement passes, ISO 1101), or best-fit",
+    )
+    weights: WeightName = Field(
+        default="arc-length", description="how points count in the best fit: by the length of profile that each stands for, or all alike"
+    )
+    gap_max_mm: Positive | None = Field(
+        default=None, description="the longest stretch without a point that counts as measured; null: a hundredth of the nominal's length"
+    )
+    end_allowance_mm: Annotated[float, Field(ge=0)] | None = Field(
+        default=None, description="how far points may lie beyond an end of an open profile; null: half the width of the zone"
+    )
+    allow: Allow = Field(default=Allow(), description="what may be missing although conformity is to be proven")
+
+
 class Discretisation(Settings):
     """How finely the nominal is sampled."""
 
@@ -264,7 +293,7 @@ class Discretisation(Settings):
     step_min: float = Field(default=1e-4, gt=0, lt=1, description="the smallest step between samples, as a share of the parameter's range")
 
 
-class Plan(Settings):
+class Plan(Deciding):
     """One inspection: what, against what, with what, and where the results go."""
 
     part: Part = Field(description="a mapping with the part's name")

@@ -10,7 +10,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from cmmlink.errors import PlanError, YamlError
-from cmmlink.plan.scan import OUT, Nominal, Part, Registration, ResultFolder, Tolerance
+from cmmlink.plan.scan import OUT, Deciding, Nominal, Part, Registration, ResultFolder, Tolerance
 from cmmlink.plan.yaml_model import Positive, Settings, read_model
 from drivers import PointFileError, read_text
 
@@ -72,7 +72,7 @@ class Cut(Settings):
     )
 
 
-class CtPlan(Settings):
+class CtPlan(Deciding):
     """One CT inspection: a surface, its sections, and what they are held against."""
 
     part: Part = Field(description="a mapping with the part's name")

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator, Mapping
 
-import numpy as np
 from rich.console import Console, Group
 from rich.live import Live
 from rich.markup import escape
@@ -88,24 +87,15 @@ def print_summary(console: Console, result: InspectionResult | None, counts: Cou
 
 
 def _reservations(result: InspectionResult | None) -> Iterator[str]:
-    """Reasons to treat the verdict with caution, one line each."""
-    if result is None or result.worst is None:
-        yield "nothing was judged"
+    """Why the verdict is what it is, and what else the reader has to know, a sentence each."""
+    if result is None:
+        yield "No point was judged."
         return
-    near = int(np.count_nonzero(result.verdicts == Verdict.UNCERTAIN))
-    outliers = result.rejected_by_reason.get(Rejection.OUTLIER.words, 0)
-    if not result.complete:
-        yield "the scan was cut short"
-    if result.coverage < _WHOLE or (result.verdict == Verdict.UNCERTAIN and result.complete and not near and not outliers):
-        yield f"only {result.coverage:.1%} of the nominal was measured: nothing is known of the rest"
-    if outliers:
-        yield f"{outliers} outliers were rejected, not judged: look whether they are dirt or a defect"
-    if near:
-        yield f"{near} points lie nearer to a limit than the uncertainty"
-    if not result.registration.converged:
-        yield "the registration did not settle: the last step still moved points"
+    yield from (reason.words for reason in result.reasons)
+    if result.rejected_by_reason.get(Rejection.OUTLIER.words, 0):
+        yield "Look whether the outliers are dirt or a defect: they were rejected, not judged."
     for rival in result.registration.rivals:
-        yield f"the part fits as well turned {math.degrees(rival.rotation_rad):.2f} deg: the pose is ambiguous"
+        yield f"The part fits as well turned by {math.degrees(rival.rotation_rad):.2f} deg: the pose is ambiguous."
 
 
 def _print_numbers(console: Console, result: InspectionResult) -> None:
@@ -114,11 +104,13 @@ def _print_numbers(console: Console, result: InspectionResult) -> None:
     zone = result.zone
     console.print(
         f"deviation {result.min_deviation_mm:+.4f} .. {result.max_deviation_mm:+.4f} mm, zone {zone.lower_mm:+g} .. {zone.upper_mm:+g} mm"
-        + (f", uncertainty {zone.uncertainty_mm:g} mm" if zone.uncertainty_mm else "")
     )
+    console.print(f"decision rule: {zone.decision_rule}")
     console.print(
-        f"profile error {result.profile_error_mm:.4f} mm (2 x largest), rms {result.rms_mm:.4f} mm, {result.out_of_tolerance} points out"
+        f"profile error {result.profile_error_mm:.4f} mm (2 x largest), zone error {result.zone_error_mm:.4f} mm (2 x farthest from the "
+        f"zone's middle), rms {result.rms_mm:.4f} mm, {result.out_of_tolerance} points out"
     )
+    _print_rule(console, result)
     console.print(
         f"worst {result.deviation_mm[worst]:+.4f} mm at station {result.station_mm[worst]:.2f} mm "
         f"(x {result.actual_mm[worst, 0]:.3f}, y {result.actual_mm[worst, 1]:.3f})"
@@ -128,7 +120,20 @@ def _print_numbers(console: Console, result: InspectionResult) -> None:
     pose = registration.nominal_from_section
     moved = f"({pose.translation_mm[0]:.4f}, {pose.translation_mm[1]:.4f}) mm"
     console.print(f"fit {result.fit}: turned {math.degrees(pose.rotation_rad):.4f} deg, moved {moved}, {registration.iterations} steps")
-    console.print(f"method {result.method}; coverage {result.coverage:.1%}")
+    gap = result.gap
+    console.print(
+        f"method {result.method}; coverage {result.coverage:.1%}; largest gap {gap.length_mm:.3f} mm at station {gap.from_mm:.2f} .. "
+        f"{gap.to_mm:.2f} mm ({result.gap_max_mm:.3f} mm count as measured)"
+    )
+
+
+def _print_rule(console: Console, result: InspectionResult) -> None:
+    """Say what decided, and what the part would be by the other fit."""
+    if result.rule == "datum":
+        return
+    errors = {"best fit": result.best_fit_error_mm, "minimum zone": result.minimum_zone_mm}
+    told = ", ".join(f"{name} {error:.4f} mm" for name, error in errors.items() if math.isfinite(error))
+    console.print(f"rule {result.rule}: zone error at {told}; fits aim at {result.zone.middle_mm:g} mm with {result.weights} weights")
 
 
 def _print_stretches(console: Console, result: InspectionResult) -> None:

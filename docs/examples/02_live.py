@@ -7,13 +7,13 @@ It prints:
     100 points: seeking
     200 points: provisional, deviations can still move by 0.11 mm
     300 points: provisional, deviations can still move by 0.04 mm
-    400 points: provisional, deviations can still move by 0.04 mm
-    500 points: provisional, deviations can still move by 0.06 mm
-    600 points: provisional, deviations can still move by 0.04 mm
-    700 points: provisional, deviations can still move by 0.04 mm
-    800 points: provisional, deviations can still move by 0.03 mm
+    400 points: provisional, deviations can still move by 0.07 mm
+    500 points: provisional, deviations can still move by 0.10 mm
+    600 points: provisional, deviations can still move by 0.07 mm
+    700 points: provisional, deviations can still move by 0.06 mm
+    800 points: provisional, deviations can still move by 0.05 mm
     nonconform: received 800, judged 800, rejected 0
-    out of tolerance from 68.3 to 71.6 mm, the worst deviation is +0.081 mm
+    out of tolerance from 67.5 to 72.5 mm, the worst deviation is +0.135 mm
 """
 
 from pathlib import Path

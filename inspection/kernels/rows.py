@@ -11,6 +11,7 @@ from inspection.kernels.feet import Feet
 from inspection.kernels.layout import (
     BEYOND_END,
     CONFORM,
+    IN_HOLLOW,
     NONCONFORM,
     NOT_FINITE,
     NOT_JUDGED,
@@ -48,7 +49,7 @@ def judge_rows(
     judgement : 1.0 where left of the curve is out of material, else -1.0; tip radius, lower and upper limit, uncertainty in mm
     """
     feet = project(place_rows(section_mm, rows[-1], first, stop, pose))
-    _judge(feet.foot_mm, feet.distance_mm, feet.gradient, feet.station_mm, feet.vertex, judgement, first, rows)
+    _judge(feet.foot_mm, feet.distance_mm, feet.gradient, feet.curvature, feet.station_mm, feet.vertex, judgement, first, rows)
 
 
 def take_in(points_mm: Array, plane: Array, off_section_max_mm: float, section_mm: Array, rejection: NDArray[np.int8], at: int) -> None:
@@ -100,16 +101,19 @@ def _place(section: Any, rejection: Any, first: int, pose: Any, moved: Any) -> N
 
 
 @kernel
-def _judge(foot: Any, distance: Any, gradient: Any, station: Any, vertex: Any, judgement: Any, first: int, rows: Any) -> None:
+def _judge(
+    foot: Any, distance: Any, gradient: Any, curvature: Any, station: Any, vertex: Any, judgement: Any, first: int, rows: Any
+) -> None:
     outward, tip, lower, upper, uncertainty = judgement
     actual, feet, normals, stations, deviations, verdicts, rejection = rows
     for i in range(len(distance)):
         row = first + i
-        if rejection[row] == BEYOND_END:
-            rejection[row] = NOT_REJECTED  # beyond an end at an earlier pose
-        if np.isnan(distance[i]) or vertex[i] == OPEN_END or rejection[row] != NOT_REJECTED:
+        if rejection[row] == BEYOND_END or rejection[row] == IN_HOLLOW:
+            rejection[row] = NOT_REJECTED  # at an earlier pose
+        too_tight = outward * curvature[i] * tip >= 1.0  # the ball does not reach the foot
+        if np.isnan(distance[i]) or vertex[i] == OPEN_END or too_tight or rejection[row] != NOT_REJECTED:
             if rejection[row] == NOT_REJECTED:
-                rejection[row] = BEYOND_END
+                rejection[row] = IN_HOLLOW if too_tight else BEYOND_END
             actual[row, 0] = actual[row, 1] = feet[row, 0] = feet[row, 1] = normals[row, 0] = normals[row, 1] = np.nan
             stations[row] = deviations[row] = np.nan
             verdicts[row] = NOT_JUDGED

@@ -218,7 +218,7 @@ def test_a_stop_ends_an_endless_scan_and_judges_all_that_was_received(live: Live
 
 def test_an_aborted_scan_has_no_verdict_whatever_was_out(live: LiveInspection) -> None:
     stop = threading.Event()
-    source = Listed(itertools.cycle(batches(oval_points(0.4), 20)))
+    source = Listed(itertools.cycle(batches(oval_points(np.where(np.arange(360) < 40, 0.4, 0.0)), 20)))
     outcome = carried_out(source, live, stopping_after(200, stop), buffer_points=40, stop=stop)
     assert (outcome.ending, outcome.measured) == ("aborted", True)
     assert outcome.result is not None

@@ -28,7 +28,8 @@ PROMISED = {
     "registration": dict,
     "stretches": list,
 }
-FURTHER = {"coverage", "complete", "tolerance", "rejected_by_reason", "damaged_bytes"}
+FURTHER = {"coverage", "largest_gap_mm", "largest_gap", "complete", "tolerance", "rejected_by_reason", "damaged_bytes"}
+FURTHER |= {"zone_error_mm", "best_fit_error_mm", "minimum_zone_mm", "reasons", "rule", "target_mm", "weights"}
 
 
 def test_the_summary_has_the_promised_keys_and_says_what_was_put_in(profile: NominalProfile) -> None:
@@ -43,7 +44,11 @@ def test_the_summary_has_the_promised_keys_and_says_what_was_put_in(profile: Nom
     assert facts["rms_mm"] == pytest.approx(np.sqrt(np.mean(bumped() ** 2)), abs=1e-9)
     assert facts["profile_error_mm"] == pytest.approx(0.4, abs=1e-9)
     assert (facts["fit"], facts["method"]) == ("none", "exact")
-    assert facts["tolerance"] == {"lower_mm": -0.05, "upper_mm": 0.07, "uncertainty_mm": 0.01}
+    rule = "ISO 14253-1: conform inside the zone less U, nonconform outside the zone plus U, U = 0.01 mm"
+    assert facts["tolerance"] == {"lower_mm": -0.05, "upper_mm": 0.07, "uncertainty_mm": 0.01, "decision_rule": rule}
+    assert facts["zone_error_mm"] == pytest.approx(2 * (0.2 - 0.01), abs=1e-9)
+    assert (facts["rule"], facts["target_mm"], facts["weights"]) == ("datum", pytest.approx(0.01), "arc-length")
+    assert facts["reasons"][0]["kind"] == "out-of-tolerance"
 
 
 def test_the_worst_point_and_the_stretches_are_where_they_were_made(profile: NominalProfile) -> None:

@@ -329,7 +329,7 @@ def test_a_ball_inside_a_hole_rides_on_the_other_side() -> None:
     assert np.abs(found.foot_mm - centres / (10.0 - 2.03) * 10).max() < 1e-11
 
 
-def test_a_ball_that_does_not_fit_into_a_hollow_is_refused() -> None:
+def test_a_ball_that_fits_nowhere_is_refused() -> None:
     nominal = discretize(profiles.circle(10.0), samples=200, material="right")
     for radius in (10.5, 1000.0):
         with pytest.raises(ValueError, match="radius"):

@@ -49,6 +49,7 @@ def test_coverage_is_the_share_of_the_length_between_neighbours_that_are_near(na
     # without the middle half, up to the stations left and right of it; the gap itself does not count
     kept = station[(station < 0.25 * length) | (station > 0.75 * length)]
     assert coverage(kept, nominal) == pytest.approx(0.5 - 1 / 200, abs=1e-12)
-    # of 200 even stations any two neighbours may be missing: three median spacings are no gap, nor is anything below 2 %
-    assert coverage(np.delete(station, [100, 101]), nominal) == pytest.approx(1.0, abs=1e-12)
-    assert coverage(np.delete(station, [100, 101, 102, 103]), nominal) == pytest.approx(1.0 - 5 / 200, abs=1e-12)
+    # a gap counts as measured up to a hundredth of the length, or up to what is stated
+    assert coverage(np.delete(station, [100]), nominal, gap_max_mm=2.001 / 200 * length) == pytest.approx(1.0, abs=1e-12)
+    assert coverage(np.delete(station, [100, 101]), nominal) == pytest.approx(1.0 - 3 / 200, abs=1e-12)
+    assert coverage(np.delete(station, [100, 101]), nominal, gap_max_mm=3.001 / 200 * length) == pytest.approx(1.0, abs=1e-12)

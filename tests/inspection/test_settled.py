@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from inspection import LiveInspection, NotMeasured, Rejection, SectionPlane, Verdict, fit_minimum_zone, register
+from inspection import LiveInspection, NotMeasured, RegistrationError, Rejection, SectionPlane, Verdict, fit_minimum_zone, register
 from tests.inspection import profiles
 from tests.inspection.oracle import closest_point
 from tests.inspection.profiles import curve_of, nominal_of
@@ -17,7 +17,8 @@ def test_final_result_is_the_registration_and_deviations_of_all_points_together(
     points = profiles.rotated(truth, 77.0, (1.0, 2.0))
     _, result = inspect_in_batches(nominal_of("P3"), points, 50)
     pose = result.registration.nominal_from_section
-    assert np.linalg.norm(pose.apply(points) - register(points, nominal_of("P3")).nominal_from_section.apply(points), axis=1).max() < 1e-9
+    best = register(points, nominal_of("P3"), weights="arc-length").nominal_from_section
+    assert np.linalg.norm(pose.apply(points) - best.apply(points), axis=1).max() < 1e-9
     exact = closest_point(curve_of("P3"), pose.apply(points))
     assert np.abs(result.deviation_mm + exact.left_mm).max() < 1e-11
     assert result.rms_mm == pytest.approx(np.sqrt(np.mean(exact.left_mm**2)), abs=1e-11)
@@ -102,11 +103,12 @@ def refusal(points: profiles.Array, **options: Any) -> str:
 
 def test_points_that_do_not_fit_are_refused_with_the_likely_cause() -> None:
     points, _ = surface("P1", 300, 9)
-    assert refusal(points[:5]) == "5 points: a registration needs at least 8"
+    with pytest.raises(RegistrationError, match=r"^5 points: a registration needs at least 8$"):
+        inspect_in_batches(nominal_of("P1"), points[:5], 5)
     assert "fit the nominal only mirrored" in refusal(points[:, ::-1])
     assert "are the x and y columns swapped" in refusal(points[:, ::-1])
-    assert "Check the unit, the scale and the nominal" in refusal(25.4 * points)
-    assert "Check the unit, the scale and the nominal" in refusal(np.random.default_rng(1).normal(0, 40, (300, 2)))
+    assert "--nominal-unit inch" in refusal(25.4 * points)
+    assert "the points do not fit the nominal" in refusal(np.random.default_rng(1).normal(0, 40, (300, 2)))
     plane = SectionPlane(np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
     off = refusal(plane.to_machine(points, 2.0), section=plane, off_section_max_mm=0.5)
     assert off.startswith("300 of 300 points lie farther than 0.5 mm from the plane of the section")

@@ -219,5 +219,6 @@ def bad_part(seed: int) -> Array:
 @pytest.mark.parametrize("seed", range(200))
 def test_a_bad_part_is_always_measured(nominal: NominalProfile, seed: int) -> None:
     result = judge(scan(nominal, bad_part(seed), seed=seed), nominal)
-    assert result.verdict in (Verdict.NONCONFORM, Verdict.UNCERTAIN)
+    # a part that another placement takes into the zone is no bad part: the rule then says so
+    assert result.verdict is not Verdict.CONFORM or result.minimum_zone_mm <= 0.1 < result.best_fit_error_mm
     assert result.judged > 350

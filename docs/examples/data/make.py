@@ -8,7 +8,7 @@ import yaml
 from inspection import NurbsCurve
 
 HERE = Path(__file__).parent
-BUMP_MM, BUMP_STATION_MM, BUMP_WIDTH_MM = 0.09, 70.0, 3.0
+BUMP_MM, BUMP_STATION_MM, BUMP_WIDTH_MM = 0.15, 70.0, 3.0
 
 turn = np.linspace(0.0, 2 * np.pi, 24, endpoint=False)
 radius_mm = 20.0 + 8.0 * np.exp(-((turn - 1.5) ** 2) / 0.5) + 1.0 * np.cos(turn - 4.0)

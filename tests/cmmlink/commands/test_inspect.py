@@ -14,11 +14,12 @@ from tests.cmmlink.oval_part import oval_points, station_mm, write_points
 def test_a_conform_part_is_said_to_be_so(nominal: Path) -> None:
     ended = inspect_oval(nominal, 0.03)
     assert (ended.code, ended.err) == (0, "")
-    assert ended.out.splitlines()[:4] == [
+    assert ended.out.splitlines()[:5] == [
         "CONFORM   points, file points.csv",
         "received 360 = judged 360 + rejected 0; lost 0 points",
         "deviation +0.0300 .. +0.0300 mm, zone -0.05 .. +0.05 mm",
-        "profile error 0.0600 mm (2 x largest), rms 0.0300 mm, 0 points out",
+        "decision rule: U not stated: simple acceptance",
+        "profile error 0.0600 mm (2 x largest), zone error 0.0600 mm (2 x farthest from the zone's middle), rms 0.0300 mm, 0 points out",
     ]
 
 
@@ -33,17 +34,20 @@ def test_a_part_with_one_point_out_does_not_conform(nominal: Path) -> None:
 def test_a_point_nearer_to_the_limit_than_the_uncertainty_proves_nothing(nominal: Path) -> None:
     ended = inspect_oval(nominal, one_off(0.048), "--uncertainty", 0.005)
     assert ended.code == 3
-    assert ended.out.splitlines()[:2] == ["NOT PROVEN   points, file points.csv", "  1 points lie nearer to a limit than the uncertainty"]
+    assert ended.out.splitlines()[:2] == [
+        "NOT PROVEN   points, file points.csv",
+        "  1 point lies nearer to a limit than U = 0.005 mm: neither side is proven.",
+    ]
 
 
 def test_a_part_measured_in_part_says_so(nominal: Path) -> None:
     points = write_points(nominal.parent / "points.csv", oval_points(0.0)[:180])
     told = ("inspect", points, "--nominal", nominal, *TOLERANCE, "--fit", "none")
-    said = "  only 49.8% of the nominal was measured: nothing is known of the rest"
-    assert said in cmmlink(*told).out.splitlines()
-    proven = cmmlink(*told, "--coverage-min", 0.6)
-    assert proven.code == 3
-    assert said in proven.out.splitlines()
+    assert "  49.8% of the profile was measured; 95.0% are needed." in cmmlink(*told).out.splitlines()
+    little = cmmlink(*told, "--coverage-min", 0.6)
+    assert little.code == 3
+    assert "  49.8% of the profile was measured; 60.0% are needed." in little.out.splitlines()
+    assert "  The largest gap is 28.5 mm, from station 28.29 to 0.06981 mm; 0.5672 mm are allowed." in little.out.splitlines()
 
 
 def test_rejected_outliers_neither_pass_nor_prove_a_part(nominal: Path) -> None:
@@ -55,7 +59,8 @@ def test_rejected_outliers_neither_pass_nor_prove_a_part(nominal: Path) -> None:
     ended = cmmlink(*told, "--reject-outliers")
     assert ended.code == 3
     lines = ended.out.splitlines()
-    assert lines[1] == "  4 outliers were rejected, not judged: look whether they are dirt or a defect"
+    assert lines[1].startswith("  Points were rejected (4 outlier): up to ")
+    assert lines[2] == "  Look whether the outliers are dirt or a defect: they were rejected, not judged."
     assert "received 360 = judged 356 + rejected 4; lost 0 points" in lines
     facts = cmmlink(*told, "--reject-outliers", "--json").json()
     assert (facts["verdict"], facts["rejected_by_reason"], facts["out_of_tolerance"]) == ("uncertain", {"outlier": 4}, 0)

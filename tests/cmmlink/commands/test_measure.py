@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.cmmlink.command import cmmlink
-from tests.cmmlink.commands.oval_files import PLAN, peanut, write_plan
+from tests.cmmlink.commands.oval_files import PLAN, write_plan
 from tests.cmmlink.oval_part import LENGTH_MM, oval_points
 
 
@@ -51,7 +51,7 @@ def test_a_device_that_is_not_there_is_a_device_failure_and_proves_nothing(nomin
     facts = ended.json()
     assert (facts["verdict"], facts["received"], facts["judged"], facts["complete"]) == ("uncertain", 0, 0, False)
     words = cmmlink("run", plan, "--out", nominal.parent / "found")
-    assert words.out.splitlines()[:2] == ["NOT MEASURED   oval 0012, serial no-such-port", "  nothing was judged"]
+    assert words.out.splitlines()[:2] == ["NOT MEASURED   oval 0012, serial no-such-port", "  No point was judged."]
     assert list((nominal.parent / "found").iterdir()) == [], "no result of nothing"
 
 
@@ -90,11 +90,10 @@ def test_a_wrong_plan_is_refused_by_file_line_and_key(nominal: Path, command: st
 
 
 @pytest.mark.parametrize("command", ["check", "run"])
-def test_a_tip_larger_than_the_smallest_concave_radius_is_refused(tmp_path: Path, command: str) -> None:
-    peanut(tmp_path)
-    text = PLAN.replace("oval.yaml", "peanut.csv").replace("tip_radius_mm: 0", "tip_radius_mm: 25")
-    message = cmmlink(command, write_plan(tmp_path / "oval.yaml", 0.0, text)).refused()
-    assert re.search(r"plan\.yaml: line 8: probe\.tip_radius_mm: tip radius 25 mm: .*smallest concave radius, 19\.59 mm", message)
+def test_a_ball_that_fits_nowhere_is_refused(nominal: Path, command: str) -> None:
+    text = PLAN.replace("file: oval.yaml", "file: oval.yaml, material: right").replace("tip_radius_mm: 0", "tip_radius_mm: 60")
+    message = cmmlink(command, write_plan(nominal, 0.0, text)).refused()
+    assert re.search(r"plan\.yaml: line 8: probe\.tip_radius_mm: tip radius 60 mm: the ball touches the profile nowhere", message)
 
 
 @pytest.mark.parametrize("command", ["check", "run"])

@@ -98,7 +98,10 @@ MISTAKES = {
         SHORT.replace("upper_mm", "uper_mm"),
         "line 5: tolerance.uper_mm is not a known key; did you mean upper_mm? Allowed: lower_mm,",
     ),
-    "unknown section": (SHORT + "colour: red\n", "line 7: colour is not a known key; Allowed: part, operator, nominal,"),
+    "unknown section": (
+        SHORT + "colour: red\n",
+        "line 7: colour is not a known key; Allowed: rule, weights, gap_max_mm, end_allowance_mm, allow, part,",
+    ),
     "missing key": (SHORT.replace("  upper_mm: 0.05\n", ""), "line 3: tolerance.upper_mm is missing: expected the upper limit"),
     "missing section": (
         SHORT.replace("nominal:", "operator: x #"),

@@ -1,0 +1,193 @@
+"""From judged points to the verdict on the part, with the reasons in the order of their weight.
+
+CONFORM is said only where every point is proven inside the zone and nothing is known that could hide a defect: points that are
+missing, stretches that were not measured, points beyond an end, an end that never came. NONCONFORM is said only where it is
+proven. Everything between is UNCERTAIN. Whatever is missing can only lower a verdict.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from inspection.gaps import Gap
+from inspection.tolerance import ToleranceZone, Verdict
+
+ReasonKind = Literal[
+    "out-of-tolerance",
+    "within-uncertainty",
+    "placement",
+    "nothing-judged",
+    "incomplete",
+    "missing",
+    "announced",
+    "rejected",
+    "ends",
+    "coverage",
+    "gap",
+    "fit",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Reason:
+    """One reason of a verdict: its kind, which never changes, and a sentence for people."""
+
+    kind: ReasonKind
+    words: str
+
+
+@dataclass(frozen=True, slots=True)
+class Conclusion:
+    """The verdict on a part and its reasons, the most important first; a part that conforms has none."""
+
+    verdict: Verdict
+    reasons: tuple[Reason, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Missing:
+    """Points of the scan that are known to be missing before the inspection saw them.
+
+    lost          : by the device's own counters
+    damaged_bytes : bytes on the wire that were no valid frame; how many points they held is not known
+    rejected      : points that arrived whole and could not be used, by reason
+    announced     : points that the device announced, or said to have sent; None where it said nothing
+    arrived       : points that arrived, used or not
+    """
+
+    lost: int = 0
+    damaged_bytes: int = 0
+    rejected: Mapping[str, int] = field(default_factory=dict)
+    announced: int | None = None
+    arrived: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Findings:
+    """What was found of a scan, as far as the verdict depends on it.
+
+    points          : the verdict on the judged points alone; NONCONFORM only where that is proven
+    why             : the reason of that verdict, where it is not CONFORM
+    judged          : points with a verdict
+    rejected        : points that the inspection itself rejected, by reason, those beyond an end left out
+    beyond_end_mm   : how far the farthest point lies beyond an open end, 0 where there is none; `beyond_end_count` how many do
+    coverage, gap   : how much was measured, and the longest stretch that was not
+    converged       : the fit settled
+    """
+
+    points: Verdict
+    why: Reason | None
+    judged: int
+    rejected: Mapping[str, int]
+    beyond_end_mm: float
+    beyond_end_count: int
+    coverage: float
+    gap: Gap
+    converged: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What may be missing before conformity is not proven any more.
+
+    measured_gap_mm : the longest gap that counts as measured
+    gap_max_mm      : the longest gap that conformity allows; infinite where nobody asked for coverage
+    allow_unseen_mm : the longest stretch that may be unseen where points are known to be missing; None allows none
+    """
+
+    coverage_min: float
+    measured_gap_mm: float
+    gap_max_mm: float
+    end_allowance_mm: float
+    allow_unseen_mm: float | None
+
+
+def conclude(found: Findings, missing: Missing, limits: Limits, complete: bool) -> Conclusion:
+    """Say the verdict on the part.
+
+    complete : the scan came to its end
+    """
+    reasons = [found.why] if found.why is not None else []
+    if not found.judged:
+        reasons.append(Reason("nothing-judged", "No point was judged."))
+    if not complete:
+        reasons.append(Reason("incomplete", "The scan did not come to its end."))
+    if limits.allow_unseen_mm is None or found.gap.length_mm > limits.allow_unseen_mm:
+        reasons += _missing_points(found, missing, limits.allow_unseen_mm)
+    reasons += _unmeasured(found, limits)
+    if not found.converged:
+        reasons.append(Reason("fit", "The fit did not settle: the pose is not the best one."))
+    doubtful = Verdict.UNCERTAIN if reasons else Verdict.CONFORM
+    return Conclusion(max(found.points, doubtful), tuple(reasons))
+
+
+def word_points(zone: ToleranceZone, beyond: int, within_uncertainty: int) -> Reason | None:
+    """The reason that the points themselves give: some beyond a limit, or too near to one to be told; None where all are proven."""
+    if beyond:
+        limit = f"beyond the limits {zone.lower_mm:g} .. {zone.upper_mm:g} mm"
+        by = f" by more than U = {zone.uncertainty_mm:g} mm" if zone.uncertainty_mm else ""
+        return Reason("out-of-tolerance", f"{_count(beyond, 'point')} {_verb(beyond, 'lies', 'lie')} {limit}{by}.")
+    if within_uncertainty:
+        lies = _verb(within_uncertainty, "lies", "lie")
+        return Reason(
+            "within-uncertainty",
+            f"{_count(within_uncertainty, 'point')} {lies} nearer to a limit than U = {zone.uncertainty_mm:g} mm: neither side is proven.",
+        )
+    return None
+
+
+def _missing_points(found: Findings, missing: Missing, allowed_mm: float | None) -> list[Reason]:
+    """Points that are known to be missing; they may hide a defect."""
+    unseen = (
+        f"up to {found.gap.length_mm:.4g} mm of the profile are unseen, {'none' if allowed_mm is None else f'{allowed_mm:g} mm'} allowed"
+    )
+    reasons = []
+    lost = [_count(missing.lost, "point") + _verb(missing.lost, " was lost", " were lost")] if missing.lost > 0 else []
+    if missing.damaged_bytes:
+        lost.append(f"{missing.damaged_bytes} bytes were damaged")
+    if lost:
+        reasons.append(Reason("missing", f"{' and '.join(lost)} on the line: {unseen}."))
+    short = 0 if missing.announced is None else missing.announced - missing.arrived - max(missing.lost, 0)
+    if missing.announced is not None and short > 0:
+        reasons.append(Reason("announced", f"The device announced {missing.announced} points and {missing.arrived} arrived: {unseen}."))
+    rejected = {**missing.rejected, **found.rejected}
+    if rejected:
+        which = ", ".join(f"{number} {reason}" for reason, number in rejected.items())
+        reasons.append(Reason("rejected", f"Points were rejected ({which}): {unseen}."))
+    return reasons
+
+
+def _unmeasured(found: Findings, limits: Limits) -> list[Reason]:
+    """Stretches of the profile, and of the part beyond it, of which nothing is known."""
+    reasons = []
+    if found.beyond_end_mm > limits.end_allowance_mm:
+        number = found.beyond_end_count
+        reasons.append(
+            Reason(
+                "ends",
+                f"{_count(number, 'point')} {_verb(number, 'lies', 'lie')} up to {found.beyond_end_mm:.4g} mm beyond an end of the "
+                f"open profile; {limits.end_allowance_mm:.4g} mm are allowed.",
+            )
+        )
+    if found.coverage < limits.coverage_min:
+        reasons.append(
+            Reason("coverage", f"{found.coverage:.1%} of the profile was measured; {limits.coverage_min:.1%} are needed."),
+        )
+    gap = found.gap
+    if gap.length_mm > limits.gap_max_mm * (1 + 1e-9):
+        reasons.append(
+            Reason(
+                "gap",
+                f"The largest gap is {gap.length_mm:.4g} mm, from station {gap.from_mm:.4g} to {gap.to_mm:.4g} mm; "
+                f"{limits.gap_max_mm:.4g} mm are allowed.",
+            )
+        )
+    return reasons
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def _verb(number: int, one: str, many: str) -> str:
+    return one if number == 1 else many

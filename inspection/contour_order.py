@@ -1,0 +1,92 @@
+"""The measured contour as a walk that does not depend on the order in which its points came.
+
+Points are gathered in small cells, whose means stand for them, so that density does not count either. The shortest tree that joins
+the means runs along the contour, since on a sampled curve the nearest neighbours are neighbours on it; its longest path is the walk.
+The tree is a part of the Delaunay triangulation (Shamos & Hoey 1975), which keeps the search nearly linear.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array
+from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
+from scipy.spatial import Delaunay, QhullError
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.int64]
+
+_ROUND_STEPS = 1e-9  # of a step: cell means are rounded to it, so that the order of a sum does not show
+_SQUEEZED = 1e-6  # points whose box is thinner than this share of its length lie on a line, which has no triangulation
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Contour:
+    """Points that stand for a scan, whatever the order and the density of its own.
+
+    points_mm  : (k, 2) means of the cells
+    weights_mm : (k,) how much of the contour each stands for
+    walk       : (w,) the rows in the order in which they lie along the contour; a side branch is not on the walk
+    """
+
+    points_mm: Array
+    weights_mm: Array
+    walk: Rows
+
+    @property
+    def walk_mm(self) -> Array:
+        """The points (w, 2) of the walk."""
+        return self.points_mm[self.walk]
+
+
+def trace_contour(points_mm: Array, step_mm: float) -> Contour:
+    """Trace the contour of points (m, 2) through their means in cells of `step_mm`.
+
+    The direction of the walk, and where a closed contour is opened, follow from the points alone.
+    """
+    means = _cell_means(points_mm, step_mm)
+    edges = _edges(means)
+    lengths = np.hypot(*(means[edges[:, 0]] - means[edges[:, 1]]).T)
+    network = coo_array((lengths, (edges[:, 0], edges[:, 1])), shape=(len(means), len(means))).tocsr()
+    tree = minimum_spanning_tree(network)
+    ends, share = tree.tocoo(), np.zeros(len(means))
+    for side in (ends.row, ends.col):
+        np.add.at(share, side, ends.data / 2)
+    return Contour(means, share, _longest_path(tree))
+
+
+def _edges(means: Array) -> Rows:
+    """Pairs (e, 2) of neighbours: of the triangulation, or along the line where all points lie on one."""
+    spread = np.sqrt(np.maximum(np.linalg.eigvalsh(np.cov(means.T)), 0.0)) if len(means) > 3 else np.zeros(2)
+    if spread[0] > _SQUEEZED * spread[1]:
+        try:
+            corners = Delaunay(means).simplices
+        except QhullError:
+            pass
+        else:
+            return np.unique(np.sort(np.vstack([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]), axis=1), axis=0)
+    axis = np.linalg.eigh(np.cov(means.T))[1][:, -1] if len(means) > 1 else np.array([1.0, 0.0])
+    order = np.argsort(means @ axis, kind="stable")
+    return np.column_stack([order[:-1], order[1:]])
+
+
+def _cell_means(points_mm: Array, step_mm: float) -> Array:
+    """The mean of the points in every cell that has any, in the order of the cells."""
+    low = points_mm.min(axis=0)
+    cells = np.floor((points_mm - low) / step_mm).astype(np.int64)
+    _, which = np.unique(cells[:, 0] * (cells[:, 1].max() + 1) + cells[:, 1], return_inverse=True)
+    count = np.bincount(which)
+    means = np.column_stack([np.bincount(which, points_mm[:, axis] - low[axis]) / count for axis in (0, 1)])
+    grain = _ROUND_STEPS * step_mm
+    rounded: Array = np.round(means / grain) * grain + low
+    return rounded
+
+
+def _longest_path(tree: "csr_array[np.float64, tuple[int, int]]") -> NDArray[np.int64]:
+    """Nodes of the longest path in a tree: from the node farthest from any one to the node farthest from it."""
+    end = int(np.argmax(dijkstra(tree, directed=False, indices=[0])[0]))
+    away, before = dijkstra(tree, directed=False, indices=[end], return_predecessors=True)
+    path = [int(np.argmax(away[0]))]
+    while path[-1] != end:
+        path.append(int(before[0, path[-1]]))
+    return np.array(path, dtype=np.int64)

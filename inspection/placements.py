@@ -1,0 +1,220 @@
+"""Whether any placement at all brings measured points into the tolerance zone: branch and bound over every rigid motion.
+
+A motion is told by the place of one of the points, the anchor, and by an angle. The distance to the nominal changes by no more
+than a point moves, so in a box of motions (anchor within half widths h, angle within t) the point i moves from where the box's
+centre puts it by at most rho_i = sqrt(2) h + 2 sin(t / 2) |p_i - anchor|. A box is refuted by any point whose deviation at the
+centre is farther out of the zone than rho_i. When every box is refuted, no placement of the part can pass: whatever fit is
+used, whatever datum, and whatever points are still to come, since the maximum over more points is never smaller. The root of the
+search is every anchor in the nominal's box grown by the zone, and every angle, so the answer depends on no start.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from inspection.coarse import check_registrable
+from inspection.kernels import project
+from inspection.kernels.layout import OPEN_END
+from inspection.minimum_zone import fit_minimum_zone
+from inspection.nominal import NominalProfile
+from inspection.rigid import RigidTransform
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.int64]
+
+_WAVE = 256  # boxes looked at together
+_STAGES = ((0, 4), (4, 12), (12, 40))  # positions in the list of witnesses: most boxes fall to the first few points
+_EVEN_WITNESSES = 24
+_SMALL = 4.0  # boxes that move points by less than this many half zones are asked with every point
+_FULL_LOOKS = 16  # of those boxes, per wave
+_TURN_SHARE = 0.7  # a box is cut in place while that moves points at least this much as the angle does
+_ROUNDING_MM = 1e-9  # of a distance: far above what the projection errs by
+
+
+@dataclass(frozen=True, slots=True)
+class PlacementProof:
+    """What a search over every placement found.
+
+    outcome   : "refuted" (no placement passes), "fits" (`pose` passes), "undecided" (the search ended before it knew)
+    pose      : nominal from section, a placement that passes
+    witnesses : points (indices) whose deviations refuted boxes, the most telling first
+    boxes     : boxes of motions that were looked at
+    """
+
+    outcome: Literal["refuted", "fits", "undecided"]
+    pose: RigidTransform | None
+    witnesses: tuple[int, ...]
+    boxes: int
+
+
+@dataclass(slots=True)
+class _Boxes:
+    """Boxes of motions: centre place (k, 2) and angle (k,), half widths (k,), and how far out of the zone their parent was (k,)."""
+
+    place: Array
+    angle: Array
+    half: Array
+    turn: Array
+    excess: Array
+
+    def __len__(self) -> int:
+        return len(self.angle)
+
+    def rows(self, picked: NDArray[np.generic]) -> "_Boxes":
+        return _Boxes(self.place[picked], self.angle[picked], self.half[picked], self.turn[picked], self.excess[picked])
+
+    def joined(self, others: Sequence["_Boxes"]) -> "_Boxes":
+        every = [self, *others]
+        return _Boxes(*(np.concatenate([getattr(boxes, name) for boxes in every]) for name in self.__slots__))
+
+
+class PlacementSearch:
+    """The search for a placement that passes, over the points of a growing scan.
+
+    half_mm, middle_mm : a placement passes when |deviation - middle_mm| <= half_mm for every point; with an uncertainty U, half_mm
+                         is half the zone's width plus U
+    tip_radius_mm      : the points are centres of a ball of this radius
+
+    A search remembers which points refuted most, and a placement that passed, so that the next one is quick. Points beyond an open
+    end count with their distance to that end; hand over only points that belong to the profile.
+    """
+
+    def __init__(self, nominal: NominalProfile, half_mm: float, middle_mm: float = 0.0, tip_radius_mm: float = 0.0) -> None:
+        self._nominal, self._half, self._middle, self._tip = nominal, half_mm, middle_mm, tip_radius_mm
+        self._ends = np.empty((0, 2)) if nominal.curve.closed else nominal.curve.point(np.array(nominal.curve.domain))
+        self._hits: dict[int, int] = {}
+        self._passed: RigidTransform | None = None
+
+    def look(self, points_mm: ArrayLike, start: RigidTransform | None = None, most_boxes: int = 60_000) -> PlacementProof:
+        """Search every placement of section points (m, 2), the earlier ones the same as in the last call.
+
+        start      : a pose near which a placement that passes is sought first; None begins at the points' best fit
+        most_boxes : the search gives up after so many boxes, undecided
+        """
+        points = check_registrable(points_mm)
+        if self._passed is not None and self._excess(points, self._passed) <= 0:
+            return PlacementProof("fits", self._passed, (), 0)
+        zone = fit_minimum_zone(points, self._nominal, start, tip_radius_mm=self._tip, middle_mm=self._middle)
+        if self._excess(points, zone.nominal_from_section) <= 0:
+            self._passed = zone.nominal_from_section
+            return PlacementProof("fits", self._passed, (), 0)
+        return self._search(points, zone.active.tolist(), most_boxes)
+
+    def _search(self, points: Array, active: list[int], most_boxes: int) -> PlacementProof:
+        """Refute boxes of motions until none is left, best first; `active` are the points that hold the minimum zone nearby."""
+        anchor = int(np.argmin(((points - points.mean(axis=0)) ** 2).sum(axis=1)))
+        arms = points - points[anchor]
+        even = np.linspace(0, len(points) - 1, _EVEN_WITNESSES).astype(int).tolist()
+        self._hits = dict.fromkeys([*self._hits, *active, *even], 0) | self._hits
+        waiting, looked_at = self._root(), 0
+        while len(waiting):
+            if looked_at >= most_boxes:
+                return PlacementProof("undecided", None, self._witnesses(), looked_at)
+            wave, waiting = _best(waiting)
+            looked_at += len(wave)
+            left = self._not_refuted(wave, arms)
+            if len(left):
+                left, passing = self._asked_of_all(left, arms)
+                if passing is not None:
+                    self._passed = _pose(*passing, points[anchor])
+                    return PlacementProof("fits", self._passed, self._witnesses(), looked_at)
+                waiting = waiting.joined(_halves(left, float(np.hypot(*arms.T).max())))
+        return PlacementProof("refuted", None, self._witnesses(), looked_at)
+
+    def _root(self) -> _Boxes:
+        """Return the one box that holds every motion which could pass."""
+        low, high = self._nominal.points_mm.min(axis=0), self._nominal.points_mm.max(axis=0)
+        side = float((high - low).max()) / 2 + self._half + abs(self._middle) + self._tip
+        return _Boxes((low + high)[None, :] / 2, np.zeros(1), np.array([side]), np.array([np.pi]), np.zeros(1))
+
+    def _not_refuted(self, wave: _Boxes, arms: Array) -> _Boxes:
+        """Return the boxes that none of the witnesses refutes, each with how far out its centre is."""
+        alive = np.arange(len(wave))
+        ordered = sorted(self._hits, key=lambda row: -self._hits[row])
+        for first, stop in _STAGES:
+            rows = np.array(ordered[first:stop], dtype=np.int64)
+            if not len(alive) or not len(rows):
+                break
+            boxes = wave.rows(alive)
+            margin, excess = self._margins(boxes, arms[rows])
+            wave.excess[alive] = np.maximum(wave.excess[alive], excess.max(axis=1))
+            refuted = margin.max(axis=1) > 0
+            for row in rows[margin[refuted].argmax(axis=1)].tolist():
+                self._hits[row] += 1
+            alive = alive[~refuted]
+        return wave.rows(alive)
+
+    def _asked_of_all(self, boxes: _Boxes, arms: Array) -> tuple[_Boxes, tuple[Array, float] | None]:
+        """Ask the small boxes with every point; return what is left, and the place and angle of a centre that passes."""
+        reach = float(np.hypot(*arms.T).max())
+        moves = np.sqrt(2) * boxes.half + 2 * np.sin(boxes.turn / 2) * reach
+        small = np.flatnonzero(moves < _SMALL * self._half)
+        left = np.ones(len(boxes), dtype=bool)
+        for box in small[np.argsort(boxes.excess[small])][:_FULL_LOOKS].tolist():
+            margin, excess = self._margins(boxes.rows(np.array([box])), arms)
+            if excess.max() <= 0:
+                return boxes, (boxes.place[box], float(boxes.angle[box]))
+            left[box] = margin.max() <= 0
+            self._hits.setdefault(int(excess.argmax()), 1)
+            boxes.excess[box] = max(boxes.excess[box], float(excess.max()))
+        return boxes.rows(left), None
+
+    def _margins(self, boxes: _Boxes, arms: Array) -> tuple[Array, Array]:
+        """By how much each point (j) refutes each box (k), and how far out of the zone the box's centre puts it, both (k, j)."""
+        cosine, sine = np.cos(boxes.angle)[:, None], np.sin(boxes.angle)[:, None]
+        x = boxes.place[:, :1] + cosine * arms[:, 0] - sine * arms[:, 1]
+        y = boxes.place[:, 1:] + sine * arms[:, 0] + cosine * arms[:, 1]
+        moves = np.sqrt(2) * boxes.half[:, None] + 2 * np.sin(boxes.turn / 2)[:, None] * np.hypot(*arms.T)
+        excess = self._outside(np.stack([x, y], axis=-1).reshape(-1, 2), moves.reshape(-1)).reshape(x.shape)
+        return excess - moves - _ROUNDING_MM, excess
+
+    def _excess(self, points: Array, pose: RigidTransform) -> float:
+        return float(self._outside(pose.apply(points), np.zeros(len(points))).max())
+
+    def _outside(self, places: Array, moves: Array) -> Array:
+        """How far out of the zone places (j, 2) lie, at least, when they may move by `moves` (j,) over the border beyond an end.
+
+        The sign of a distance turns round in the region beyond an open end. Where a place may come there, the kinder sign counts,
+        so that the bound holds across the jump.
+        """
+        feet = project(places, self._nominal.grid)
+        left = self._nominal.outward * feet.distance_mm - self._tip - self._middle
+        outside = np.abs(left)
+        if len(self._ends):
+            distance = np.abs(feet.distance_mm)
+            to_end = np.hypot(*(places[:, None, :] - self._ends).T).min(axis=0)
+            either = (feet.vertex == OPEN_END) | (to_end <= distance + 2 * moves)
+            kinder = np.minimum(np.abs(distance - self._tip - self._middle), np.abs(distance + self._tip + self._middle))
+            outside = np.where(either, np.minimum(outside, kinder), outside)
+        return np.asarray(outside - self._half)
+
+    def _witnesses(self) -> tuple[int, ...]:
+        return tuple(row for row in sorted(self._hits, key=lambda row: -self._hits[row]) if self._hits[row])
+
+
+def _best(waiting: _Boxes) -> tuple[_Boxes, _Boxes]:
+    """Take the most promising boxes off those that wait."""
+    if len(waiting) <= _WAVE:
+        return waiting, waiting.rows(np.empty(0, dtype=np.int64))
+    order = np.argpartition(waiting.excess, _WAVE)
+    return waiting.rows(order[:_WAVE]), waiting.rows(order[_WAVE:])
+
+
+def _halves(boxes: _Boxes, reach_mm: float) -> list[_Boxes]:
+    """Cut every box in place, into four, or in angle, into two: whichever moves points more."""
+    in_place = np.sqrt(2) * boxes.half >= _TURN_SHARE * 2 * np.sin(boxes.turn / 2) * reach_mm
+    wide, long = boxes.rows(in_place), boxes.rows(~in_place)
+    h, t = wide.half / 2, long.turn / 2
+    quarters = [
+        _Boxes(wide.place + np.column_stack([x * h, y * h]), wide.angle, h, wide.turn, wide.excess) for x in (-1, 1) for y in (-1, 1)
+    ]
+    return quarters + [_Boxes(long.place, long.angle + way * t, long.half, t, long.excess) for way in (-1, 1)]
+
+
+def _pose(place: Array, angle: float, anchor: Array) -> RigidTransform:
+    """Return the motion that turns by an angle and brings the anchor to a place."""
+    turned = RigidTransform(angle, np.zeros(2)).apply(anchor[None, :])[0]
+    return RigidTransform(angle, place - turned)

@@ -1,0 +1,125 @@
+"""Proofs over every placement: reference parts, minimum zones known from elsewhere, parts that can pass, and open profiles."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from inspection import NominalProfile, NurbsCurve, RigidTransform, discretize
+from inspection.placements import PlacementSearch
+from tests.inspection import profiles
+from tests.inspection.profiles import AIRFOILS, Array
+
+# Half minimum zones of the reference scans, found by independent branch and bound in long double (500 points, form as in `reference_form`).
+HALF_ZONES_MM = {"goe404": 0.036958537, "mh42": 0.037013398, "naca65410": 0.035523921}
+
+
+@cache
+def nominal_of(name: str) -> NominalProfile:
+    points = np.loadtxt(AIRFOILS / f"{name}.dat", skiprows=1) * 100.0
+    return discretize(NurbsCurve.interpolate(points, closed=True) if name == "closed" else airfoil(points), samples=3000)
+
+
+def airfoil(points: Array) -> NurbsCurve:
+    """The profile as the command line reads it: a cubic through the points, joined to itself."""
+    from cmmlink.nominal_files.through_points import through_points
+
+    return through_points(points, np.arange(1, len(points) + 1), True, "uiuc-selig", ()).curve
+
+
+def scan(name: str, count: int, form: Array, turned_deg: float, shift: tuple[float, float]) -> Array:
+    """Points at the middles of `count` equal shares of the length, moved by `form` along the outward normal, then turned and shifted."""
+    nominal = nominal_of(name)
+    curve = nominal.curve
+    u = profiles.even_in_arc_length(curve, 2 * count + 1)[1::2] if not curve.closed else middles(curve, count)
+    normal = nominal.outward * profiles.left_normal(curve, u)
+    return RigidTransform(np.radians(turned_deg), np.array(shift)).apply(curve.point(u) + form[:, None] * normal)
+
+
+def middles(curve: NurbsCurve, count: int) -> Array:
+    """Parameters at the middles of equal shares of the length, by Newton steps on the arc length."""
+    wanted = (np.arange(count) + 0.5) / count * curve.length_mm
+    u = np.linspace(*curve.domain, 20_001)
+    station = curve.station_mm(u)
+    station[-1] = curve.length_mm
+    u = np.interp(wanted, station, u)
+    for _ in range(4):
+        u = u - (curve.station_mm(u) - wanted) / np.hypot(*curve.derivatives(u, 1)[1].T)
+    return np.asarray(u)
+
+
+def stations(name: str, count: int) -> Array:
+    return (np.arange(count) + 0.5) / count * nominal_of(name).curve.length_mm
+
+
+def reference_form(name: str, count: int) -> Array:
+    s = 2 * np.pi * stations(name, count) / nominal_of(name).curve.length_mm
+    return 0.02 * np.sin(2 * s + 0.4) + 0.015 * np.cos(5 * s) + 0.01 * np.sin(13 * s + 1)
+
+
+def dented(name: str) -> Array:
+    """The reference part that cannot pass: a dent of 0.16 mm at 30 % of the length."""
+    s, length = stations(name, 800), nominal_of(name).curve.length_mm
+    form = 0.01 * np.sin(6 * np.pi * s / length + 0.5) - 0.16 * np.exp(-(((s - 0.3 * length) / 3) ** 2))
+    return scan(name, 800, form, 124, (20, -10))
+
+
+@pytest.mark.parametrize("name", ["goe404", "mh42"])
+def test_a_prefix_is_refuted_as_soon_as_no_placement_is_left(name: str) -> None:
+    points, search = dented(name), PlacementSearch(nominal_of(name), 0.05)
+    assert [search.look(points[:count]).outcome for count in (160, 180, 200, 220, 240, 400, 800)] == ["fits"] * 4 + ["refuted"] * 3
+
+
+@pytest.mark.parametrize("name", HALF_ZONES_MM)
+def test_the_minimum_zone_is_the_border_between_fitting_and_refuted(name: str) -> None:
+    points = scan(name, 500, reference_form(name, 500), 92, (15, -7))
+    for half in (HALF_ZONES_MM[name] + 1e-6, HALF_ZONES_MM[name] - 1e-5):
+        found = PlacementSearch(nominal_of(name), half).look(points)
+        assert found.outcome == ("fits" if half > HALF_ZONES_MM[name] else "refuted")
+        if found.pose is not None:
+            again = PlacementSearch(nominal_of(name), half).look(points, found.pose)
+            assert again.outcome == "fits"
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_part_that_can_pass_is_never_refuted(seed: int) -> None:
+    """Form just inside the zone, in any place, whole or in part, in any order: the truth is a placement that passes."""
+    rng = np.random.default_rng(seed)
+    name = str(rng.choice(["goe404", "mh42", "naca65410"]))
+    length = nominal_of(name).curve.length_mm
+    s = 2 * np.pi * stations(name, 300) / length
+    form = sum(rng.uniform(-1, 1) * np.cos(k * s + rng.uniform(0, 7)) for k in range(1, 9))
+    form *= 0.0499 / np.abs(form).max()
+    points = scan(name, 300, np.asarray(form), rng.uniform(-180, 180), tuple(rng.uniform(-50, 50, 2)))
+    first, count = int(rng.integers(0, 200)), int(rng.integers(40, 300))
+    part = rng.permutation(points[first : first + count])
+    start = RigidTransform(0.0, np.zeros(2)) if seed % 3 == 0 else None
+    assert PlacementSearch(nominal_of(name), 0.05).look(part, start).outcome != "refuted"
+
+
+def test_a_scan_that_runs_over_an_open_end_is_not_refuted_for_it() -> None:
+    """The sign of the deviation turns round behind an end; a point just behind it lies within the zone's round cap."""
+    nominal = discretize(profiles.p1(), samples=1000)
+    curve = nominal.curve
+    u = profiles.even_in_arc_length(curve, 200)
+    tangent = curve.derivatives(u[-1:], 1)[1][0]
+    behind = curve.point(u[-1:]) + 0.03 * tangent / np.hypot(*tangent)
+    points = np.vstack([curve.point(u) + 0.02 * profiles.left_normal(curve, u), behind])
+    for middle in (0.0, 0.02):
+        half = 0.04
+        found = PlacementSearch(nominal, half, middle).look(RigidTransform(0.7, np.array([5.0, 9.0])).apply(points))
+        assert found.outcome == "fits"
+
+
+def test_centres_of_a_ball_are_held_against_their_surface_points() -> None:
+    nominal = nominal_of("goe404")
+    u = middles(nominal.curve, 400)
+    normal = nominal.outward * profiles.left_normal(nominal.curve, u)
+    for form, outcome in ((0.03, "fits"), (0.09, "refuted")):
+        bump = form * np.exp(-(((np.arange(400) - 150) / 3) ** 2))
+        centres = nominal.curve.point(u) + (1.0 + bump)[:, None] * normal
+        assert PlacementSearch(nominal, 0.04, tip_radius_mm=1.0).look(centres).outcome == outcome
+
+
+def test_a_search_that_may_not_go_on_is_undecided() -> None:
+    assert PlacementSearch(nominal_of("goe404"), 0.05).look(dented("goe404")[:240], most_boxes=300).outcome == "undecided"
