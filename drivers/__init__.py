@@ -12,7 +12,7 @@ from drivers.errors import DeviceError, DeviceRefused, LinkError, MeshError, Poi
 from drivers.files.column_choice import AxisName
 from drivers.files.point_file import PointFile, PointFileSource, convert_to_mm, points_of, read_points
 from drivers.files.stated_units import UnitName, mm_per
-from drivers.files.text_table import Columns, parse_columns, read_text
+from drivers.files.text_table import Columns, count_of, numbers_of, parse_columns, read_text, shorten
 from drivers.links.address import device_address
 from drivers.links.capture import Capture
 from drivers.maps import shipped_map, shipped_maps
@@ -63,10 +63,12 @@ __all__ = [
     "UnitName",
     "WireBytes",
     "convert_to_mm",
+    "count_of",
     "decoder",
     "decoders",
     "device_address",
     "mm_per",
+    "numbers_of",
     "parse_columns",
     "points_of",
     "read_points",
@@ -74,4 +76,5 @@ __all__ = [
     "register_map",
     "shipped_map",
     "shipped_maps",
+    "shorten",
 ]

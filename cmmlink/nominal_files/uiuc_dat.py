@@ -3,16 +3,18 @@
 Selig: a title, then one loop from the trailing edge over the upper side to the leading edge and back below.
 Lednicer: a title, a line with the two counts, then the upper and the lower side, each from the leading edge, apart by a
 blank line. Found in the wild and understood: no title, a title that looks like numbers, a line of four numbers (the grid
-of MSES), rows `999.0 999.0` between blocks, sides in the other direction, sides without a blank line between them.
+of MSES), rows `999.0 999.0` between blocks, sides in the other direction, sides without a blank line between them, words or a row
+of other numbers behind the points.
 """
 
-import re
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cmmlink.nominal_files import NominalFile
+from cmmlink.nominal_files.dat_lines import DatLines, leave_out_words
 from cmmlink.nominal_files.through_points import through_points
 from drivers import convert_to_mm, parse_columns
 from inspection import NominalError
@@ -25,17 +27,22 @@ Block = tuple[Array, Lines]  # points (m, 2) and the lines they stand on
 
 _SEPARATOR = 999.0
 _CHORD_UNITS = 2.0  # an airfoil this small in mm was almost certainly given in chords
+_MOST_LAST_ROWS = 3
+_FEWEST_POINTS = 4
 _JUMP = 0.8  # of the chord: a step from edge to edge, where one side ends and the next begins
 
 
 def read(text: str, scale: float, closed: bool | None) -> NominalFile:
     """Interpolate the one loop, or the two sides joined at the leading edge."""
-    body, notes = _without_title(text)
-    columns = parse_columns(body)
+    given = leave_out_words(text)
+    columns, notes = parse_columns("\n".join(given.lines)), list(given.notes)
     if columns.values.shape[1] != 2:
         raise NominalError(f"line {columns.line_numbers[0]}: {columns.values.shape[1]} columns; expected two, x and y")
-    table, lines, counts = _without_counts(columns.values, columns.line_numbers, notes)
-    blocks = _blocks(table, lines, body.split("\n"), counts)
+    table, lines = _without_last_rows(columns.values, columns.line_numbers, notes)
+    table, lines, counts = _without_counts(table, lines, notes)
+    _refuse_far_rows(table, lines)
+    _refuse_title_that_may_be_a_point(given, table)
+    blocks = _blocks(table, lines, given.lines, counts)
     kind, (points, order) = _loop(blocks, notes)
     points_mm = convert_to_mm(points, order, scale)
     if scale == 1.0 and np.ptp(points_mm, axis=0).max() <= _CHORD_UNITS:
@@ -43,36 +50,44 @@ def read(text: str, scale: float, closed: bool | None) -> NominalFile:
     return through_points(points_mm, order, closed, kind, (*columns.notes, *notes))
 
 
-def _without_title(text: str) -> tuple[str, list[str]]:
-    """Blank out the title and the grid line of MSES, keeping the count of lines."""
-    lines, notes = text.split("\n"), list[str]()
-    filled = [i for i, line in enumerate(lines) if line.strip()][:3]
-    columns = [len(_numbers(lines[i])) for i in filled]
-    if columns[0] == 0 or columns[0] not in (2, columns[-1]):
-        notes.append(f"title: {lines[filled[0]].strip()[:60]}")
-        lines[filled[0]] = "#"
-    if len(filled) > 2 and columns[1] in (4, 5) and columns[2] == 2:
-        notes.append(f"line {filled[1] + 1}: {columns[1]} numbers, the limits of a flow grid, left out")
-        lines[filled[1]] = "#"
-    return "\n".join(lines), notes
+def _without_last_rows(table: Array, lines: Lines, notes: list[str]) -> tuple[Array, Lines]:
+    """Take off last rows that lie far from all points, like a thickness and a camber in percent."""
+    for count in range(_MOST_LAST_ROWS, 0, -1):
+        others = table[1:-count]  # the first row may count the points
+        if len(others) >= _FEWEST_POINTS and all(_is_far_from(row, others) for row in table[-count:]):
+            said = [f"line {line}: '{x:g} {y:g}'" for (x, y), line in zip(table[-count:], lines[-count:], strict=True)]
+            notes.append(f"{', '.join(said)} {'lies' if count == 1 else 'lie'} far from all points, behind the last: left out")
+            return table[:-count], lines[:-count]
+    return table, lines
 
 
-def _numbers(line: str) -> list[float]:
-    """Read the numbers of a line; none if anything else stands on it."""
-    try:
-        return [float(word) for word in re.split(r"[\s,;]+", line.strip()) if word]
-    except ValueError:
-        return []
+def _refuse_far_rows(table: Array, lines: Lines) -> None:
+    """Refuse a point farther from all others than these are from each other: a slip of the decimal point."""
+    for i in range(1, len(table)) if len(table) > _FEWEST_POINTS else ():
+        if _is_far_from(table[i], np.delete(table, i, axis=0)):
+            x, y = table[i]
+            raise NominalError(
+                f"line {lines[i]}: {x:g} {y:g} lies far from all other points; expected a point of the profile: mend or remove it"
+            )
+
+
+def _refuse_title_that_may_be_a_point(given: DatLines, table: Array) -> None:
+    numbers = given.title_numbers
+    if numbers and not _is_far_from(np.array(numbers), table):
+        raise NominalError(
+            f"line {given.title_line}: begins with {numbers[0]:g} {numbers[1]:g}, which may be the first point, and goes on with words; "
+            "expected a title that begins with a word, or a point with # before the words"
+        )
 
 
 def _without_counts(table: Array, lines: Lines, notes: list[str]) -> tuple[Array, Lines, tuple[int, int] | None]:
     """Take off what precedes the coordinates: a title that looks like numbers, and the counts of the two sides."""
-    if len(table) > 2 and lines[0] == 1 and _far_from(table[0], table[2:]) and not _are_counts(table, lines):
+    if len(table) > 2 and lines[0] == 1 and _is_far_from(table[0], table[2:]) and not _are_counts(table, lines):
         notes.append(f"line 1: '{table[0, 0]:g} {table[0, 1]:g}' lies far from the points: taken as the title")
         table, lines = table[1:], lines[1:]
     if len(table) > 1 and _are_counts(table, lines):
         return table[1:], lines[1:], (int(table[0, 0]), int(table[0, 1]))
-    if len(table) > 1 and _far_from(table[0], table[1:]):
+    if len(table) > 1 and _is_far_from(table[0], table[1:]):
         raise NominalError(
             f"line {lines[0]}: {table[0, 0]:g} {table[0, 1]:g} is far from the {_points(table[1:])} points that follow; "
             "expected a point, or how many points the two sides have"
@@ -84,14 +99,14 @@ def _are_counts(table: Array, lines: Lines) -> bool:
     """Whether the first row holds the two counts: whole numbers with the right sum, set apart by a blank line or by distance."""
     row = table[0]
     whole = np.all(np.isfinite(row)) and np.all(row == np.round(row)) and np.all(row >= 2) and row.sum() == _points(table[1:])
-    return bool(whole) and bool(lines[1] - lines[0] > 1 or _far_from(row, table[1:]))
+    return bool(whole) and bool(lines[1] - lines[0] > 1 or _is_far_from(row, table[1:]))
 
 
 def _points(table: Array) -> int:
     return int((table != _SEPARATOR).any(axis=1).sum())
 
 
-def _far_from(point: Array, others: Array) -> bool:
+def _is_far_from(point: Array, others: Array) -> bool:
     """Whether a point lies farther from the others than they lie from each other."""
     others = others[(others != _SEPARATOR).any(axis=1)]
     if not len(others) or not np.all(np.abs(others) < 1e9) or np.all(point == _SEPARATOR):
@@ -101,7 +116,7 @@ def _far_from(point: Array, others: Array) -> bool:
     return bool(np.any(point > high + size) or np.any(point < low - size))
 
 
-def _blocks(table: Array, lines: Lines, text: list[str], counts: tuple[int, int] | None) -> list[Block]:
+def _blocks(table: Array, lines: Lines, text: Sequence[str], counts: tuple[int, int] | None) -> list[Block]:
     """Cut where the file does: at the counts, at separators, else at blank lines, else where one side jumps to the next."""
     separator = (table == _SEPARATOR).all(axis=1)
     if counts:

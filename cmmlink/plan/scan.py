@@ -64,7 +64,7 @@ class Nominal(Settings):
 
     file: Path = Field(description="the file of the nominal profile: UIUC dat, points, or NURBS yaml")
     scale: Positive = Field(default=1.0, description="how many mm a unit of the file is; for an airfoil in chord units, the chord in mm")
-    closed: bool | None = Field(default=None, description="whether the profile is closed; null: what the file shows")
+    closed: bool | None = Field(default=None, description="whether the profile is closed; null: as the file shows; a blunt edge is closed")
     material: Material | None = Field(
         default=None, description="the side of the material, seen along the direction of travel; null: inside a closed profile"
     )

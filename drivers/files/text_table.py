@@ -109,6 +109,13 @@ def parse_columns(text: str, places: Collection[int] = ()) -> Columns:
     return Columns(values, np.array([number for number, _ in data], dtype=np.int64), names, tuple(notes), tuple(units))
 
 
+def numbers_of(line: str) -> list[float]:
+    """Return the numbers of one line, as `parse_columns` reads them, without a remark behind; none if anything else stands on it."""
+    line = _REMARK.sub("", _without_quotes(line.strip()), count=1)
+    fields = next((reading.fields(line) for reading in _READINGS if reading.explains(line)), [line])
+    return [] if len(fields) == 1 and not _NUMBER.fullmatch(line) else [_number(field) for field in fields]
+
+
 def shorten(text: str) -> str:
     """Return at most 40 characters of a text, for a message."""
     return text if len(text) <= 40 else text[:37] + "..."

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from drivers.errors import PointFileError
 from drivers.files.point_file import points_of
 from drivers.files.stated_units import axis_letters
-from drivers.files.text_table import count_of, parse_columns, read_bytes, read_text, shorten
+from drivers.files.text_table import count_of, numbers_of, parse_columns, read_bytes, read_text, shorten
 
 ROWS = [[1.5, -2.25], [3.0, 4.125]]
 
@@ -106,3 +106,27 @@ def test_words_for_messages() -> None:
     assert axis_letters(["X [mm]", "y", "width", "z_mm", "xy"]) == ["x", "y", "", "z", ""]
     assert [count_of(1, "point"), count_of(2, "point")] == ["1 point", "2 points"]
     assert shorten("x" * 41) == "x" * 37 + "..."
+
+
+@pytest.mark.parametrize(
+    ("line", "numbers"),
+    [
+        ("1.000000D+00 -2.5d-1", [1.0, -0.25]),
+        ("  1.0 0.0 # TE", [1.0, 0.0]),
+        ("1.0 0.0 // edge", [1.0, 0.0]),
+        ("1,5 2,25", [1.5, 2.25]),
+        ("1,5; 2,25", [1.5, 2.25]),
+        ("1.5, .25", [1.5, 0.25]),
+        ("-2 3\t-2 3", [-2.0, 3.0, -2.0, 3.0]),
+        ("1;2;3", [1.0, 2.0, 3.0]),
+        ("12", [12.0]),
+        ("# 1 2", []),
+        ("1.0 0.0 TE", []),
+        ("NACA 0012", []),
+        ("", []),
+    ],
+)
+def test_one_line_is_read_as_the_columns_are(line: str, numbers: list[float]) -> None:
+    assert numbers_of(line) == numbers
+    if len(numbers) > 1:
+        assert parse_columns(f"{line}\n{line}").values.tolist() == [numbers, numbers]
