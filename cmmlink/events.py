@@ -1,6 +1,7 @@
 """What a run says while it goes on: immutable events, in the order in which things happened.
 
 `RunStarted` comes first and `RunFinished` last; between them every arrival from the source, and after points their verdicts.
+Once it is proven in mid-scan that the part will fail, `ProvenOut` says so; when it comes depends on how busy the machine is.
 A sink is any function that takes an event; it is called in the thread of the run and may stop the run by raising.
 """
 
@@ -73,6 +74,14 @@ class Judged:
     counts: Counts
 
 
+@dataclass(frozen=True, slots=True)
+class ProvenOut:
+    """No placement of the first `points` received passes, whatever comes: for display; the final verdict does not rest on it."""
+
+    time_s: float
+    points: int
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class RunFinished:
     """The run is over. Without a result, `message` says why there is none; after a failure it says what failed."""
@@ -83,5 +92,5 @@ class RunFinished:
     message: str
 
 
-Event = RunStarted | Arrived | Judged | RunFinished
+Event = RunStarted | Arrived | Judged | ProvenOut | RunFinished
 Sink = Callable[[Event], None]

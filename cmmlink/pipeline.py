@@ -12,7 +12,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from cmmlink.buffer import Buffer
-from cmmlink.events import Arrived, Counts, Ending, Event, Judged, RunFinished, RunStarted, Sink
+from cmmlink.events import Arrived, Counts, Ending, Event, Judged, ProvenOut, RunFinished, RunStarted, Sink
+from cmmlink.live_proof import LiveProof
 from drivers import HARMLESS_REASONS, Arrival, Damaged, DeviceError, Lost, PointBatch, Rejected, ScanClosed, ScanOpened, ScanSource
 from inspection import InspectionError, InspectionResult, LiveInspection, Missing, Rejection, Verdict
 
@@ -104,7 +105,8 @@ def run_inspection(
     try:
         _publish(sinks, started)
         reader.start()
-        _judge_all(source, live, sinks, buffer, tally, acquired, clock, stop)
+        with LiveProof(live) as proof:
+            _judge_all(source, live, proof, sinks, buffer, tally, acquired, clock, stop)
     finally:
         source.stop()
         buffer.close()
@@ -141,6 +143,7 @@ def _acquire(
 def _judge_all(
     source: ScanSource,
     live: LiveInspection,
+    proof: LiveProof,
     sinks: Sequence[Sink],
     buffer: "Buffer[tuple[float, Arrival]]",
     tally: _Tally,
@@ -149,6 +152,7 @@ def _judge_all(
     stop: threading.Event,
 ) -> None:
     """Take what arrives and judge it until acquisition has ended and the buffer is empty."""
+    told = False
     while True:
         ended = acquired.is_set()  # read before the buffer is emptied: after it is set, nothing more is handed over
         taken = buffer.take(0.0 if ended else _LOOK_S)
@@ -167,6 +171,10 @@ def _judge_all(
                     batches = []
         if batches:
             _judge(live, sinks, buffer, tally, batches, clock)
+            proof.offer()
+        if not told and proof.refuted is not None:
+            told = True
+            _publish(sinks, ProvenOut(clock(), proof.refuted))
 
 
 def _judge(

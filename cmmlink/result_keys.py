@@ -246,7 +246,9 @@ class RecordedPose(_Json):
     rotation_rad: float = Field(description="the rotation about the section's origin, counterclockwise")
     translation_mm: list[float] = Field(description="the translation after the rotation, [x, y]")
     rms_mm: float | None = Field(description="the root mean square of the deviations at this pose")
-    can_move_mm: float | None = Field(description="by how much a deviation can still move at most; null where it is not known")
+    can_move_mm: float | None = Field(
+        description="by how much a deviation can still move at most: 0 at a pose known beforehand, else null, since no bound is known"
+    )
     iterations: int = Field(description="the steps that the fit took")
     converged: bool = Field(description="whether the fit settled")
 

@@ -14,7 +14,7 @@ LinkPhase = Literal["connecting", "up", "down", "closed"]
 
 @dataclass(frozen=True, slots=True)
 class RegistrationState:
-    """How far the registration is, how far values can still move (mm), and how many other poses fit as well."""
+    """How far the registration is, how far values can still move (mm; null: no bound is known), and how many other poses fit."""
 
     state: Literal["seeking", "provisional", "settled"]
     can_move_mm: float | None

@@ -15,12 +15,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cmmlink.events import Arrived, Counts, Ending, Event, Judged, RunStarted
+from cmmlink.events import Arrived, Counts, Ending, Event, Judged, ProvenOut, RunStarted
 from cmmlink.extremes import DEVIATION, FOOT_X, NORMAL_X, STATION, VERDICT, ChangedBins, Extremes, PointsVersion
 from cmmlink.plan import Plan
 from cmmlink.result_json import number, result_json
 from cmmlink.run_state import LinkPhase, Phase, RegistrationState, RunKind, RunState, VerdictState, WorstPoint, ZoneLimits
-from cmmlink.words import NOT_MEASURED, VERDICT_NAMES, Headline, headline_of, local_words
+from cmmlink.words import LOOKS_OUT, NOT_MEASURED, VERDICT_NAMES, Headline, headline_of, local_words
 from drivers import Heartbeat, LinkDown, LinkUp, PointBatch, ScanClosed, ScanOpened
 from inspection import JudgedRows, LiveUpdate, NominalProfile, ToleranceZone, Verdict, coverage
 
@@ -102,6 +102,7 @@ class RunView:
         self._verdict_at: datetime | None = None
         self._update: LiveUpdate | None = None
         self._out = 0
+        self._proven_at: int | None = None
         self._coverage, self._coverage_s = 0.0, -math.inf
         self._ended: Ended | None = None
         self._failure = self._remark = ""
@@ -115,6 +116,8 @@ class RunView:
             self._take_arrival(event)
         elif isinstance(event, Judged):
             self._take_verdicts(event)
+        elif isinstance(event, ProvenOut):
+            self._take_proof(event)
         else:
             self._end(Ended(event.ending, event.message, result_json(event.result, event.counts), event.result), event.counts)
 
@@ -198,7 +201,8 @@ class RunView:
         anew = update.first == 0  # all points were judged once more: what was shown before is void
         extremes = self._empty_extremes() if anew else self._extremes
         extremes.add(update.station_mm, update.deviation_mm, update.foot_mm, update.actual_mm, update.verdicts)
-        out = int(np.count_nonzero(update.verdicts == Verdict.NONCONFORM)) + (0 if anew else self._out)
+        verdicts = self.context.zone.verdicts(update.deviation_mm)  # without what the pose can still move: what looks out now
+        out = int(np.count_nonzero(verdicts == Verdict.NONCONFORM)) + (0 if anew else self._out)
         covered, covered_s = self._coverage, self._coverage_s
         if event.time_s - covered_s > _COVERAGE_EVERY_S:
             covered, covered_s = coverage(extremes.stations_mm, self.context.profile), event.time_s
@@ -208,6 +212,11 @@ class RunView:
             self._update, self._counts, self._latency_s = update, counts, event.age_s
             if counts.judged:
                 self._verdict_at = self._now()
+            self._publish()
+
+    def _take_proof(self, event: ProvenOut) -> None:
+        with self._lock:
+            self._proven_at = event.points
             self._publish()
 
     def _end(self, ended: Ended, counts: Counts) -> None:
@@ -319,13 +328,15 @@ class RunView:
         return min(1.0, self._counts.received / self._expected) if self._expected else None
 
     def _verdict_so_far(self) -> VerdictState:
-        unproven = headline_of(Verdict.UNCERTAIN)
+        unproven, out = headline_of(Verdict.UNCERTAIN), headline_of(Verdict.NONCONFORM)
         if self._phase == "preparing":
             return _state_of(unproven, False, "preparing the inspection")
-        provisional = self._update is None or self._update.state != "settled"
+        if self._proven_at is not None:
+            return _state_of(out, False, f"no placement of the first {_points(self._proven_at)} passes")
         if self._out:
-            why = f"{_points(self._out)} out so far" + (", provisional" if provisional else "")
-            return _state_of(headline_of(Verdict.NONCONFORM), False, why)
+            is_proof = self._update is not None and self._update.state == "settled"
+            headline, proven = (out, "out so far") if is_proof else (LOOKS_OUT, "so far, not proven")
+            return _state_of(headline, False, f"{_points(self._out)} {proven}")
         if not self._counts.judged:
             seeking = self._update is not None and self._update.state == "seeking"
             return _state_of(unproven, False, "seeking the part" if seeking else "waiting for points")

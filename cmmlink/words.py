@@ -1,4 +1,7 @@
-"""The words of the verdict: as results spell them, and as people read them on the page, in the terminal and on pictures."""
+"""The words of the verdict: as results spell them, and as people read them on the page, in the terminal and on pictures.
+
+While a scan runs there is one more: points look out of tolerance, and it is not proven that the part will fail.
+"""
 
 import math
 from collections.abc import Mapping
@@ -50,6 +53,8 @@ def local_words(moment: datetime) -> str:
 
 
 NOT_MEASURED = Headline("NOT MEASURED", "none")
+LOOKS_OUT = Headline("LOOKS OUT", "not-proven")
+POSE_MOVES = "the pose still moves"
 
 
 def headline_of(verdict: Verdict | None, ending: str = "complete", share: float | None = None) -> Headline:

@@ -18,6 +18,7 @@ from inspection.methods import Method, WeightName
 from inspection.minimum_zone import MinimumZone, fit_minimum_zone
 from inspection.nominal import Material, NominalProfile, discretize
 from inspection.placements import PlacementProof, PlacementSearch
+from inspection.prefix import Prefix, PrefixSearch
 from inspection.registration import Registration
 from inspection.result import NOT_JUDGED, InspectionResult, JudgedRows, Rejection, Stretch
 from inspection.rigid import RigidTransform
@@ -49,6 +50,8 @@ __all__ = [
     "NurbsCurve",
     "PlacementProof",
     "PlacementSearch",
+    "Prefix",
+    "PrefixSearch",
     "Reason",
     "Registration",
     "RegistrationError",

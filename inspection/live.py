@@ -18,6 +18,7 @@ from inspection.conclusion import Missing
 from inspection.methods import Method, WeightName
 from inspection.nominal import NominalProfile
 from inspection.pose_track import PoseTrack, seek_pose
+from inspection.prefix import Prefix, PrefixSearch, prefix_of
 from inspection.registration import Registration
 from inspection.result import NOT_JUDGED, InspectionResult, rejections_by_reason
 from inspection.rigid import RigidTransform
@@ -40,7 +41,9 @@ class LiveUpdate:
     """What one batch changed. Arrays cover the received points first .. stop - 1; rejected points carry NaN and NOT_JUDGED.
 
     state       : seeking (no verdicts yet), provisional (the pose still moves), settled (a datum: final at once)
-    can_move_mm : by how much a provisional deviation can still move (95 %); NaN while seeking, 0 when settled
+    verdicts    : provisional ones are UNCERTAIN where the pose, as far as it is expected to move yet, could change them, and always
+                  for a minimum zone. They are no proof: form that is still to come may move the pose farther
+    can_move_mm : a bound on how far a deviation can still move: 0 when settled, else NaN, since none is known
     """
 
     state: State
@@ -163,6 +166,19 @@ class LiveInspection:
         self._judge(0, self._rows.count)
         return self._update(0)
 
+    def prefix(self) -> Prefix | None:
+        """A copy of the points so far for a `prefix_search`, None where no point looks out of tolerance and without a provisional pose.
+
+        None as well where outliers are rejected: what looks out may be rejected in the end.
+        """
+        if self._track is None or self._terms.reject_outliers:
+            return None
+        return prefix_of(self._rows, self._track.pose, self._track.slide_mm(), self._terms)
+
+    def prefix_search(self) -> PrefixSearch:
+        """A search for the proof that the part will fail, on the terms of this inspection. It may run in another thread."""
+        return PrefixSearch(self._terms)
+
     def finish(self, complete: bool = True, missing: Missing | None = None) -> InspectionResult:
         """Register all points together, judge every one at that pose, and say the verdict on the part.
 
@@ -177,7 +193,7 @@ class LiveInspection:
         """Deviations and verdicts of rows first .. stop - 1 at the pose of this moment, if there is one."""
         pose = self._track.pose if self._track is not None else self._known_pose
         if pose is not None:
-            self._rows.judge(first, stop, pose, self._terms)
+            self._rows.judge(first, stop, pose, self._terms, self._track.reserve_mm() if self._track is not None else 0.0)
 
     def _advance(self) -> bool:
         """Move the state at a block's end; True when every verdict given so far is replaced."""
@@ -204,7 +220,7 @@ class LiveInspection:
             rows.station[first:stop].copy(),
             rows.deviation[first:stop].copy(),
             rows.verdicts[first:stop].copy(),
-            0.0 if self._known_pose is not None else float("nan") if self._track is None else self._track.can_move_mm(),
+            0.0 if self._known_pose is not None else float("nan"),
             self._track.registration if self._track is not None else None,
         )
 

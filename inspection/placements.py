@@ -8,7 +8,7 @@ used, whatever datum, and whatever points are still to come, since the maximum o
 search is every anchor in the nominal's box grown by the zone, and every angle, so the answer depends on no start.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -88,11 +88,18 @@ class PlacementSearch:
         self._hits: dict[int, int] = {}
         self._passed: RigidTransform | None = None
 
-    def look(self, points_mm: ArrayLike, start: RigidTransform | None = None, most_boxes: int = 60_000) -> PlacementProof:
-        """Search every placement of section points (m, 2), the earlier ones the same as in the last call.
+    def look(
+        self,
+        points_mm: ArrayLike,
+        start: RigidTransform | None = None,
+        most_boxes: int = 60_000,
+        is_over: Callable[[], bool] = lambda: False,
+    ) -> PlacementProof:
+        """Search every placement of section points (m, 2). Earlier ones the same as in the last call make the search quick.
 
         start      : a pose near which a placement that passes is sought first; None begins at the points' best fit
         most_boxes : the search gives up after so many boxes, undecided
+        is_over    : asked between two waves of boxes; the search gives up once it says so, undecided
         """
         points = check_registrable(points_mm)
         if self._passed is not None and self._excess(points, self._passed) <= 0:
@@ -101,17 +108,18 @@ class PlacementSearch:
         if self._excess(points, zone.nominal_from_section) <= 0:
             self._passed = zone.nominal_from_section
             return PlacementProof("fits", self._passed, (), 0)
-        return self._search(points, zone.active.tolist(), most_boxes)
+        return self._search(points, zone.active.tolist(), most_boxes, is_over)
 
-    def _search(self, points: Array, active: list[int], most_boxes: int) -> PlacementProof:
+    def _search(self, points: Array, active: list[int], most_boxes: int, is_over: Callable[[], bool]) -> PlacementProof:
         """Refute boxes of motions until none is left, best first; `active` are the points that hold the minimum zone nearby."""
         anchor = int(np.argmin(((points - points.mean(axis=0)) ** 2).sum(axis=1)))
         arms = points - points[anchor]
         even = np.linspace(0, len(points) - 1, _EVEN_WITNESSES).astype(int).tolist()
-        self._hits = dict.fromkeys([*self._hits, *active, *even], 0) | self._hits
+        hits = {row: count for row, count in self._hits.items() if row < len(points)}
+        self._hits = dict.fromkeys([*hits, *active, *even], 0) | hits
         waiting, looked_at = self._root(), 0
         while len(waiting):
-            if looked_at >= most_boxes:
+            if looked_at >= most_boxes or is_over():
                 return PlacementProof("undecided", None, self._witnesses(), looked_at)
             wave, waiting = _best(waiting)
             looked_at += len(wave)

@@ -1,5 +1,6 @@
 """The provisional pose of a scan that still runs: sought on the points so far, then refined with every further block."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ from inspection.deviations import deviations
 from inspection.errors import RegistrationError
 from inspection.fine import MISFIT, ranked_poses, register_fine
 from inspection.kernels import GrowingSums
+from inspection.nominal import NominalProfile
 from inspection.registration import Registration
 from inspection.result import NOT_JUDGED
 from inspection.rigid import RigidTransform, rotation_about
@@ -32,12 +34,14 @@ class PoseTrack:
         self._terms, self._start, self._centre = terms, self.pose, registration.centre_mm
         self._expected_form_mm = _PRIOR_SHARE * (terms.zone.upper_mm - terms.zone.lower_mm)
         self._places, self._normals = nominal.points_mm[::_PLACES], nominal.outward * nominal.normal[::_PLACES]
+        self._stations = nominal.station_mm[::_PLACES]
         reach = float(np.hypot(*(self._places - self._centre).T).max())
         self._sums = GrowingSums(self._centre, reach, nominal.length_mm)
         d = deviations(self.pose.apply(points_mm), nominal, tip_radius_mm=terms.tip_radius_mm)
         part = np.where(d.beyond_end, np.int8(NOT_JUDGED), np.int8(0))
         self._sums.add(d.foot_mm, d.normal, d.deviation_mm - terms.target_mm, d.station_mm, part)
-        self._can_move_mm: float | None = None  # asked for at most once a batch, and only batches that end a block change it
+        self._ends, self._tangents = _open_ends(nominal)
+        self._reserve_mm: float | None = None  # asked for more often than it changes, which is once a block
 
     @property
     def pose(self) -> RigidTransform:
@@ -53,27 +57,46 @@ class PoseTrack:
         x, y, angle = self._sums.motion.tolist()
         pose = rotation_about(self._centre, angle, np.array([x, y])).after(self._start)
         self.registration = replace(self.registration, nominal_from_section=pose)
-        self._can_move_mm = None
+        self._reserve_mm = None
 
     def refit(self, points_mm: Array) -> "PoseTrack":
         """A track about the pose that fits all points (m, 2) so far, started at this one's."""
         return _fit_track(points_mm, self.pose, self._terms)
 
-    def can_move_mm(self) -> float:
-        """How far the remaining uncertainty of the pose (95 %) can still shift any deviation on the profile.
+    def reserve_mm(self) -> float:
+        """How far the last pose is expected to move a deviation that was measured: what provisional verdicts leave room for.
 
-        What changes from point to point is noise, independent at every point. The rest is form error, one value for every
-        eighth of the length: a scan of a few such patches is trusted no more than its patches, less those that the pose
-        itself used up. Where nothing is measured yet, form error of a sixth of the zone's width is expected.
+        One standard deviation by the model of `_scatter`, the largest over what was measured so far. This is an expectation, no
+        bound: form that is still to come can move the pose farther than all form so far. For a minimum zone it is infinite, since
+        one point still to come moves that as far as the point stands out.
         """
-        if self._can_move_mm is not None:
-            return self._can_move_mm
+        if self._terms.fit == "minimum-zone":
+            return math.inf
+        if self._reserve_mm is None:
+            held = self._sums.holds_points(self._stations)
+            self._reserve_mm = self._sums.spread_mm(self._places[held], self._normals[held], self._scatter())
+        return self._reserve_mm
+
+    def is_clear(self, largest_mm: float) -> bool:
+        """Whether the pose is expected to move no deviation anywhere on the profile by more than that (95 %)."""
+        return 2.0 * self._sums.spread_mm(self._places, self._normals, self._scatter()) < largest_mm
+
+    def slide_mm(self) -> float:
+        """How far the pose is expected to slide along an open profile at its ends (95 %), 0 for a closed one; no bound either."""
+        return 2.0 * self._sums.spread_mm(self._ends, self._tangents, self._scatter()) if len(self._ends) else 0.0
+
+    def _scatter(self) -> float:
+        """The variance (mm^2) of independent errors that would leave the pose as uncertain as noise and form do.
+
+        What changes from point to point is noise, independent at every point. The rest is form error, one value for every eighth
+        of the length: a scan of a few such patches is trusted no more than its patches, less those that the pose itself used up.
+        Where nothing is measured yet, form error of a sixth of the zone's width is expected.
+        """
         sums = self._sums
         patches = max(sums.covered / _CORRELATION, 1.0)
         form = max(sums.mean_square - sums.noise, 0.0) * patches / max(patches - 3.0, 0.5)
         form = max(form, self._expected_form_mm**2 * (1 - sums.covered))
-        self._can_move_mm = 2.0 * sums.spread_mm(self._places, self._normals, sums.noise + form * sums.count / patches)
-        return self._can_move_mm
+        return sums.noise + form * sums.count / patches
 
 
 def seek_pose(points_mm: Array, terms: Terms) -> PoseTrack | None:
@@ -88,9 +111,15 @@ def seek_pose(points_mm: Array, terms: Terms) -> PoseTrack | None:
     if not clear or scores[0] > largest_rms:
         return None
     track = _fit_track(points_mm, poses[0][1], terms)
-    return track if track.can_move_mm() < largest_rms else None
+    return track if track.is_clear(largest_rms) else None
 
 
 def _fit_track(points_mm: Array, start: RigidTransform, terms: Terms) -> PoseTrack:
     registration = register_fine(points_mm, terms.nominal, start, tip_radius_mm=terms.tip_radius_mm, target_mm=terms.target_mm)
     return PoseTrack(registration, points_mm, terms)
+
+
+def _open_ends(nominal: NominalProfile) -> tuple[Array, Array]:
+    """The ends of an open profile and the directions along it there, both (2, 2); (0, 2) for a closed one."""
+    ends = np.empty((0, 2)) if nominal.curve.closed else nominal.points_mm[[0, -1]]
+    return ends, nominal.normal[[0, -1]][: len(ends), ::-1] * np.array([1.0, -1.0])

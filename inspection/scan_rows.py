@@ -46,11 +46,16 @@ class ScanRows:
         take_in(points_mm, plane.packed, off_section_max_mm, self.points, self.rejection, self.count)
         self.height[self.count : self.count + len(points_mm)] = plane.heights(points_mm)
 
-    def judge(self, first: int, stop: int, pose: RigidTransform, terms: Terms) -> None:
-        """Fill in rows first .. stop - 1 as they are with the points at this pose."""
+    def judge(self, first: int, stop: int, pose: RigidTransform, terms: Terms, reserve_mm: float = 0.0) -> None:
+        """Fill in rows first .. stop - 1 as they are with the points at this pose.
+
+        reserve_mm : how far a deviation may still move; a verdict on a point is given where that cannot change it
+        """
         place = (math.cos(pose.rotation_rad), math.sin(pose.rotation_rad), *pose.translation_mm.tolist())
+        outward, tip_mm, lower_mm, upper_mm, uncertainty_mm = terms.judgement
+        judgement = (outward, tip_mm, lower_mm, upper_mm, uncertainty_mm + reserve_mm)
         arrays = (self.actual, self.foot, self.normal, self.station, self.deviation, self.verdicts, self.rejection)
-        judge_rows(self.points, arrays, first, stop, place, partial(feet_on, nominal=terms.nominal, method=terms.method), terms.judgement)
+        judge_rows(self.points, arrays, first, stop, place, partial(feet_on, nominal=terms.nominal, method=terms.method), judgement)
 
     def usable_rows(self) -> NDArray[np.int64]:
         """Rows (k,) of points that a registration may use."""

@@ -39,7 +39,7 @@ class Alarms:
             if event.counts.stalls > self._stalls:
                 self.raise_alarm("warning", "Buffer full", "the device was made to wait", event.counts.stalls - self._stalls)
                 self._stalls = event.counts.stalls
-        else:
+        elif isinstance(event, RunFinished):
             self._take_end(event)
 
     @property

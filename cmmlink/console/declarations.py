@@ -13,7 +13,7 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from cmmlink import extremes
+from cmmlink import extremes, words
 from cmmlink.console import protocol
 from inspection import Verdict
 
@@ -58,6 +58,7 @@ def _constants() -> dict[str, Any]:
         **{name: getattr(extremes, name) for name in columns},
         **{verdict.name: int(verdict) for verdict in Verdict},
         "WORDS_OF_VERDICTS": protocol.WORDS_OF_VERDICTS,
+        "POSE_MOVES": words.POSE_MOVES,
     }
 
 
@@ -117,8 +118,8 @@ def _type(hint: Any) -> str:
 
 
 def _bracketed(hint: Any) -> str:
-    words = _type(hint)
-    return f"({words})" if " " in words else words
+    name = _type(hint)
+    return f"({name})" if " " in name else name
 
 
 if __name__ == "__main__":

@@ -135,7 +135,7 @@ class Recorder:
             self._note_pose(event)
         elif isinstance(event, RunStarted):
             self._started, self._began = event, self._now()
-        elif self.run:
+        elif isinstance(event, RunFinished) and self.run:
             self._end(event)
 
     def __enter__(self) -> "Recorder":

@@ -12,7 +12,7 @@ from rich.table import Table
 from cmmlink.events import Counts, Ending
 from cmmlink.run_state import RunState
 from cmmlink.run_view import RunView
-from cmmlink.words import Shape, headline_of
+from cmmlink.words import POSE_MOVES, Shape, headline_of
 from inspection import InspectionResult, Rejection, Verdict
 
 STYLES = {Verdict.CONFORM: "bold green", Verdict.UNCERTAIN: "bold yellow", Verdict.NONCONFORM: "bold red"}
@@ -56,7 +56,6 @@ class LiveTable:
 
 def _table_rows(state: RunState) -> dict[str, str]:
     worst, registration = state.worst, state.registration
-    moving = "" if registration.can_move_mm is None else f", can move {registration.can_move_mm:.4f} mm"
     style = _STYLE_OF[state.verdict.shape]
     return {
         "part": escape(" ".join(filter(None, [state.part, state.serial_number]))),
@@ -64,7 +63,7 @@ def _table_rows(state: RunState) -> dict[str, str]:
         "link": escape(": ".join(filter(None, [state.link, state.link_detail]))),
         "points": f"{state.received} received, {state.judged} judged, {state.rejected} rejected, {state.lost} lost",
         "rate": f"{state.rate_per_s:.0f} points/s",
-        "registration": registration.state + (moving if registration.state == "provisional" else ""),
+        "registration": registration.state + (f", {POSE_MOVES}" if registration.state == "provisional" else ""),
         "worst": "" if worst is None else f"{worst.deviation_mm:+.4f} mm at station {worst.station_mm:.1f} mm",
         "verdict": f"[{style}]{state.verdict.word}[/]: {escape(state.verdict.why)}",
     }

@@ -61,6 +61,11 @@ class GrowingSums:
         """Half the mean squared change of the deviation from point to point, mm^2."""
         return float(self._change[0] / max(self.count, 1.0) / 2.0)
 
+    def holds_points(self, station_mm: Array) -> NDArray[np.bool_]:
+        """Whether the 64th of the length at stations (k,) holds a point."""
+        bins = (station_mm / self._frame[0][3] * len(self._marks)).astype(np.int64)
+        return np.asarray(self._marks[np.clip(bins, 0, len(self._marks) - 1)] > 0)
+
     @property
     def covered(self) -> float:
         """Share of the length that holds points."""

@@ -2,12 +2,13 @@
 
 import threading
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from datetime import datetime
 
 import numpy as np
 import pytest
 
-from cmmlink.events import Arrived, Counts, Judged, RunFinished, RunStarted
+from cmmlink.events import Arrived, Counts, Judged, ProvenOut, RunFinished, RunStarted
 from cmmlink.extremes import Extremes, PointsVersion
 from cmmlink.run_view import RunContext, RunView
 from drivers import Arrival, LinkDown, LinkUp, PointBatch, ScanClosed, ScanOpened
@@ -36,15 +37,18 @@ class Played:
         self.view(Arrived(self.now_s, arrival))
 
     def judge(self, first: int, deviation_mm: list[float], state: State = "provisional", received: int | None = None) -> None:
+        count = first + len(deviation_mm)
+        counts = Counts(received=count if received is None else received, judged=count)
+        self.view(Judged(self.now_s, 0.02, self.update(first, deviation_mm, state), counts))
+
+    def update(self, first: int, deviation_mm: list[float], state: State = "provisional") -> LiveUpdate:
         m = len(deviation_mm)
         station = np.linspace(0, self.profile.length_mm, m)
         deviation = np.array(deviation_mm)
         foot = np.column_stack([station, np.zeros(m)])
         actual = foot + np.column_stack([np.zeros(m), deviation])
         verdicts = np.select([np.abs(deviation) > 0.06, np.abs(deviation) > 0.04], [2, 1], 0).astype(np.int8)
-        update = LiveUpdate(state, first, first + m, actual, foot, station, deviation, verdicts, 0.003, None)
-        count = first + m if received is None else received
-        self.view(Judged(self.now_s, 0.02, update, Counts(received=count, judged=first + m)))
+        return LiveUpdate(state, first, first + m, actual, foot, station, deviation, verdicts, 0.003, None)
 
 
 @pytest.fixture
@@ -97,7 +101,8 @@ def test_verdict_so_far_counts_what_is_out_and_begins_anew_with_the_points(playe
     played.arrive(ScanOpened("scanner", "S-9", 3))
     played.judge(0, [0.0, 0.2, -0.03])
     state = played.view.state()
-    assert (state.verdict.word, state.verdict.why, state.out_of_tolerance) == ("NOT CONFORM", "1 point out so far, provisional", 1)
+    assert (state.verdict.word, state.verdict.shape, state.out_of_tolerance) == ("LOOKS OUT", "not-proven", 1)
+    assert state.verdict.why == "1 point so far, not proven"
     assert state.worst is not None
     assert (state.worst.deviation_mm, state.worst.verdict) == (0.2, "nonconform")
     assert (state.worst.x_mm, state.worst.y_mm) == pytest.approx((played.profile.length_mm / 2, 0.2))
@@ -109,6 +114,34 @@ def test_verdict_so_far_counts_what_is_out_and_begins_anew_with_the_points(playe
     assert state.worst.deviation_mm == -0.03
     assert played.view.newest_points.generation == before.generation + 1
     assert len(played.view.points_since(before)[0].bins) == 3
+
+
+def test_red_is_said_only_of_what_is_proven(played: Played) -> None:
+    played.arrive(ScanOpened("scanner", "S-9", 4))
+    played.judge(0, [0.0, 0.2, -0.03])
+    assert played.view.state().verdict.shape == "not-proven"
+    played.view(ProvenOut(played.now_s, 3))
+    told = played.view.state().verdict
+    assert (told.word, told.shape, told.final) == ("NOT CONFORM", "not-conform", False)
+    assert told.why == "no placement of the first 3 points passes"
+    played.judge(0, [0.0, 0.01, -0.03, 0.0])
+    assert played.view.state().verdict == told, "more points cannot undo a proof"
+
+
+def test_with_a_known_pose_a_point_that_is_out_is_proof(played: Played) -> None:
+    played.arrive(ScanOpened("scanner", "S-9", 4))
+    played.judge(0, [0.0, 0.055], "settled")
+    assert played.view.state().verdict.word == "NOT PROVEN", "out by less than U"
+    played.judge(2, [0.061], "settled")
+    told = played.view.state().verdict
+    assert (told.word, told.shape, told.final, told.why) == ("NOT CONFORM", "not-conform", False, "1 point out so far")
+
+
+def test_what_looks_out_is_counted_at_the_pose_of_the_moment_whatever_the_verdicts_leave_room_for(played: Played) -> None:
+    played.arrive(ScanOpened("scanner", "S-9", 4))
+    update = played.update(0, [0.0, 0.2, -0.2, 0.058])
+    played.view(Judged(played.now_s, 0.02, replace(update, verdicts=np.ones(4, dtype=np.int8)), Counts(received=4, judged=4)))
+    assert (played.view.state().out_of_tolerance, played.view.state().verdict.word) == (2, "LOOKS OUT")
 
 
 def test_state_that_was_given_never_changes(played: Played) -> None:

@@ -207,7 +207,7 @@ def test_the_live_table_shows_the_run_and_leaves_the_summary(tmp_path: Path) -> 
     with terminal("demo", "--defect", "0.12@40", *kept_in(tmp_path)) as screen:
         assert screen.to_the_end() == 1
     table, _, summary = screen.screen.rpartition("CONFORM")
-    for words in ("registration", "provisional, can move", "points/s", "SIMULATED", "so far, provisional", "/4000", "worst"):
+    for words in ("registration", "provisional, the pose still moves", "points/s", "SIMULATED", "/4000", "worst"):
         assert words in table, words
     assert "received 4000 = judged 4000 + rejected 0; lost 0 points" in summary
     assert "\x1b[?25h" in screen.screen.rpartition("\x1b[?25l")[2]  # the cursor is shown again

@@ -53,12 +53,11 @@ test("the card belongs to what the view shows", () => {
   assert.equal(cardOf({ ...heard, run: { ...run, kind: "replay" } }).badge, "REPLAY of then");
 });
 
-test("values move by nothing only where the registration is final", () => {
+test("values are final only where the registration is, and no number is claimed before", () => {
   assert.equal(moveWords(undefined), "\u2013");
   assert.equal(moveWords({ state: "seeking", can_move_mm: null, other_poses: 0 }), "\u2013");
-  assert.equal(moveWords({ state: "provisional", can_move_mm: 0.0123, other_poses: 0 }), "\u00b112.3 \u00b5m");
-  assert.equal(moveWords({ state: "provisional", can_move_mm: 0.25, other_poses: 0 }), "\u00b10.25 mm");
-  assert.equal(moveWords({ state: "settled", can_move_mm: 0, other_poses: 0 }), "nothing: final");
+  assert.equal(moveWords({ state: "provisional", can_move_mm: null, other_poses: 0 }), "the pose still moves");
+  assert.equal(moveWords({ state: "settled", can_move_mm: 0, other_poses: 0 }), "final");
   assert.equal(moveWords({ state: "settled", can_move_mm: 0, other_poses: 1 }), "final, but 1 other pose fits as well");
   assert.equal(moveWords({ state: "settled", can_move_mm: 0, other_poses: 2 }), "final, but 2 other poses fit as well");
 });

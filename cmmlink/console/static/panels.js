@@ -3,6 +3,7 @@
 import { buttonOf, byId, fillBar, make, put, putInto, showSymbol, styleOf, within } from "./dom.js";
 import { count, digitsFor, signed } from "./numbers.js";
 import { classOf, toleranceUse } from "./points.js";
+import { POSE_MOVES } from "./protocol.js";
 import { CODE_OF } from "./verdicts.js";
 
 /** @import { Control, RegistrationState, RunRow, RunState, StationState, SurfaceState } from "./protocol.js" */
@@ -157,15 +158,14 @@ function showRegistration(registration) {
 }
 
 /**
- * By how much values can still move.
+ * Whether values can still move. By how much is not said, since no bound is known while the pose moves.
  * @param {RegistrationState | undefined} registration
  */
 export function moveWords(registration) {
-  const move = registration?.can_move_mm ?? null, others = registration?.other_poses ?? 0;
+  const others = registration?.other_poses ?? 0;
   if (others) return `final, but ${others} other pose${others > 1 ? "s fit" : " fits"} as well`;
-  if (move === null) return NONE;
-  if (move === 0) return "nothing: final";
-  return move < 0.1 ? `\u00b1${(move * 1000).toFixed(1)} \u00b5m` : `\u00b1${move.toFixed(2)} mm`;
+  if (registration?.state === "provisional") return POSE_MOVES;
+  return registration?.state === "settled" ? "final" : NONE;
 }
 
 /**

@@ -18,6 +18,7 @@ export const CONFORM: 0;
 export const UNCERTAIN: 1;
 export const NONCONFORM: 2;
 export const WORDS_OF_VERDICTS: { readonly conform: "CONFORM"; readonly uncertain: "NOT PROVEN"; readonly nonconform: "NOT CONFORM" };
+export const POSE_MOVES: "the pose still moves";
 
 /** The first message: which version serves, which of its pages this is, and whether the network can reach it. */
 export interface Hello {
@@ -103,7 +104,7 @@ export interface AlarmList {
   readonly type: "alarms";
 }
 
-/** How far the registration is, how far values can still move (mm), and how many other poses fit as well. */
+/** How far the registration is, how far values can still move (mm; null: no bound is known), and how many other poses fit. */
 export interface RegistrationState {
   readonly state: "seeking" | "provisional" | "settled";
   readonly can_move_mm: number | null;

@@ -18,3 +18,4 @@ export const CONFORM = 0;
 export const UNCERTAIN = 1;
 export const NONCONFORM = 2;
 export const WORDS_OF_VERDICTS = {"conform": "CONFORM", "uncertain": "NOT PROVEN", "nonconform": "NOT CONFORM"};
+export const POSE_MOVES = "the pose still moves";

@@ -1,0 +1,97 @@
+"""What a scan that still runs can prove: that no placement of the points so far passes, so that no more points can save the part.
+
+The largest deviation over more points is never smaller. A prefix without a placement inside half the zone + U is therefore a part
+that fails under any fit and any datum, and no model of form or noise enters. The same holds for any choice of its points, which
+is how a long prefix stays quick to ask about.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inspection.errors import RegistrationError
+from inspection.placements import PlacementSearch
+from inspection.result import NOT_JUDGED
+from inspection.rigid import RigidTransform
+from inspection.scan_rows import ScanRows
+from inspection.terms import Terms
+
+Array = NDArray[np.float64]
+
+_SURELY = 3.0  # of what the pose can slide along an open end (95 %): points nearer to the end may lie beyond it at the last pose
+_BINS = 512  # shares of the length of which the lowest and the highest point stand for all, where there are more points
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prefix:
+    """The points of a scan so far that the last pose will judge, where they look out of tolerance at the pose of this moment.
+
+    received     : points received when this was taken
+    points_mm    : (m, 2) in section coordinates
+    station_mm   : (m,) at that pose
+    deviation_mm : (m,) likewise
+    pose         : nominal from section
+    """
+
+    received: int
+    points_mm: Array
+    station_mm: Array
+    deviation_mm: Array
+    pose: RigidTransform
+
+    def __post_init__(self) -> None:
+        for array in (self.points_mm, self.station_mm, self.deviation_mm):
+            array.setflags(write=False)
+
+
+class PrefixSearch:
+    """The search for a placement that passes, over the prefixes of one scan. It remembers what refuted most."""
+
+    def __init__(self, terms: Terms) -> None:
+        zone = terms.zone
+        self._length, self._middle = terms.nominal.length_mm, zone.middle_mm
+        self._search = PlacementSearch(terms.nominal, _half_mm(terms), zone.middle_mm, terms.tip_radius_mm)
+
+    def refutes(self, prefix: Prefix, is_over: Callable[[], bool] = lambda: False) -> bool:
+        """Whether it is proven that no placement of a prefix passes, and so that the part will fail. False says nothing.
+
+        is_over : asked now and then; the search is given up once it says so
+        """
+        rows = self._telling_rows(prefix)
+        try:
+            return self._search.look(prefix.points_mm[rows], prefix.pose, is_over=is_over).outcome == "refuted"
+        except RegistrationError:  # too few points, or all in one place
+            return False
+
+    def _telling_rows(self, prefix: Prefix) -> NDArray[np.int64]:
+        """Rows, in their order, of points that stand for all: the lowest and the highest of every share of the length."""
+        count = len(prefix.points_mm)
+        if count <= 2 * _BINS:
+            return np.arange(count)
+        bins = np.minimum((prefix.station_mm * (_BINS / self._length)).astype(np.int64), _BINS - 1)
+        order = np.lexsort((prefix.deviation_mm, bins))
+        borders = np.flatnonzero(np.diff(bins[order]))
+        return np.unique(np.concatenate([order[[0, -1]], order[borders], order[borders + 1]]))
+
+
+def prefix_of(rows: ScanRows, pose: RigidTransform, slide_mm: float, terms: Terms) -> Prefix | None:
+    """The prefix at a provisional pose, None where no point looks out there: that pose is then a placement that passes.
+
+    slide_mm : how far the pose may still slide along the profile at its open ends (95 %)
+    """
+    judged = np.flatnonzero(rows.verdicts[: rows.count] != NOT_JUDGED)
+    if not terms.nominal.curve.closed:
+        reserve = _SURELY * slide_mm + terms.zone.upper_mm - terms.zone.lower_mm
+        station = rows.station[judged]
+        judged = judged[(station > reserve) & (station < terms.nominal.length_mm - reserve)]
+    deviation = rows.deviation[judged]
+    if np.abs(deviation - terms.target_mm).max(initial=0.0) <= _half_mm(terms):
+        return None
+    return Prefix(rows.count, rows.points[judged], rows.station[judged], deviation, pose)
+
+
+def _half_mm(terms: Terms) -> float:
+    """How far from the middle of the zone a point may lie before it is proven to be out."""
+    return (terms.zone.upper_mm - terms.zone.lower_mm) / 2 + terms.zone.uncertainty_mm
