@@ -4,7 +4,7 @@ BIN := .venv/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 INSTALL := $(PIP) --no-build-isolation --editable
 
-.PHONY: demo install test lowest platforms upgrade bench paper soak
+.PHONY: demo install test lowest platforms upgrade bench paper soak proofs
 demo: .venv/installed
 	$(BIN)/cmmlink demo --out demo-result
 
@@ -35,6 +35,10 @@ upgrade: .venv/test-installed
 # A hundred recording processes killed at random moments; every acknowledged point must be there.
 soak: .venv/test-installed
 	$(BIN)/python -m tests.integration.killed soak 100
+
+# The proof in mid-scan over 1,200 simulated scans of six kinds, 200 each: no part that passes may be proven out.
+proofs: .venv/test-installed
+	$(BIN)/python -m tests.benchmarks.live_proof 200
 
 # Ours against the rivals of the package index, in one run; takes some minutes and wants a quiet machine.
 bench: .venv/bench-installed
