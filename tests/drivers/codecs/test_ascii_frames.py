@@ -212,15 +212,15 @@ def test_a_unit_that_is_none_is_named(unit: str) -> None:
         AsciiDecoder().feed(line(f"S,dev,1,{unit},3"))
 
 
-def test_a_million_points_with_flipped_bits_give_no_wrong_point_and_the_true_loss() -> None:
-    count = 1_000_000
+def test_thousands_of_flipped_bits_give_no_wrong_point_and_the_true_loss() -> None:
+    count = 200_000
     device, rng = AsciiDevice(), np.random.default_rng(4)
     sent_mm = np.round(rng.uniform(-100, 100, (count, 3)), 3)
     opening = device.opening(count)
     texts = (b"P,%d,%d,%.3f,%.3f,%.3f,0" % (i, 100 * i, x, y, z) for i, (x, y, z) in enumerate(sent_mm.tolist()))
     body = b"".join(b"%b*%04X\r\n" % (text, crc_hqx(text, 0xFFFF)) for text in texts)
-    damaged = flipped(opening + body, 1e-4, rng, first=len(opening)) + device.closing(count)
+    damaged = flipped(opening + body, 5e-4, rng, first=len(opening)) + device.closing(count)
     book = decoded(AsciiDecoder(), damaged, range(1024, len(damaged), 1024))
     only_sent_points(book, sent_mm, within_mm=0.0)
     assert len(set(book.sequence)) == len(book.sequence)
-    assert 1000 < book.lost == count - len(book.sequence)
+    assert 4000 < book.lost == count - len(book.sequence)

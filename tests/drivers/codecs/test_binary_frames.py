@@ -158,14 +158,14 @@ def test_a_heartbeat_puts_a_wrong_guess_right() -> None:
 
 
 @pytest.mark.parametrize("size", [1, 64])
-def test_a_million_points_with_flipped_bits_give_no_wrong_point_and_the_true_loss(size: int) -> None:
-    count = 1_000_000
+def test_thousands_of_flipped_bits_give_no_wrong_point_and_the_true_loss(size: int) -> None:
+    count = 200_000
     data, sent_mm = single(count) if size == 1 else blocks(count, size)
-    damaged = data[:72] + flipped(data[72:-72], 1e-4, np.random.default_rng(4)) + data[-72:]
+    damaged = data[:72] + flipped(data[72:-72], 5e-4, np.random.default_rng(4)) + data[-72:]
     book = decoded(BinaryDecoder(), damaged, range(1024, len(damaged), 1024))
     only_sent_points(book, sent_mm, within_mm=0.0)
     assert len(set(book.sequence)) == len(book.sequence)
-    assert 1000 < book.lost == count - len(book.sequence)
+    assert 2000 < book.lost == count - len(book.sequence)
 
 
 def test_a_point_marked_invalid_in_any_frame_is_rejected() -> None:

@@ -156,16 +156,16 @@ def test_a_lost_byte_costs_one_value(at: int) -> None:
     assert distances(book) == [millimetres(30_000 + i) for i in book.sequence]
 
 
-def test_a_million_values_with_flipped_bits() -> None:
+def test_thousands_of_flipped_bits_make_no_wrong_distance() -> None:
     """Marking bits, counter and clock may flip as they like; a flipped distance bit stays within the step that is allowed."""
-    count, step_mm = 1_000_000, 0.02
+    count, step_mm = 300_000, 0.02  # the counter wraps once
     index = np.arange(count)
     value = (32_000 + 20_000 * np.sin(index / 5000)).astype(np.int64)
     words = np.stack([value, (7 + index) % (1 << 18), index * 100 & 0xFFFF, index * 100 >> 16 & 0xFFFF], axis=1)
     parts = [words & 63, 64 | words >> 6 & 63, 128 | np.array([0, 64, 64, 64]) | words >> 12 & 63]
     data = INFO + np.stack(parts, axis=2).astype(np.uint8).tobytes()
     tail = b"".join(block(int(i), 30_000) for i in range(count, count + 3))
-    damaged = flipped(data, 1e-4, np.random.default_rng(4), first=len(INFO) + 24)
+    damaged = flipped(data, 3e-4, np.random.default_rng(4), first=len(INFO) + 24)
     decoder = OptoncdtDecoder(50.0, rate_hz=1000.0, count=count, largest_step_mm=step_mm)
     book = decoded(decoder, damaged + tail, range(1024, len(damaged), 1024))
     sequence = np.array(book.sequence)

@@ -90,14 +90,14 @@ def test_any_cut_of_a_damaged_stream_gives_the_same(seed: int, edges: list[int])
     assert decoded(make(), damaged, [min(edge, len(damaged)) for edge in edges]) == decoded(make(), damaged)
 
 
-def test_a_million_bursts_with_flipped_bits() -> None:
+def test_hundreds_of_flipped_bits_make_no_wrong_distance() -> None:
     """Flips of the four marking bits never give a wrong distance; flips of data bits stay within the step that is allowed."""
-    count = 1_000_000
+    count = 250_000
     values = (8000 + 4000 * np.sin(np.arange(count + 1) / 5000)).astype(np.int64)
     nibbles = np.stack([values >> 4 * k & 15 for k in range(4)], axis=1)
     clean = (0xC0 | (np.arange(count + 1) & 3)[:, None] << 4 | nibbles).astype(np.uint8)
     rng = np.random.default_rng(4)
-    struck = np.argwhere(rng.random(clean.shape) < 1e-4)
+    struck = np.argwhere(rng.random(clean.shape) < 4e-4)
     for marking_only in (True, False):
         damaged = clean.copy()
         damaged[struck[:, 0], struck[:, 1]] ^= (1 << rng.integers(4 if marking_only else 0, 8, len(struck))).astype(np.uint8)
