@@ -223,7 +223,14 @@ def _across(points_mm: Array) -> float:
         corners = points_mm[ConvexHull(points_mm).vertices]
     except QhullError:  # all on a line
         return float(np.hypot(*np.ptp(points_mm, axis=0)))
-    return float(np.hypot(*(corners[:, None, :] - corners[None, :, :]).transpose(2, 0, 1)).max())
+    # Two calipers turned about the hull (Shamos 1978): the corner across from an edge lies where the edges turn back on it. Pairs of
+    # all corners would take gigabytes where a nominal has ten thousands of samples.
+    x, y = (np.roll(corners, -1, axis=0) - corners).T
+    turned = np.arctan2(y, x)
+    turned = (turned - turned[0]) % (2 * np.pi)
+    across = np.searchsorted(turned, (turned + np.pi) % (2 * np.pi))
+    beside = [(across + shift) % len(corners) for shift in (-1, 0, 1)]  # and its neighbours, where edges are parallel up to rounding
+    return float(max(np.hypot(*(corners[other] - np.roll(corners, -end, axis=0)).T).max() for other in beside for end in (0, 1)))
 
 
 def _goes_round(points_mm: Array) -> bool:

@@ -1,4 +1,4 @@
-"""The demonstration as a process of its own: simulated device, serial line, pipeline, verdict, files."""
+"""The demonstration: simulated device, serial line, pipeline, verdict, files; in this process, and in a terminal of its own."""
 
 import csv
 import json
@@ -16,6 +16,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tests.cmmlink.command import cmmlink
+
 ROOT = Path(__file__).resolve().parents[2]
 PATIENCE_S = 60.0
 POINTS = 4000
@@ -26,30 +28,11 @@ def kept_in(folder: Path) -> list[str]:
     return ["--out", str(folder), "--records", str(folder / "records")]
 
 
-class Demonstration:
-    """The demonstration running without a terminal."""
-
-    def __init__(self, folder: Path, *options: str) -> None:
-        command = [sys.executable, "-m", "cmmlink", "demo", "--headless", "--json", *kept_in(folder), *options]
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT)
-
-    def ended(self) -> tuple[int, dict[str, Any]]:
-        """Exit code and JSON object of a demonstration that has nothing to complain of."""
-        out, err = self.process.communicate(timeout=PATIENCE_S)
-        assert [line for line in err.splitlines() if not line.startswith("cmmlink: compiling")] == []
-        return self.process.returncode, json.loads(out)
-
-
-@contextmanager
-def demonstrations(*settings: tuple[Path | str, ...]) -> Iterator[list[Demonstration]]:
-    """Several demonstrations side by side."""
-    running = [Demonstration(Path(folder), *map(str, options)) for folder, *options in settings]
-    try:
-        yield running
-    finally:
-        for one in running:
-            one.process.kill()
-            one.process.communicate()
+def demonstration(folder: Path, *options: str) -> tuple[int, dict[str, Any]]:
+    """Exit code and JSON object of a demonstration without a terminal, in this process; the device is a process of its own."""
+    ended = cmmlink("demo", "--headless", "--json", *kept_in(folder), *options)
+    assert ended.err == ""
+    return ended.code, ended.json()
 
 
 def judged_points(folder: Path) -> NDArray[np.float64]:
@@ -74,10 +57,8 @@ def has_the_defect(code: int, facts: dict[str, Any]) -> None:
 
 
 def test_the_demonstration_conforms_and_finds_a_defect_where_and_as_high_as_it_was_made(tmp_path: Path) -> None:
-    with demonstrations((tmp_path / "sound",), (tmp_path / "bad", "--defect", "0.12@40")) as (sound, bad):
-        (sound_code, sound_facts), (bad_code, bad_facts) = sound.ended(), bad.ended()
-    conforms(sound_code, sound_facts)
-    has_the_defect(bad_code, bad_facts)
+    conforms(*demonstration(tmp_path / "sound"))
+    has_the_defect(*demonstration(tmp_path / "bad", "--defect", "0.12@40"))
 
     # The same seed is the same part but for the defect: what differs is the bump alone.
     without, with_defect = judged_points(tmp_path / "sound"), judged_points(tmp_path / "bad")
@@ -90,8 +71,7 @@ def test_the_demonstration_conforms_and_finds_a_defect_where_and_as_high_as_it_w
 
 
 def test_another_seed_is_another_part_in_another_place(tmp_path: Path) -> None:
-    with demonstrations((tmp_path / "2", "--seed", "2"), (tmp_path / "3", "--seed", "3")) as running:
-        (code_2, two), (code_3, three) = (one.ended() for one in running)
+    (code_2, two), (code_3, three) = (demonstration(tmp_path / seed, "--seed", seed) for seed in ("2", "3"))
     assert (code_2, code_3) == (0, 0)
     # Seed n lies turned by 37 + 11 n degrees on the simulated machine, at (210, 145) mm.
     for seed, facts in ((2, two), (3, three)):
