@@ -13,11 +13,12 @@ from drivers.links.link_settings import LinkSettings
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Connected:
-    """A device made ready for one scan. `simulated` says that no real device is measured."""
+    """A device made ready for one scan. `simulated` says that no real device is measured; `notes` are what was assumed about it."""
 
     source: ScanSource
     device: str
     simulated: bool
+    notes: tuple[str, ...] = ()
 
 
 Connect = Callable[[Plan], AbstractContextManager[Connected]]
@@ -27,7 +28,11 @@ Connect = Callable[[Plan], AbstractContextManager[Connected]]
 @contextmanager
 def connect(plan: Plan) -> Iterator[Connected]:
     """Make the real device of a plan ready for one scan. Raises PlanError where the plan describes none."""
-    yield Connected(source_of(plan), words_of(plan.device), simulated=False)
+    source, device = source_of(plan), plan.device
+    notes: tuple[str, ...] = ()
+    if isinstance(source, PointFileSource) and isinstance(device, FileDevice):
+        notes = tuple(f"{device.file.name}: {note}" for note in source.notes)
+    yield Connected(source, words_of(device), simulated=False, notes=notes)
 
 
 def words_of(device: Device) -> str:
@@ -39,7 +44,7 @@ def source_of(plan: Plan) -> ScanSource:
     """The source of a plan's device; a file of points is read here. Raises PlanError or PointFileError."""
     device = plan.device
     if isinstance(device, FileDevice):
-        return PointFileSource(device.file, device.scale)
+        return PointFileSource(device.file, device.scale, unit=device.unit, columns=device.columns)
     try:
         return _source_with_axis(device)
     except ValueError as error:

@@ -42,18 +42,20 @@ class Counts:
 
 @dataclass(frozen=True, slots=True)
 class RunStarted:
-    """A run begins. `simulated` says that no real device is measured."""
+    """A run begins. `simulated` says that no real device is measured; `notes` are what was assumed about nominal and points."""
 
     part: str
     serial_number: str
     operator: str
     device: str
     simulated: bool
+    notes: tuple[str, ...] = ()
 
     @classmethod
     def from_header(cls, header: Mapping[str, Any]) -> "RunStarted":
         """The same from the header of a recorded run, which holds it among other things."""
-        return cls(*(header[field.name] for field in fields(cls)))
+        told = {field.name: header[field.name] for field in fields(cls) if field.name in header}  # older records hold no notes
+        return cls(**told | {"notes": tuple(told.get("notes", ()))})
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,8 +37,15 @@ def name_place(plan_file: Path, key: str) -> Iterator[None]:
 def profile_of(plan: Plan) -> NominalProfile:
     """The nominal that a plan names, discretised as it says."""
     nominal = plan.nominal
-    file = load_nominal(nominal.file, nominal.scale, nominal.closed)
+    file = load_nominal(nominal.file, nominal.mm_per_unit, nominal.closed)
     return discretize_file(file, nominal.file, nominal, plan.discretisation)
+
+
+def notes_on_nominal(plan: Plan) -> tuple[str, ...]:
+    """What was assumed or mended when the nominal of a plan was read, each with the name of its file."""
+    nominal = plan.nominal
+    unit = (f"read in {nominal.unit}, as asked",) if nominal.unit else ()
+    return tuple(f"{nominal.file.name}: {note}" for note in (*unit, *load_nominal(nominal.file, nominal.mm_per_unit, nominal.closed).notes))
 
 
 def discretize_file(file: NominalFile, path: Path, nominal: Nominal, finely: Discretisation) -> NominalProfile:
@@ -106,7 +113,7 @@ def _fitting(plan: Plan | CtPlan) -> _Fitting:
     }
 
 
-def run_started(plan: Plan | CtPlan, device: str, simulated: bool) -> RunStarted:
+def run_started(plan: Plan | CtPlan, device: str, simulated: bool, notes: tuple[str, ...] = ()) -> RunStarted:
     """The event that begins a run of a plan."""
     operator = plan.operator if isinstance(plan, Plan) else None
-    return RunStarted(plan.part.name, plan.part.serial_number or "", operator or "", device, simulated)
+    return RunStarted(plan.part.name, plan.part.serial_number or "", operator or "", device, simulated, notes)

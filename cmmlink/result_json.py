@@ -4,8 +4,14 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from cmmlink.events import Counts, RunStarted
 from inspection import InspectionResult, Registration, Verdict
+
+_PLACES = 50  # of the profile, whose numbers of points are compared
+_DENSER = 10.0
+_SHARE_OF_A_PLACE = 0.05  # of the points: fewer move no fit
 
 
 def result_json(result: InspectionResult | None, counts: Counts) -> dict[str, Any]:
@@ -48,6 +54,21 @@ def result_json(result: InspectionResult | None, counts: Counts) -> dict[str, An
     }
 
 
+def density_notes(result: InspectionResult | None, length_mm: float) -> list[str]:
+    """A reservation where the points lie far denser in one place of the profile than in others, for a fit by points follows them."""
+    if result is None or not result.judged:
+        return []
+    counts = np.histogram(result.station_mm[np.isfinite(result.station_mm)], bins=_PLACES, range=(0.0, length_mm))[0]
+    densest, sparse = int(counts.max()), float(np.quantile(counts[counts > 0], 0.1))
+    if densest < _SHARE_OF_A_PLACE * result.judged or densest <= _DENSER * sparse:
+        return []
+    at = int(counts.argmax()) * length_mm / _PLACES
+    return [
+        f"the points lie {densest / sparse:.0f} times as dense at station {at:.1f} .. {at + length_mm / _PLACES:.1f} mm as elsewhere: "
+        "a fit that counts points follows them"
+    ]
+
+
 def identity_json(started: RunStarted) -> dict[str, Any]:
     """What was measured, by whom and with what: the further keys of a run."""
     return {
@@ -56,6 +77,7 @@ def identity_json(started: RunStarted) -> dict[str, Any]:
         "operator": started.operator or None,
         "device": started.device,
         "simulated": started.simulated,
+        "notes": list(started.notes),
     }
 
 

@@ -119,6 +119,7 @@ class Measured(Inspected):
     operator: str | None = Field(description="who measured")
     device: str = Field(description="the device or file that the points came from")
     simulated: bool = Field(description="whether the device was a simulated one: no real part was measured")
+    notes: list[str] = Field(description="what was assumed about the nominal and the points: unit, columns, gaps, rows left out, density")
 
 
 class Recorded(Measured):
@@ -264,6 +265,9 @@ class Shown(_Json):
     operator: str = Field(description="who measured, empty where nobody was named")
     device: str = Field(description="the device that the points came from")
     simulated: bool = Field(description="whether the device was a simulated one")
+    notes: list[str] = Field(
+        default=[], description="what was assumed about the nominal and the points; records of earlier versions have none"
+    )
     software: dict[str, str] = Field(description="the versions of everything that the result depends on")
     plan_sha256: str = Field(description="the hash of the effective plan")
     nominal: str = Field(description="the name of the nominal's file")

@@ -15,13 +15,13 @@ from typing import Any
 
 from cmmlink.devices import Connected
 from cmmlink.events import RunStarted, Sink
-from cmmlink.from_plan import inspection_of, run_started
+from cmmlink.from_plan import inspection_of, notes_on_nominal, run_started
 from cmmlink.log import log_event
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan import Plan
 from cmmlink.record import PATIENCE_S, Recorder, RecordReference, RunInputs, open_to_record
 from cmmlink.result_folder import folder_of
-from cmmlink.result_json import identity_json, result_json
+from cmmlink.result_json import density_notes, identity_json, result_json
 from cmmlink.words import utc_words
 from inspection import NominalProfile, rehearse
 
@@ -47,11 +47,16 @@ class FinishedRun:
         started = self.started
         return " ".join(filter(None, [started.part, started.serial_number, "(SIMULATED)" if started.simulated else ""]))
 
+    @property
+    def notes(self) -> list[str]:
+        """What was assumed about the nominal and the points, and what the reader of the verdict has to know of them."""
+        return [*self.started.notes, *density_notes(self.outcome.result, self.profile.length_mm)]
+
     def result_json(self) -> dict[str, Any]:
         """The run as `--json` and result.json hold it."""
         evidence = asdict(self.evidence) if self.evidence else {}
-        found = result_json(self.outcome.result, self.outcome.counts)
-        return found | {"ending": self.outcome.ending, "measured_at": utc_words(self.began)} | identity_json(self.started) | evidence
+        found = result_json(self.outcome.result, self.outcome.counts) | identity_json(self.started) | {"notes": self.notes}
+        return found | {"ending": self.outcome.ending, "measured_at": utc_words(self.began)} | evidence
 
     def folder_of(self, pattern: Path) -> Path:
         """The folder of this run's results, its placeholders filled in; without a record the run is named by when it began."""
@@ -87,7 +92,7 @@ def carry_out(
     _log.info("nominal %s, %s, %s", plan.nominal.file, plan.tolerance.zone, plan.registration)
     rehearse(profile, plan.registration.method, plan.registration.reject_outliers)
     live = inspection_of(plan, profile)
-    started = run_started(plan, device.device, device.simulated)
+    started = run_started(plan, device.device, device.simulated, (*notes_on_nominal(plan), *device.notes))
     on_ready()
     began = now()
     with ExitStack() as stack:

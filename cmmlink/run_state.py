@@ -56,6 +56,7 @@ class RunState:
     """Everything that is shown of a run in numbers and words, as it was at one moment.
 
     kind          : a run that is measured, or what poses as none: a replay, a run from the records, a section of a surface
+    notes         : what was assumed about the nominal and the points
     began         : when the points were measured: date, time of day and offset from UTC
     ending        : null while the run is on; message says why a run has no result, or what failed
     link_detail   : why the link was lost, or how long it was away; empty while it never was
@@ -74,6 +75,7 @@ class RunState:
     device: str
     address: str
     simulated: bool
+    notes: tuple[str, ...]
     began: str
     phase: Phase
     ending: Ending | Literal["failed"] | None

@@ -261,6 +261,7 @@ class RunView:
             plan=context.plan,
             part=started.part,
             serial_number=started.serial_number,
+            notes=started.notes,
             operator=started.operator,
             device=self._device_name or started.device,
             address=started.device,

@@ -241,7 +241,7 @@ class _Profiles:
 
     def _load(self, path: Path) -> None:
         nominal = self._plan.nominal
-        file = load_nominal(path, nominal.scale, nominal.closed)
+        file = load_nominal(path, nominal.mm_per_unit, nominal.closed)
         self.notes += [f"{path.name}: {note}" for note in file.notes]
         self._profiles[path] = discretize_file(file, path, nominal, Discretisation())
 

@@ -81,10 +81,11 @@ def contour_of(points_mm: Array, nominal: NominalProfile) -> Contour:
     """
     away = np.abs(points_mm - np.median(points_mm, axis=0)).max(axis=1)
     near = points_mm[away <= _NEAR * nominal.size_mm]
-    contour = trace_contour(near, nominal.length_mm / (_SIGNATURE_STEPS * _CELLS_A_STEP))
-    if len(contour.points_mm) >= FEWEST_POINTS:
-        return contour
-    few = points_mm[np.lexsort(points_mm.T)][:: max(1, len(points_mm) // FEWEST_POINTS)]  # all in a few cells
+    if len(near) >= FEWEST_POINTS:
+        contour = trace_contour(near, nominal.length_mm / (_SIGNATURE_STEPS * _CELLS_A_STEP))
+        if len(contour.points_mm) >= FEWEST_POINTS:
+            return contour
+    few = points_mm[np.lexsort(points_mm.T)][:: max(1, len(points_mm) // FEWEST_POINTS)]  # all in a few cells, or none near another
     return Contour(few, np.ones(len(few)), np.arange(len(few)))
 
 

@@ -14,7 +14,7 @@ from typing import Annotated
 import typer
 
 from cmmlink.commands.console import serve_console
-from cmmlink.commands.exit_codes import DEVICE_FAILED, NO_RECORD, STOPPED, UNUSABLE, fail
+from cmmlink.commands.exit_codes import DEVICE_FAILED, NO_RECORD, STOPPED, UNUSABLE, fail, fail_as_asked
 from cmmlink.commands.measure import demo, inspect, run
 from cmmlink.commands.records import export, replay, runs, show, verify
 from cmmlink.commands.setup import check, doctor, list_ports, nominal, simulate
@@ -89,11 +89,11 @@ def _run_command() -> int | str | None:
     except typer.TyperException as error:
         code = fail(_usage(error), UNUSABLE)
     except (PlanError, RunError, InspectionError, PointFileError, MeshError) as error:
-        code = fail(str(error), UNUSABLE)
+        code = fail_as_asked(error, UNUSABLE)
     except DeviceError as error:
-        code = fail(str(error), DEVICE_FAILED)
+        code = fail_as_asked(error, DEVICE_FAILED)
     except StoreError as error:
-        code = fail(str(error), NO_RECORD)
+        code = fail_as_asked(error, NO_RECORD)
     except OSError as error:
         code = fail(str(error) if error.filename else f"the answer could not be written: {error}", UNUSABLE)
         _silence_stdout()

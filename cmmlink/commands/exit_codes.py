@@ -1,12 +1,14 @@
 """What a command's exit status says, and the one line on standard error that goes with a failure."""
 
+import json
 import logging
 import sys
 
-from inspection import Verdict
+from inspection import NotMeasured, Verdict
 
 EXIT_OF = {Verdict.CONFORM: 0, Verdict.NONCONFORM: 1, Verdict.UNCERTAIN: 3}
 UNUSABLE, DEVICE_FAILED, NO_RECORD = 2, 4, 5
+_KIND_OF = {UNUSABLE: "unusable", DEVICE_FAILED: "device-failed", NO_RECORD: "no-record"}
 STOPPED = 130  # by Ctrl-C outside a run; shells and typer use this number
 
 
@@ -18,3 +20,12 @@ def fail(message: str, code: int) -> int:
     _log.error("%s", message, exc_info=sys.exc_info()[0] is not None)
     sys.stderr.write(f"cmmlink: {message}\n")
     return code
+
+
+def fail_as_asked(error: Exception, code: int) -> int:
+    """The same for an error that leaves no result; where --json was asked for, a JSON object on standard output says it as well."""
+    if "--json" in sys.argv[1:]:
+        kind = "not-measured" if isinstance(error, NotMeasured) else _KIND_OF[code]
+        sys.stdout.write(json.dumps({"error": {"kind": kind, "message": str(error), "exit_status": code}}) + "\n")
+        sys.stdout.flush()
+    return fail(f"{error} (NOT MEASURED)" if isinstance(error, NotMeasured) else str(error), code)

@@ -15,22 +15,28 @@ from cmmlink.commands.console import run_on_page
 from cmmlink.commands.options import (
     AllowUnseen,
     Closed,
+    ColumnsText,
     EndAllowance,
     GapMax,
     Headless,
     Json,
     NoBrowser,
     NominalScale,
+    NominalUnit,
     NoRecord,
     Out,
+    Plane,
     PlanFile,
     Records,
     RejectOutliers,
     Rule,
     Uncertainty,
+    Unit,
     Weights,
+    columns_from,
     plan_from_options,
     records_folder,
+    section_in,
 )
 from cmmlink.commands.output import Output, now, report_outcome, stop_on_ctrl_c
 from cmmlink.demo import plan_file as demo_plan_file
@@ -49,6 +55,7 @@ _OPTION_OF = {
     "device": "POINTS",
     "nominal.file": "--nominal",
     "nominal.scale": "--scale",
+    "nominal.unit": "--nominal-unit",
     "tolerance.uncertainty_mm": "--uncertainty",
     "tolerance": "--tolerance",
     "probe.tip_radius_mm": "--tip-radius",
@@ -139,6 +146,10 @@ def inspect(
     tip_radius: Annotated[float, typer.Option(metavar="R", help="The points are centres of a ball of this radius, mm.")] = 0.0,
     uncertainty: Uncertainty = 0.0,
     scale: NominalScale = 1.0,
+    nominal_unit: NominalUnit = None,
+    unit: Unit = None,
+    columns: ColumnsText = None,
+    plane: Plane = "xy",
     closed: Closed = None,
     material: Annotated[Material | None, typer.Option(help="Side of the material, seen along the nominal.")] = None,
     coverage_min: Annotated[
@@ -158,9 +169,10 @@ def inspect(
     """Inspect a file of points, and record it as a run."""
     settings = {
         "part": {"name": points.stem.strip() or points.name},
-        "nominal": {"file": nominal, "scale": scale, "closed": closed, "material": material},
+        "nominal": {"file": nominal, "scale": scale, "unit": nominal_unit, "closed": closed, "material": material},
         "tolerance": {"lower_mm": tolerance[0], "upper_mm": tolerance[1], "uncertainty_mm": uncertainty},
-        "device": {"type": "file", "file": points},
+        "device": {"type": "file", "file": points, "unit": unit, "columns": columns_from(columns)},
+        "section": section_in(plane),
         "probe": {"tip_radius_mm": tip_radius},
         "registration": {"fit": fit, "method": method, "coverage_min": coverage_min, "reject_outliers": reject_outliers},
         "rule": rule,
@@ -180,5 +192,6 @@ def inspect(
         folder = None if no_record else records_folder(records)
         finished = carry_out(plan, profile, device, records=folder, clock=time.monotonic, now=now, stop=stop, patience_s=_PATIENCE_S)
     if finished.outcome.refusal is not None:
-        raise PlanError(f"{points}: {finished.outcome.refusal}")
+        refusal = finished.outcome.refusal
+        raise type(refusal)(f"{points}: {refusal}")
     return report_outcome(finished, Output(headless=True, as_json=as_json, out=out))

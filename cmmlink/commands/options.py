@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 import typer
 from pydantic import BaseModel, ValidationError
@@ -10,6 +10,7 @@ from pydantic import BaseModel, ValidationError
 from cmmlink.errors import PlanError
 from cmmlink.plan import words_of_allowed
 from cmmlink.record import default_folder
+from drivers import UnitName
 from inspection import RuleName, WeightName
 
 PlanFile = Annotated[Path, typer.Argument(metavar="PLAN.yaml", help="The inspection plan.")]
@@ -40,6 +41,11 @@ Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder f
 Records = Annotated[Path | None, typer.Option("--records", metavar="DIR", help="Folder of the run records.")]
 NoRecord = Annotated[bool, typer.Option("--no-record", help="Keep no record of it.")]
 RunName = Annotated[str, typer.Argument(metavar="RUN", help="The id of a run, the beginning of one, or last.")]
+Unit = Annotated[UnitName | None, typer.Option("--unit", help="Unit of the points, above what their file states.")]
+NominalUnit = Annotated[UnitName | None, typer.Option("--nominal-unit", help="Unit of the nominal file, in place of --scale.")]
+PlaneName = Literal["xy", "xz", "yz"]
+Plane = Annotated[PlaneName, typer.Option("--plane", help="The plane that the points of the section lie in.")]
+ColumnsText = Annotated[str | None, typer.Option("--columns", metavar="x=2,y=3", help="Columns of x, y and z in the file, from 1.")]
 Headless = Annotated[bool, typer.Option("--headless", help="No page, no live table.")]
 NoBrowser = Annotated[bool, typer.Option("--no-browser", help="Serve the page and print its address, but open no browser.")]
 Uncertainty = Annotated[float, typer.Option(metavar="U", help="Expanded uncertainty of a deviation, mm.")]
@@ -68,3 +74,20 @@ def plan_from_options(model: type[Model], settings: Mapping[str, object], option
         value = problem["input"]
         found = f" is {value:g}" if isinstance(value, int | float) and not isinstance(value, bool) else ""
         raise PlanError(f"{option}{found}: expected {words_of_allowed(problem)}") from None
+
+
+def columns_from(text: str | None) -> dict[str, int] | None:
+    """The columns of x, y and z from an option like x=2,y=3. Raises PlanError."""
+    if text is None:
+        return None
+    told = [part.partition("=") for part in text.replace(" ", "").lower().split(",")]
+    columns = {axis: int(place) for axis, _, place in told if axis in ("x", "y", "z") and place.isdecimal()}
+    if len(columns) != len(told) or len(columns) < 2 or len(set(columns.values())) < len(columns) or min(columns.values()) < 1:
+        raise PlanError(f"--columns {text}: expected different columns, counted from 1, for two or three of x, y and z, like x=2,y=3")
+    return columns
+
+
+def section_in(plane: PlaneName) -> dict[str, Any]:
+    """The section of a plan that lies in a plane of the machine: the first axis becomes x, the second y."""
+    normal = {"xy": (0.0, 0.0, 1.0), "xz": (0.0, -1.0, 0.0), "yz": (1.0, 0.0, 0.0)}[plane]
+    return {"normal": normal, "x_axis": (0.0, 1.0, 0.0) if plane == "yz" else (1.0, 0.0, 0.0)}

@@ -18,6 +18,7 @@ from cmmlink.commands.exit_codes import DEVICE_FAILED, EXIT_OF, UNUSABLE
 from cmmlink.console.launch import graphical_browser
 from cmmlink.report import print_summary, write_run
 from cmmlink.run import FinishedRun
+from inspection import NotMeasured
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,8 +54,13 @@ def terminal() -> Console:
 
 
 def report_outcome(run: FinishedRun, output: Output) -> int:
-    """Print the outcome and write its files, each even if the other fails. Returns the exit code."""
+    """Print the outcome and write its files, each even if the other fails. Returns the exit code.
+
+    Raises NotMeasured where the set-up contradicts the points: then there is no result to print or to write.
+    """
     outcome, evidence = run.outcome, run.evidence
+    if isinstance(outcome.refusal, NotMeasured) and outcome.failure is None and outcome.ending == "complete":
+        raise outcome.refusal
     message = str(outcome.failure or outcome.refusal or "")
     if outcome.ending == "aborted":
         message = message or "stopped by the operator: the scan is not complete"
@@ -70,7 +76,7 @@ def report_outcome(run: FinishedRun, output: Output) -> int:
         if output.as_json:
             print_json(run.result_json())
         else:
-            print_summary(terminal(), outcome.result, outcome.counts, f"{run.title}, {run.started.device}", outcome.ending)
+            print_summary(terminal(), outcome.result, outcome.counts, f"{run.title}, {run.started.device}", outcome.ending, run.notes)
     if written and not output.as_json:
         typer.echo(f"results in {folder}: {', '.join(written)}")
     if evidence is not None and not output.as_json:

@@ -16,7 +16,7 @@ from cmmlink.buffer import CAPACITY_POINTS
 from cmmlink.errors import PlanError, YamlError
 from cmmlink.plan.yaml_model import Positive, Settings, line_of, read_model
 from cmmlink.result_folder import check_placeholders
-from drivers import PointFileError, device_address, read_text, shipped_maps
+from drivers import AxisName, PointFileError, UnitName, device_address, mm_per, read_text, shipped_maps
 from inspection import FitName, Material, Method, RuleName, ToleranceZone, WeightName
 
 Vector = tuple[float, float, float]
@@ -52,6 +52,16 @@ _AXIS = "what makes points of the distances of a one-dimensional sensor"
 _LEAST_SINE = 1e-3  # between x axis and normal: below it the direction of x in the plane is noise
 
 
+def _in_place_of_scale(unit: UnitName | None, info: ValidationInfo) -> UnitName | None:
+    """A unit in words, refused where a scale is given as well."""
+    if unit is not None and info.data.get("scale", 1.0) != 1.0:
+        raise ValueError("either unit or scale")
+    return unit
+
+
+Unit = Annotated[UnitName | None, AfterValidator(_in_place_of_scale)]
+
+
 class Part(Settings):
     """What is measured."""
 
@@ -64,10 +74,16 @@ class Nominal(Settings):
 
     file: Path = Field(description="the file of the nominal profile: UIUC dat, points, or NURBS yaml")
     scale: Positive = Field(default=1.0, description="how many mm a unit of the file is; for an airfoil in chord units, the chord in mm")
+    unit: Unit = Field(default=None, description="the unit of the file in words, in place of scale: mm, um or inch")
     closed: bool | None = Field(default=None, description="whether the profile is closed; null: as the file shows; a blunt edge is closed")
     material: Material | None = Field(
         default=None, description="the side of the material, seen along the direction of travel; null: inside a closed profile"
     )
+
+    @property
+    def mm_per_unit(self) -> float:
+        """How many mm a unit of the file is."""
+        return mm_per(self.unit) if self.unit else self.scale
 
 
 class Tolerance(Settings):
@@ -170,6 +186,14 @@ class FileDevice(Settings):
     type: Literal["file"] = Field(description="a file of points in place of a device")
     file: Path = Field(description="the file of points: csv, txt, asc, xyz or npy")
     scale: Positive = Field(default=1.0, description="how many mm a unit of the file is")
+    unit: Unit = Field(
+        default=None,
+        description="the unit of the file in words, in place of scale: mm, um or inch; null: mm, unless the file says otherwise",
+    )
+    columns: dict[AxisName, Annotated[int, Field(ge=1)]] | None = Field(
+        default=None,
+        description="the columns of x, y and z, counted from 1, like {x: 2, y: 3}; null: as the file names them, or the first",
+    )
 
 
 Device = Annotated[SerialDevice | ModbusDevice | FileDevice, Field(discriminator="type")]

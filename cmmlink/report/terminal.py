@@ -1,7 +1,7 @@
 """The live table of a run and its summary, in the terminal."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 from rich.console import Console, Group
 from rich.live import Live
@@ -69,13 +69,22 @@ def _table_rows(state: RunState) -> dict[str, str]:
     }
 
 
-def print_summary(console: Console, result: InspectionResult | None, counts: Counts, heading: str, ending: Ending = "complete") -> None:
+def print_summary(
+    console: Console,
+    result: InspectionResult | None,
+    counts: Counts,
+    heading: str,
+    ending: Ending = "complete",
+    notes: Sequence[str] = (),
+) -> None:
     """Print the verdict, or how early the run ended; the four numbers, and what the verdict on the profile rests on."""
     verdict, share = (None, None) if result is None or not counts.received else (result.verdict, result.coverage)
     headline = headline_of(verdict, ending if counts.received else "complete", share)
     console.print(f"[{_STYLE_OF[headline.shape]}]{headline.words}[/]   {escape(heading)}".rstrip())
     for reason in _reservations(result):
         console.print(f"  {reason}", style="yellow")
+    for note in notes:
+        console.print(f"  note: {escape(note)}")
     console.print(f"received {counts.received} = judged {counts.judged} + rejected {counts.rejected}; lost {counts.lost} points")
     for reason, count in counts.rejected_by_reason.items():
         console.print(f"  rejected: {count} {reason}")

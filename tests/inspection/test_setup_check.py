@@ -78,6 +78,13 @@ def test_a_scan_of_another_size_is_not_measured(nominal: NominalProfile, factor:
     assert mend in told
 
 
+def test_a_scan_in_micrometres_is_not_measured_while_its_pose_is_sought(nominal: NominalProfile) -> None:
+    live = LiveInspection(nominal, ZONE)
+    live.add(scan(nominal) * 1000)
+    with pytest.raises(NotMeasured, match="--unit um"):
+        live.finish()
+
+
 def test_a_unit_is_named_for_points_in_any_order(nominal: NominalProfile) -> None:
     points = np.random.default_rng(3).permutation(scan(nominal)) / 25.4
     assert "--unit inch" in refusal(points, nominal, zone=ToleranceZone(-0.5, 0.5), coverage_min=0.0)

@@ -135,7 +135,7 @@ export interface ZoneLimits {
   readonly uncertainty_mm: number;
 }
 
-/** Everything that is shown of a run in numbers and words, as it was at one moment. kind : a run that is measured, or what poses as none: a replay, a run from the records, a section of a surface began : when the points were measured: date, time of day and offset from UTC ending : null while the run is on; message says why a run has no result, or what failed link_detail : why the link was lost, or how long it was away; empty while it never was streaming : whether the device shows itself alive now expected : number of points the device announced latency_s : how long the newest judged point waited for its verdict verdict_at_ms : when the newest verdict was given, ms since 1970 */
+/** Everything that is shown of a run in numbers and words, as it was at one moment. kind : a run that is measured, or what poses as none: a replay, a run from the records, a section of a surface notes : what was assumed about the nominal and the points began : when the points were measured: date, time of day and offset from UTC ending : null while the run is on; message says why a run has no result, or what failed link_detail : why the link was lost, or how long it was away; empty while it never was streaming : whether the device shows itself alive now expected : number of points the device announced latency_s : how long the newest judged point waited for its verdict verdict_at_ms : when the newest verdict was given, ms since 1970 */
 export interface RunState {
   readonly number: string;
   readonly kind: "run" | "replay" | "recorded" | "section";
@@ -146,6 +146,7 @@ export interface RunState {
   readonly device: string;
   readonly address: string;
   readonly simulated: boolean;
+  readonly notes: readonly string[];
   readonly began: string;
   readonly phase: "preparing" | "starting" | "measuring" | "ending" | "finished";
   readonly ending: "complete" | "aborted" | "interrupted" | "failed" | null;
