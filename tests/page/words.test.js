@@ -7,7 +7,8 @@ import { alarmWords } from "../../cmmlink/console/static/alarms.js";
 import { CODE_OF, SHAPE_OF, wordOf } from "../../cmmlink/console/static/verdicts.js";
 import { ageWords, bannersOf, cardOf, moveWords, readiness } from "../../cmmlink/console/static/panels.js";
 
-const HEARD = { view: "live", chosen: null, surface: null, run: null, isRecorded: false, station: null, control: null, hasFault: false, isRemote: false, link: "live" };
+const HEARD = { view: "live", chosen: null, surface: null, run: null, isRecorded: false,
+  station: null, control: null, hasFault: false, isRemote: false, link: "live" };
 const RUN = { number: "run 7", phase: "measuring", link: "up", remark: "" };
 
 test("the most urgent thing stands in the banner", () => {
@@ -20,7 +21,8 @@ test("the most urgent thing stands in the banner", () => {
   assert.match(bannerOf({ ...HEARD, link: "away" }).words, /STALE/);
   assert.match(bannerOf({ ...HEARD, run: lost, control: watching }).words, /LINK LOST/);
   assert.deepEqual(bannersOf({ ...HEARD, run: { ...lost, phase: "finished" } }), []);
-  assert.deepEqual(bannerOf({ ...HEARD, run: RUN, isRecorded: true }), { words: "run 7", kind: "note", button: "Back to live", act: "live" });
+  assert.deepEqual(bannerOf({ ...HEARD, run: RUN, isRecorded: true }),
+    { words: "run 7", kind: "note", button: "Back to live", act: "live" });
   assert.match(bannerOf({ ...HEARD, control: watching }).words, /another page is in control/);
   assert.match(bannerOf({ ...HEARD, control: { ...watching, taken: false } }).words, /no page is in control/);
   assert.equal(bannerOf({ ...HEARD, run: { ...RUN, remark: "identical" }, isRemote: true }).words, "identical");
@@ -45,7 +47,8 @@ test("the card belongs to what the view shows", () => {
   const surface = { plan: "ct.yaml", word: "NOT CONFORM", shape: "not-conform", state: "done", message: "", done: 3, total: 3 };
   const ct = cardOf({ ...heard, view: "ct", surface });
   assert.deepEqual([ct.part, ct.serial, ct.word], ["ct.yaml", "", "NOT CONFORM"]);
-  const chosen = { part: "blade", serial_number: "B-0", word: "ABORTED AT 32 %", shape: "ended-early", counted: false, began: "once", run: "r" };
+  const chosen = { part: "blade", serial_number: "B-0", word: "ABORTED AT 32 %",
+    shape: "ended-early", counted: false, began: "once", run: "r" };
   const row = cardOf({ ...heard, view: "history", chosen });
   assert.deepEqual([row.serial, row.word, row.final, row.badge], ["B-0", "ABORTED AT 32 %", false, "RECORDED once"]);
   const isOn = { ...run, phase: "measuring", verdict: { ...verdict, final: false } };

@@ -13,7 +13,8 @@ export function showAlarms(alarms, kind) {
   const open = alarms.filter((alarm) => !alarm.acknowledged || alarm.active);
   const first = open.find((alarm) => alarm.severity === "fault" && alarm.current) ?? open.find((alarm) => alarm.current) ?? open[0];
   const isEarlier = first && (!first.current || kind === "replay" || kind === "recorded");
-  const words = !first ? "" : isEarlier ? `${whose(first)}: ${alarmWords(first)}` : alarmWords(first), more = open.length > 1 ? `  (+${open.length - 1})` : "";
+  const owner = first && isEarlier ? `${whose(first)}: ` : "";
+  const words = first ? owner + alarmWords(first) : "", more = open.length > 1 ? `  (+${open.length - 1})` : "";
   const line = byId("alarms");
   line.dataset.severity = isEarlier ? "earlier" : first?.severity ?? "none";
   line.dataset.acknowledged = String(Boolean(first?.acknowledged));

@@ -6,7 +6,8 @@ import { INK, Sheet, cross, mark, ring } from "./sheet.js";
 
 /** @import { RunRow } from "./protocol.js" */
 /** @import { Pen } from "./sheet.js" */
-/** @typedef {{ worst_mm: number, lower_mm: number, upper_mm: number, verdict: RunRow["verdict"], counted: boolean, label: string }} Entry */
+/** @typedef {RunRow["verdict"]} Shown */
+/** @typedef {{ worst_mm: number, lower_mm: number, upper_mm: number, verdict: Shown, counted: boolean, label: string }} Entry */
 /** @typedef {Pick<RunRow, "worst_mm" | "lower_mm" | "upper_mm" | "verdict" | "counted"> & { label: string }} Candidate */
 /** @typedef {{ px: (place: number) => number, py: (deviation: number) => number, left: number, bottom: number, width: number }} Scale */
 
@@ -154,4 +155,4 @@ export class Chart {
  * @param {Candidate} candidate
  * @returns {candidate is Candidate & { lower_mm: number, upper_mm: number }}
  */
-const hasZone = ({ lower_mm, upper_mm }) => lower_mm !== null && upper_mm !== null;
+const hasZone = (candidate) => candidate.lower_mm !== null && candidate.upper_mm !== null;

@@ -26,7 +26,9 @@ const SILENT = ["enter", "devices"]; // commands whose success is not worth a wo
 
 /** @type {Heard} */
 const heard = {
-  view: "part", chosen: null, surface: null, run: null, isRecorded: false, station: null, control: null, hasFault: false, isRemote: false, link: "connecting" };
+  view: "part", chosen: null, surface: null, run: null, isRecorded: false, station: null, control: null, hasFault: false, isRemote: false,
+  link: "connecting",
+};
 /** @type {{ nowMs: number, at: number }} */
 let clock = { nowMs: 0, at: 0 }; // the station's time of day, and when it was heard
 /** @type {readonly AlarmRow[]} */

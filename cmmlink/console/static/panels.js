@@ -12,7 +12,8 @@ import { CODE_OF } from "./verdicts.js";
 /** @typedef {{ words: string, kind: "none" | "note" | "warning" | "fault", button: string, act: "live" | "take control" }} Banner */
 /**
  * What stands at the right of the page: whose verdict, and the verdict.
- * @typedef {{ part: string, serial: string, names: (string | undefined)[], word: string, shape: RunState["verdict"]["shape"], final: boolean,
+ * @typedef {{ part: string, serial: string, names: (string | undefined)[], word: string,
+ * shape: RunState["verdict"]["shape"], final: boolean,
  *   why: string, phase: string, badge: string, before: string, run: RunState | null }} Card
  */
 /**
@@ -32,7 +33,8 @@ import { CODE_OF } from "./verdicts.js";
 
 const NONE = "\u2013";
 /** @type {Card} */
-const NO_CARD = { part: "", serial: "", names: [], word: "", shape: "none", final: false, why: "", phase: "", badge: "", before: "", run: null };
+const NO_CARD = { part: "", serial: "", names: [], word: "",
+  shape: "none", final: false, why: "", phase: "", badge: "", before: "", run: null };
 const SIGNS = { over: "\u25b2", under: "\u25bc", "not-proven": "\u25c6", in: "\u25cf", near: "\u25cf" };
 const PHASES = { preparing: "preparing", starting: "connecting", measuring: "so far", ending: "ending", finished: "" };
 
@@ -79,10 +81,12 @@ export function cardOf({ run, isRecorded, station, view, chosen, surface }) {
  * @returns {Card}
  */
 function cardOfRun(run) {
-  const { word, shape, final, why } = run.verdict, badge = { run: "", section: "SECTION", replay: "REPLAY of", recorded: "RECORDED" }[run.kind];
+  const { word, shape, final, why } = run.verdict,
+    badge = { run: "", section: "SECTION", replay: "REPLAY of", recorded: "RECORDED" }[run.kind];
   const dated = run.kind === "section" || !badge ? badge : `${badge} ${run.began}`;
   const phase = final ? "" : PHASES[run.phase];
-  return { part: run.part, serial: run.serial_number, names: [run.plan, run.operator], word, shape, final, why, phase, badge: dated, before: "", run };
+  return { part: run.part, serial: run.serial_number, names: [run.plan, run.operator], word, shape, final,
+    why, phase, badge: dated, before: "", run };
 }
 
 /**
@@ -104,7 +108,8 @@ function cardOfNextPart(run, station) {
  * @returns {Card}
  */
 function cardOfRow({ part, serial_number: serial, word, shape, counted, began, run }) {
-  return { ...NO_CARD, part, serial, names: [run], word, shape, final: counted, why: "as recorded; O opens the run", badge: `RECORDED ${began}` };
+  return { ...NO_CARD, part, serial, names: [run], word, shape,
+    final: counted, why: "as recorded; O opens the run", badge: `RECORDED ${began}` };
 }
 
 /**
@@ -112,7 +117,8 @@ function cardOfRow({ part, serial_number: serial, word, shape, counted, began, r
  * @returns {Card}
  */
 function cardOfSurface({ plan, word, shape, state, message, done, total }) {
-  const why = state === "done" || state === "failed" ? message : total ? `${done} of ${total} sections` : "choose a CT plan";
+  const progress = total ? `${done} of ${total} sections` : "choose a CT plan";
+  const why = state === "done" || state === "failed" ? message : progress;
   return { ...NO_CARD, part: plan || "No surface", names: ["CT surface"], word: word || "NO SURFACE", shape, final: state === "done", why };
 }
 
@@ -145,7 +151,8 @@ function showWorst(run) {
   byId("worst").dataset.kind = kind ?? "none";
   put("worst-shape", kind ? SIGNS[kind] : "");
   put("worst-value", worst ? signed(worst.deviation_mm, digitsFor(run.zone)) : NONE);
-  put("worst-where", worst ? `at station ${worst.station_mm.toFixed(2)} mm` : run ? "no point judged" : "");
+  const nowhere = run ? "no point judged" : "";
+  put("worst-where", worst ? `at station ${worst.station_mm.toFixed(2)} mm` : nowhere);
   put("worst-use", worst ? `${Math.round(100 * toleranceUse(worst.deviation_mm, run.zone))} % of the tolerance` : "");
 }
 
