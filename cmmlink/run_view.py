@@ -368,7 +368,7 @@ def _reason_of(ended: Ended, verdict: Verdict | None, coverage_min: float) -> st
     """One line under the headline."""
     result = ended.result
     if not result["received"]:
-        return ended.message or "no point was received"
+        return ended.message if ended.ending == "interrupted" and ended.message else "no point was received"
     if verdict is None:
         return "cut short; Replay judges what was received" if ended.ending == "interrupted" else "no part found"
     if ended.ending != "complete":

@@ -99,14 +99,14 @@ def read_whole(path: Path) -> bytes:
         refuse_endless(path)
         content = path.read_bytes()
     except OSError as error:
-        raise _unreadable(path, error) from error
+        raise MeshError(_words_of_unreadable(path, error)) from error
     if not content:
         raise MeshError(f"{path}: the file is empty (0 bytes); export the surface again")
     return content
 
 
-def _unreadable(path: Path, error: OSError) -> MeshError:
-    return MeshError(f"{path}: cannot be read ({error.strerror or error}); check the path and its permissions")
+def _words_of_unreadable(path: Path, error: OSError) -> str:
+    return f"{path}: cannot be read ({error.strerror or error}); check the path and its permissions"
 
 
 def _size_and_start(path: Path) -> tuple[int, bytes]:
@@ -117,7 +117,7 @@ def _size_and_start(path: Path) -> tuple[int, bytes]:
             file.seek(0)
             return size, file.read(_START_BYTES)
     except OSError as error:
-        raise _unreadable(path, error) from error
+        raise MeshError(_words_of_unreadable(path, error)) from error
 
 
 def rounding_note(mesh: SurfaceMesh, scale: float) -> tuple[str, ...]:

@@ -113,7 +113,8 @@ def test_cap_bends_up_to_one_peak_and_down(curve: NurbsCurve) -> None:
 def test_demonstration_plan_fits_its_nominal() -> None:
     plan = load_plan(plan_file())
     nominal = load_nominal(plan.nominal.file, plan.nominal.scale, plan.nominal.closed)
-    assert nominal.notes == ("closed: the last point repeats the first, smooth there",)
+    assert nominal.notes[0] == "closed: the last point repeats the first, smooth there"
+    assert [note.split()[1] for note in nominal.notes[1:]] == ["curvature", "tightest"]  # what every nominal is checked for
     assert material_side(nominal.curve) == "left"
     profile = discretize(nominal.curve, samples=4000, step_min=2.5e-4, material="left")
     assert plan.probe.tip_radius_mm == 1.0

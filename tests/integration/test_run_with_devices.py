@@ -73,7 +73,8 @@ def test_losses_and_rejections_stand_in_the_result(tmp_path: Path) -> None:
     ) as device:
         code, facts, errors = run(tmp_path, f"{{type: modbus, map: generic-ring, address: '{device.address}', reconnect_s: 20}}")
         tally = device.tally()
-    assert code == 0, errors
+    assert code == 3, errors  # what was lost was not seen
+    assert [reason["kind"] for reason in facts["reasons"]] == ["missing", "rejected"]
     assert facts["lost"] == tally["lost-frames"] > 0
     assert facts["rejected"] > 0
     assert facts["received"] == facts["judged"] + facts["rejected"] == COUNT - facts["lost"]

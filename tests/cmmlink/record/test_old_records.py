@@ -41,15 +41,14 @@ def test_an_old_record_is_read_whole(records: Path) -> None:
     assert found["result"]["worst"]["deviation_mm"] == pytest.approx(0.1262, abs=5e-5)
 
 
-def test_an_old_record_is_judged_again_to_the_same_result(records: Path) -> None:
-    """To the last bit by the software of that day; by other versions of the libraries, within their round-off."""
+def test_an_old_record_is_judged_again_by_the_rules_of_today(records: Path) -> None:
+    """The same points get the same verdict; the pose moves by what arc-length weights change, and the keys of today are added."""
     with open_to_read(records, today) as store:
         recorded = recorded_run(store, find_run(store, "last"))
         again = replay_run(store, recorded, decoder_of)
-    if not again.changed:
-        assert again.identical
-    for change in again.differs:
-        if change.key != "deviations":
-            assert change.replayed == pytest.approx(change.recorded, rel=1e-9, abs=1e-9), change
     assert recorded.result is not None
+    for key in ("verdict", "received", "judged", "rejected", "lost", "method", "fit"):
+        assert again.result_json[key] == recorded.result[key], key
+    for key in ("max_deviation_mm", "min_deviation_mm", "rms_mm"):
+        assert again.result_json[key] == pytest.approx(recorded.result[key], abs=2e-3), key
     assert set(again.result_json) >= set(recorded.result)

@@ -57,6 +57,7 @@ def say_for_ever(*texts: bytes) -> Serve:
     points = [OPENING, *(sealed(f"P,{n},{n},1,2,3,0") for n in range(POINTS))]
 
     def serve(client: socket.socket) -> None:
+        time.sleep(0.3)  # a link that opens throws away what it finds in its buffer
         while points:
             client.sendall(points.pop(0))
         while True:

@@ -36,6 +36,7 @@ def test_codes_of_the_loops_are_those_of_the_enumerations() -> None:
         "OFF_SECTION": layout.OFF_SECTION,
         "BEYOND_END": layout.BEYOND_END,
         "OUTLIER": layout.OUTLIER,
+        "IN_HOLLOW": layout.IN_HOLLOW,
     }
     assert {verdict.name: int(verdict) for verdict in Verdict} == {
         "CONFORM": layout.CONFORM,
@@ -47,7 +48,7 @@ def test_codes_of_the_loops_are_those_of_the_enumerations() -> None:
 
 
 def test_codes_stay_as_they_are_written_in_records() -> None:
-    assert [int(reason) for reason in Rejection] == [0, 1, 2, 3, 4]
+    assert [int(reason) for reason in Rejection] == [0, 1, 2, 3, 4, 5]
     assert (Verdict.CONFORM, Verdict.UNCERTAIN, Verdict.NONCONFORM, NOT_JUDGED) == (0, 1, 2, -1)
 
 
