@@ -39,7 +39,8 @@ LARGEST_BLOCK = 1024
 OPENING, POINT, HEARTBEAT, CLOSING = range(4)
 INVALID = 1
 UNITS_PER_MM = 1e5
-RUN = 256  # frames looked at together; a damaged one among them costs that many checksums at most
+RUN = 256  # frames looked at together at most
+SHORTEST_RUN = 4  # and where runs keep breaking off, so that a frame costs a few checksums, whatever stands behind it
 
 
 class BinaryDecoder:
@@ -49,6 +50,7 @@ class BinaryDecoder:
         self._pending = b""
         self._out = Outbox(self._take_damage)
         self._asked = False
+        self._most = RUN  # frames to look at together: twice as many as were good the last time
         self._damage = 0
         self._away = False
         self._opening = b""
@@ -88,7 +90,7 @@ class BinaryDecoder:
 
     def _take_run(self, data: bytes, start: int) -> int:
         """Take good points in sequence, many at once; return the number of bytes used."""
-        count = min((len(data) - start) // SIZE, RUN)
+        count = min((len(data) - start) // SIZE, self._most)
         if count < 2 or self._away or self._said_again or self._damage:
             return 0
         frames = np.frombuffer(data, dtype=FRAME, count=count, offset=start)
@@ -97,11 +99,11 @@ class BinaryDecoder:
         expected = (self._counter.expected + np.arange(count)) & 0xFFFF
         plain = (frames["sync"] == FRAME_SYNC) & (frames["type"] == POINT) & (frames["flags"] == 0)
         good = plain & (frames["crc"] == crc) & (frames["seq"] == expected)
-        if not good.all():
-            count = int(good.argmin())
-            if not count:
-                return 0
-            frames = frames[:count]
+        count = count if good.all() else int(good.argmin())
+        self._most = min(RUN, max(SHORTEST_RUN, 2 * count))
+        if not count:
+            return 0
+        frames = frames[:count]
         self._append_batch(self._counter.expected + np.arange(count), frames["t_us"].astype(np.int64), frames["xyz"])
         self._counter.expected += count
         return count * SIZE

@@ -39,7 +39,8 @@ FIRST_IN_RANGE, LAST_IN_RANGE = 643, 64877
 SCALE = 102.0 / 65520.0
 COUNTER_RANGE, CLOCK_RANGE, TICKS_PER_SECOND = 1 << 18, 1 << 32, 1e5
 TAGS = np.array([192, 192, 192], dtype=np.uint8)
-RUN = 1024  # blocks looked at together
+RUN = 1024  # blocks looked at together at most
+SHORTEST_RUN = 4  # and where runs keep breaking off, so that a block costs about the same, whatever stands behind it
 PROMPT = b"->"
 SHORTEST_REPLY, LONGEST_REPLY = 3, 4096
 OUTPUTS = re.compile(r"\b(DIST1|DIST_RAW|DIST|SHUTTER|COUNTER|TIMESTAMP(?:_?LO|_?HI)?|INTENSITY|STATE)\b")
@@ -90,6 +91,7 @@ class OptoncdtDecoder:
         self._distances = Distances(self._clock.seconds, gap="gap in the sensor's counter", count=count, largest_step_mm=largest_step_mm)
         self._out = self._distances.out
         self._asked = False
+        self._most = RUN  # blocks to look at together: twice as many as were good the last time
         self._text = b""
         self._outputs: list[str] | None = None
         self._places: list[int] = []  # where counter and clock stand among them
@@ -108,7 +110,7 @@ class OptoncdtDecoder:
 
     def feed(self, data: bytes) -> list[Arrival]:
         """Decode the next bytes."""
-        data = self._text + data
+        data, self._text = self._text + data, b""
         at = 0
         while not self._out.closed:
             at += self._take_run(data, at)
@@ -143,6 +145,7 @@ class OptoncdtDecoder:
         distance_mm = self._distance_mm(np.asarray(blocks.distance, dtype=np.float64))
         good = self._are_next(blocks) & blocks.is_in_range() & self._distances.are_steady(distance_mm)
         count = len(good) if good.all() else int(good.argmin())
+        self._most = min(RUN, max(SHORTEST_RUN, 2 * count))
         if count:
             self._distances.take_many(np.asarray(blocks.ticks)[:count], distance_mm[:count])
             self._counter.expected += count
@@ -152,7 +155,7 @@ class OptoncdtDecoder:
     def _values_ahead(self, data: bytes, start: int) -> NDArray[np.int64]:
         """Return the values (m, words) of the blocks ahead, up to the first whose words do not stand where they belong."""
         words = len(self._outputs or ())
-        count = self._distances.room(min((len(data) - start) // (3 * words), RUN))
+        count = self._distances.room(min((len(data) - start) // (3 * words), self._most))
         if count < 2:
             return np.empty((0, words), dtype=np.int64)
         raw = np.frombuffer(data, np.uint8, count * 3 * words, start).reshape(count, words, 3)

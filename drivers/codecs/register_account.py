@@ -109,12 +109,23 @@ class RegisterAccount:
     def hand_over(self, values: Columns, numbers: NDArray[np.int64]) -> None:
         """Hand over the points that are no repetitions and that the device does not mark invalid."""
         usable = numbers >= 0
-        self._suspect_word_order(values, usable)
+        self._suspect_word_order(values, usable & ~self._find_marked(values, len(usable)))
         usable[usable] = ~self._find_invalid({name: column[usable] for name, column in values.items()}, int(usable.sum()))
         if usable.any():
             self._out.append(PointBatch(numbers[usable], self._seconds(values, usable), self._points_mm(values, usable)))
         if self._count is not None and self._first is not None and self._counter.expected - self._first >= self._count:
             self._close()
+
+    def _find_marked(self, values: Columns, count: int) -> NDArray[np.bool_]:
+        """Tell of which of `count` points the device itself says that they hold no value: these say nothing of the map."""
+        marked = np.zeros(count, dtype=np.bool_)
+        for name, column in values.items():
+            field = self._fields[name]
+            if field.invalid is not None:
+                marked |= equals_pattern(column, field.invalid, field.type)
+            if field.invalid_bits:
+                marked |= column.astype(np.int64) & field.invalid_bits != 0
+        return marked
 
     def _suspect_word_order(self, values: Columns, new: NDArray[np.bool_]) -> None:
         """Remember of how many new points no coordinate makes sense, and of how many of these it would with the words swapped."""

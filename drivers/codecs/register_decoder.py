@@ -8,7 +8,7 @@ from drivers.codecs.outbox import Outbox
 from drivers.codecs.register_account import RegisterAccount
 from drivers.codecs.register_map import Block, RegisterMap, entries_of
 from drivers.codecs.register_patterns import PATTERN_OF
-from drivers.codecs.register_pdus import EXCEPTIONS, READ_FIFO, Exchange, first_exchange, size_of_strange_answer
+from drivers.codecs.register_pdus import EXCEPTIONS, READ_FIFO, Exchange, first_exchange, size_of_strange_head
 from drivers.errors import DeviceRefused, ProtocolError
 from drivers.source import Arrival, Damaged, ScanOpened
 
@@ -60,15 +60,20 @@ class RegisterDecoder:
         return self._out.hand_over()
 
     def _step_over_strange_answer(self) -> bool:
-        """Leave an answer of another function out, with its request; tell whether what is pending now is in step."""
-        while size := size_of_strange_answer(self._pending):
-            if size < 0:
-                keep = 3 if self._pending[0] == READ_FIFO else 5
-                self._strange += max(0, len(self._pending) - 2 * keep - 1)
-                self._pending = self._pending[: keep + 1] + self._pending[max(keep + 1, len(self._pending) - keep) :]
+        """Leave an answer of another function out, with its request; tell whether what is pending now is in step.
+
+        Where it ends, nothing in it says. But as nothing was learnt from it, the same is asked again: it ends where that stands.
+        """
+        while self._strange or (head := size_of_strange_head(self._pending)):
+            asked = self._pattern.request()
+            skipped = 0 if self._strange else head
+            found = self._pending.find(asked, skipped)
+            end = found if found >= 0 else max(skipped, len(self._pending) - len(asked) + 1)
+            self._strange += end
+            self._pending = self._pending[end:]
+            if found < 0:
                 return False
-            self._count_strange(size)
-            self._pending = self._pending[size:]
+            self._count_strange(0)
         return True
 
     def _count_strange(self, byte_count: int) -> None:
@@ -88,9 +93,9 @@ class RegisterDecoder:
                 f"{self._map.device} answers exception {exchange.exception} ({what}) to function {exchange.function} at register "
                 f"{exchange.address}, count {exchange.count}; check the map and the device id"
             )
-        block = {"status": self._map.status, "pop": self._map.pop}.get(self._pattern.step)
-        count = block.size if block else exchange.count
-        if exchange.function != READ_FIFO and len(exchange.registers) != 2 * count:
+        if exchange.function != self._pattern.request()[0]:
+            self._out.append(Damaged(exchange.size, "answer of another function than asked for"))
+        elif exchange.function != READ_FIFO and len(exchange.registers) != 2 * self._pattern.count_due(exchange.count):
             self._out.append(Damaged(len(exchange.registers), "answer of another length than asked for"))
         elif self._pattern.step == "status":
             self._take_status(exchange.registers)

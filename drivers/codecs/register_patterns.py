@@ -49,6 +49,11 @@ class Pattern:
         block = {"status": self._map.status, "pop": self._map.pop}.get(self.step)
         return self._read(block) if block else self._points_request()
 
+    def count_due(self, asked: int) -> int:
+        """Return how many registers an answer to the next request carries, of which `asked` were asked for as the bytes say."""
+        block = {"status": self._map.status, "pop": self._map.pop}.get(self.step) or self._map.points
+        return asked if block is self._map.points and block.entries > 1 else block.size
+
     def hear_status(self, values: Mapping[str, int]) -> None:
         """Decide from the fields of a sound status what to read next."""
         self.step, self.idle = self._step_after_status(), False

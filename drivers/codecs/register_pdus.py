@@ -45,16 +45,10 @@ def fifo_request(address: int) -> bytes:
     return bytes([READ_FIFO]) + address.to_bytes(2, "big")
 
 
-def size_of_strange_answer(data: bytes) -> int:
-    """Return the size of the first request in `data` with its answer where it answers another function; 0 where it does not.
-
-    Where a strange answer ends, nothing in it says. But as nothing was learnt from it, the same is asked again: it ends where the
-    same request stands again. -1 while that has not come.
-    """
+def size_of_strange_head(data: bytes) -> int:
+    """Return the size of the first request in `data` with its answer's first byte where it answers another function, else 0."""
     asked = 3 if data[:1] == bytes([READ_FIFO]) else 5
-    if len(data) <= asked or data[asked] & 0x7F == data[0]:
-        return 0
-    return data.find(data[:asked], asked + 1)
+    return 0 if len(data) <= asked or data[asked] & 0x7F == data[0] else asked + 1
 
 
 def first_exchange(data: bytes) -> Exchange | None:

@@ -1,8 +1,10 @@
-"""What every wire format keeps, found by its name: no cut of the bytes changes what is decoded, and no bytes cost memory."""
+"""What every wire format keeps, found by its name: no cut of the bytes changes what is decoded, and no bytes cost memory or time."""
 
+import sys
 from collections import deque
 from collections.abc import Callable
 from itertools import pairwise
+from random import Random
 
 import numpy as np
 import pytest
@@ -11,106 +13,182 @@ from hypothesis import strategies as st
 
 from drivers.codecs import decoder, decoders
 from drivers.codecs.register_decoder import RegisterDecoder
+from drivers.codecs.register_map import RegisterMap
 from drivers.errors import DeviceError
-from drivers.source import Arrival, Decoder, PointBatch
-from tests.drivers.codecs.register_tables import RING, Ring
-from tests.drivers.codecs.streams import Account, account
-from tests.drivers.codecs.test_ascii_frames import stream
-from tests.drivers.codecs.test_binary_frames import single
-from tests.drivers.codecs.test_optoncdt_frames import INFO, block
-from tests.drivers.codecs.test_riftek_frames import bursts
+from drivers.maps import shipped_map
+from drivers.source import Arrival, Damaged, Decoder, Lost, PointBatch, Rejected
+from tests.drivers.codecs import wire_bytes
+from tests.drivers.codecs.wire_bytes import PIECES, TURNS, Registers, cuttings, damaged
 
-OPTIONS: dict[str, dict[str, object]] = {
-    "optoncdt": {"range_mm": 50.0},
-    "riftek": {"range_mm": 50.0, "rate_hz": 1000.0},
-    "riftek-ascii": {"rate_hz": 100.0},
+OPTIONS: dict[str, list[dict[str, object]]] = {
+    "ascii": [{}, {"unit": "mm"}],
+    "binary": [{}],
+    "optoncdt": [{"range_mm": 50.0}, {"range_mm": 50.0, "rate_hz": 1000.0, "largest_step_mm": 0.5, "count": 20}],
+    "riftek": [{"range_mm": 50.0, "rate_hz": 1000.0}, {"range_mm": 50.0, "rate_hz": 1000.0, "count": 12, "largest_step_mm": 0.5}],
+    "riftek-ascii": [{"rate_hz": 100.0}, {"rate_hz": 100.0, "count": 9, "largest_step_mm": 1.0}],
 }
-MOST_BYTES = 20_000  # that any decoder may hold back
-
-
-def ring_stream() -> bytes:
-    ring, asking = Ring(), RegisterDecoder(RING)
-    ring.write(30)
-    data = b""
-    for _ in range(8):
-        answer = ring.answer(asking.request())
-        asking.feed(answer)
-        data += answer
-    return data
-
-
-SOUND: dict[str, bytes] = {
-    "ascii": stream(12)[0] + stream(3)[0],
-    "binary": single(12)[0] + single(3)[0],
-    "optoncdt": INFO + b"".join(block(i, 30_000 + i) for i in range(20)) + b"OUTPUT RS422\r\n->" + block(20, 30_000),
-    "riftek": bursts(list(range(30))),
-    "riftek-ascii": b"1.5\r\n-2.25\r\nOK\r\n3\r\n" * 8,
-    "registers": ring_stream(),
+MAPS = {
+    "latest": RegisterMap.model_validate(wire_bytes.LATEST_MAP),
+    **{name: shipped_map(name) for name in ("generic-ring", "generic-fifo", "gocator")},
 }
-NAMES = [*sorted(decoders()), "registers"]
+NAMES = [*PIECES, *TURNS]
+MOST_BYTES = 40_000  # that any decoder may hold back: a block of 1024 points takes 18,454
+Event = tuple[object, ...]
 
 
-def make_of(name: str) -> Callable[[], Decoder]:
-    return (lambda: RegisterDecoder(RING)) if name == "registers" else (lambda: decoder(name, **OPTIONS.get(name, {})))
+def events(arrivals: list[Arrival]) -> list[Event]:
+    """Everything that happened, in its order: points one by one, and like counts that follow one another as their sum."""
+    found: list[Event] = []
+    for arrival in arrivals:
+        match arrival:
+            case PointBatch():
+                columns = arrival.sequence.tolist(), arrival.time_s.tolist(), arrival.points_mm.tolist()
+                found += [(number, time_s, *point) for number, time_s, point in zip(*columns, strict=True)]
+            case Damaged(byte_count, reason) | Rejected(byte_count, reason) | Lost(byte_count, reason):
+                kind = (type(arrival).__name__, reason)
+                before = int(str(found.pop()[2])) if found and found[-1][:2] == kind else 0
+                found.append((*kind, byte_count + before))
+            case _:
+                found.append((arrival,))
+    return found
 
 
-def outcome(make: Callable[[], Decoder], data: bytes, edges: list[int]) -> tuple[Account, str]:
-    """What is decoded of the bytes cut at the edges, and what ended it."""
+def outcome(make: Callable[[], Decoder], data: bytes, cuts: list[int]) -> tuple[list[Event], str]:
+    """What is decoded of the bytes cut at the given places, and what ended it."""
     made, failure = make(), ""
     arrivals: list[Arrival] = []
-    cuts = [0, *sorted(edge % (len(data) + 1) for edge in edges), len(data)]
     try:
-        for first, last in pairwise(cuts):
+        for first, last in pairwise([0, *cuts, len(data)]):
             arrivals += made.feed(data[first:last])
     except DeviceError as error:
         failure = str(error)
-    arrivals += made.break_off()
-    if failure:  # what was pending where it ended is not what was decoded
-        arrivals = [arrival for arrival in arrivals if isinstance(arrival, PointBatch)]
-    return account(arrivals), failure
+    return events(arrivals + made.break_off()), failure
 
 
-@st.composite
-def damaged(draw: st.DrawFn, sound: bytes) -> bytes:
-    """Sound bytes with pieces taken out, put in, turned over or said twice; or bytes of any kind."""
-    data = draw(st.sampled_from([sound, sound, sound, b""]))
-    for _ in range(draw(st.integers(0, 6))):
-        at, size = draw(st.integers(0, len(data))), draw(st.integers(0, 40))
-        piece = draw(st.one_of(st.binary(max_size=80), st.sampled_from([b"->", b"\r\n", b"-", b"S,", data[at : at + size], 5000 * b"x"])))
-        data = data[:at] + piece + data[at + draw(st.sampled_from([0, 1, size])) :]
-    return data
+def talk(register_map: RegisterMap, device: Registers, rng: Random) -> list[bytes]:
+    """Let a decoder ask a device some times; gives the bytes of each request with its answer."""
+    asking, pieces = RegisterDecoder(register_map), list[bytes]()
+    for _ in range(rng.randint(1, 25)):
+        request = asking.request()
+        pieces.append(request + device.answer(request, rng))
+        try:
+            asking.feed(pieces[-1])
+        except DeviceError:
+            break
+    return pieces
+
+
+def wire_of(name: str, rng: Random) -> tuple[Callable[[], Decoder], bytes]:
+    """Make a decoder's maker, and bytes for it."""
+    if name in PIECES:
+        options = rng.choice(OPTIONS[name])
+        return lambda: decoder(name, **options), damaged(PIECES[name](rng), rng)
+    pieces = talk(MAPS[name], Registers(TURNS[name], strange=rng.random() < 0.5), rng)
+    return lambda: RegisterDecoder(MAPS[name]), b"".join(pieces) if rng.random() < 0.6 else damaged(pieces, rng)
 
 
 def test_every_format_is_tried() -> None:
-    assert set(SOUND) == set(NAMES), "give every format sound bytes here"
+    assert set(PIECES) == set(decoders()), "give every format pieces in wire_bytes.py"
 
 
 @pytest.mark.parametrize("name", NAMES)
-@given(data=st.data())
-@settings(max_examples=150, deadline=None)
-def test_no_cut_changes_what_is_decoded(name: str, data: st.DataObject) -> None:
-    wire = data.draw(damaged(SOUND[name]))
-    edges = data.draw(st.lists(st.integers(0, 10_000), max_size=12))
-    make = make_of(name)
-    whole = outcome(make, wire, [])
-    assert outcome(make, wire, edges) == whole
-    if len(wire) < 2000:
-        assert outcome(make, wire, list(range(len(wire)))) == whole
+@given(seed=st.integers(0, 2**32))
+@settings(max_examples=60)
+def test_no_cut_changes_what_is_decoded_nor_its_order(name: str, seed: int) -> None:
+    rng = Random(seed)
+    make, wire = wire_of(name, rng)
+    whole, *others = [outcome(make, wire, cuts) for cuts in cuttings(len(wire), rng)]
+    assert all(other == whole for other in others)
+
+
+@pytest.mark.parametrize("name", TURNS)
+@pytest.mark.parametrize("seed", range(4))
+def test_strange_answers_cost_themselves_alone(name: str, seed: int) -> None:
+    """An answer of another function, even one that holds the request again, must not put the decoder out of step."""
+    rng, asking = Random(seed), RegisterDecoder(MAPS[name])
+    device, arrivals = Registers(TURNS[name], strange=True), list[Arrival]()
+    for _ in range(150):
+        request = asking.request()
+        arrivals += asking.feed(request + device.answer(request, rng))
+    device.strange = False
+    for _ in range(20):
+        request = asking.request()
+        arrivals += asking.feed(request + device.answer(request, rng))
+    strange = [at for at, event in enumerate(events(arrivals)) if event[:2] == ("Damaged", "answer of another function than asked for")]
+    points = [at for at, event in enumerate(events(arrivals)) if len(event) == 5]
+    assert strange
+    assert points[-1] > strange[-1]
+
+
+def endless(name: str, kind: str, rng: Random) -> bytes:
+    """4096 bytes that may come for ever: of no form, of one letter, or half of what the format has."""
+    _, wire = wire_of(name, Random(1))
+    half = b"".join(piece[: max(1, len(piece) - 2)] for piece in (PIECES[name](rng) if name in PIECES else [wire[:40]]))
+    heads = wire_bytes.binary_block(0, 0, 1024 * [(0, 0, 0, 0)])[:18] if name == "binary" else wire[:3]
+    kinds = {"letters": b"x", "digits": b"7", "zeros": b"\0", "ones": b"\xff", "halves": half, "heads": heads}
+    return ((kinds[kind] if kind in kinds else rng.randbytes(4096)) * 4096)[:4096]
+
+
+def calls_to_feed(made: Decoder, pieces: list[bytes]) -> int:
+    """Count the calls of functions, of C as of Python, that it takes to feed the pieces."""
+    count = 0
+
+    def note(frame: object, event: str, argument: object) -> None:
+        nonlocal count
+        count += event in ("call", "c_call")
+
+    sys.setprofile(note)
+    try:
+        for piece in pieces:
+            try:
+                made.feed(piece)
+            except DeviceError:
+                made.break_off()
+    finally:
+        sys.setprofile(None)
+    return count
 
 
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("kind", ["letters", "zeros", "ones", "random", "heads"])
-def test_no_bytes_cost_memory(name: str, kind: str) -> None:
-    rng = np.random.default_rng(1)
-    heads = SOUND[name][: max(2, len(SOUND[name]) // 40)] + bytes([SOUND[name][0]])
-    piece = {"letters": 4096 * b"x", "zeros": bytes(4096), "ones": 4096 * b"\xff", "random": rng.bytes(4096), "heads": 300 * heads}[kind]
-    made = make_of(name)()
-    for _ in range(50):
-        try:
-            made.feed(piece)
-        except DeviceError:
-            break
-    assert held(made, set()) < MOST_BYTES + 300 * len(heads)
+@pytest.mark.parametrize("kind", ["letters", "digits", "zeros", "ones", "random", "halves", "heads"])
+def test_no_bytes_cost_memory_or_time(name: str, kind: str) -> None:
+    """What is held stays small, with every feed copied at most once, and as many bytes again cost as many calls again."""
+    piece, (make, _) = endless(name, kind, Random(2)), wire_of(name, Random(1))
+    made = make()
+    calls_to_feed(made, 8 * [piece])  # until a block that never ends is longer than any
+    calls = [calls_to_feed(made, 8 * [piece]) for _ in range(2)]
+    assert held(made, set()) < MOST_BYTES
+    assert calls[1] <= 1.5 * calls[0] + 200
+    small = [bytes([byte]) for byte in piece[:600]]
+    singly = [calls_to_feed(made, small) for _ in range(3)]
+    assert max(singly[1:]) <= 1.5 * singly[0] + 200
+    assert held(made, set()) < MOST_BYTES
+
+
+SPECIAL: dict[str, Callable[[int], bytes]] = {
+    "ascii": lambda i: wire_bytes.ascii_line(f"P,{i},{i},1,1,1,{i % 2}"),
+    "binary": lambda i: wire_bytes.binary_frame(1, i, i, bytes(12), flags=i % 2),
+    "optoncdt": lambda i: b"".join(
+        wire_bytes.optoncdt_word(value, first=not k) for k, value in enumerate((30_000 if i % 2 else 262_076, i, 100 * i % 2**16, 0))
+    ),
+    "riftek": lambda i: bytes((0xC0 if i % 2 else 0x80) | (i & 3) << 4 | 5 for _ in range(4)),
+    "riftek-ascii": lambda i: b"1.5\r\n" if i % 2 else b"-\r\n",
+}
+
+
+@pytest.mark.parametrize("name", SPECIAL)
+def test_a_stream_whose_every_second_point_is_special_costs_as_much_per_point_however_much_comes_at_once(name: str) -> None:
+    """Nothing that stands behind a point is looked at again for each of them."""
+    first = b"GETOUTINFO_RS422 DIST1 COUNTER TIMESTAMPLO TIMESTAMPHI\r\n->" if name == "optoncdt" else b""
+    stream = first + b"".join(SPECIAL[name](i) for i in range(1200))
+
+    def make() -> Decoder:
+        return decoder(name, **OPTIONS[name][0])
+
+    sixth = len(stream) // 6
+    few = calls_to_feed(make(), [stream[at : at + 240] for at in range(0, sixth, 240)])
+    many = calls_to_feed(make(), [stream])
+    assert many <= 1.3 * 6 * few
 
 
 def held(thing: object, seen: set[int]) -> int:

@@ -11,7 +11,7 @@ from drivers.codecs.register_map import RegisterMap
 from drivers.errors import DeviceRefused, ProtocolError
 from drivers.maps import shipped_map
 from drivers.source import Arrival, PointBatch
-from tests.drivers.codecs.register_tables import RING, Ring, Table, turns
+from tests.drivers.codecs.register_tables import RING, Gocator, Ring, Table, turns
 from tests.drivers.codecs.streams import account
 
 
@@ -197,3 +197,12 @@ def test_a_counter_that_is_no_whole_number_is_refused_with_the_map(kind: str) ->
     }
     with pytest.raises(ValueError, match=f"whole numbers for the field sequence, which counts or marks, not {kind}"):
         RegisterMap.model_validate(document)
+
+
+def test_points_that_the_device_itself_calls_empty_do_not_put_the_map_in_doubt() -> None:
+    """A profiler that sees nothing on most of its way is no profiler read wrongly."""
+    table, decoder = Gocator(), RegisterDecoder(shipped_map("gocator"))
+    arrivals = turns(decoder, table)
+    table.queue = [(number, number, 0x80000000 if number % 4 else 250) for number in range(80, 160)]
+    book = account(arrivals + turns(decoder, table))
+    assert (len(book.sequence), book.counts["Rejected", "z holds no value"]) == (20, 60)
