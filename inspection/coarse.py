@@ -137,7 +137,7 @@ def _signature_poses(points_mm: Array, nominal: NominalProfile) -> list[RigidTra
     for scan in (clean, clean[::-1]):
         even = _even_walk(scan, step)
         if len(even) > 2 * _CHORD_STEPS:
-            poses += _poses_at_best_shifts(even[: _SIGNATURE_STEPS + 1], nominal, step)
+            poses += _poses_at_best_shifts(even, nominal, step)
     return poses
 
 
@@ -187,8 +187,11 @@ def _drop_spikes(points_mm: Array) -> Array:
 
 
 def _even_walk(points_mm: Array, step: float) -> Array:
-    """Points (k, 2) about one `step` apart along the scan, so that noise between them does not lengthen the walk."""
+    """Points (k, 2) about one `step` apart along the scan, so that noise between them does not lengthen the walk.
+
+    The walk ends when it is as long as the nominal: what lies far out costs no more than what lies near.
+    """
     corners = points_mm[strides(points_mm, step)]
     travelled = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
-    even = np.arange(0.0, travelled[-1], step)
+    even = np.arange(0.0, min(travelled[-1], (_SIGNATURE_STEPS + 0.5) * step), step)  # (k,), k <= _SIGNATURE_STEPS + 1
     return np.column_stack([np.interp(even, travelled, corners[:, axis]) for axis in (0, 1)])

@@ -86,7 +86,8 @@ class RiftekDecoder:
             self._end_burst()
         elif self._burst:
             self._out.append(Damaged(len(self._burst), "burst cut off where the link ended"))
-        self._burst, self._away = b"", True
+        self._burst = b""
+        self._asked = self._away = self._last_count is not None  # before the first burst nothing can be lost: the stream is asked for again
         return self._out.hand_over()
 
     def _end_burst(self) -> None:

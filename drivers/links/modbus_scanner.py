@@ -10,7 +10,8 @@ import struct
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import closing
+from contextlib import closing, suppress
+from math import inf
 from typing import Protocol
 
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
@@ -25,12 +26,14 @@ from drivers.errors import DeviceError, LinkError
 from drivers.links.address import HostPort, device_address, require_port
 from drivers.links.link_settings import LinkSettings
 from drivers.links.reconnect import keep_up
+from drivers.links.tcp_line import open_tcp
 from drivers.links.watch import Watch, explained
 from drivers.source import Arrival, PointBatch, ScanClosed, WireBytes
 
 TRIES = 3  # of one request, before the link counts as lost
 USUAL = LinkSettings(19_200, "E")  # of an RTU line, as the standard says
 LONGEST_PAUSE_S = 0.05  # between two requests of a device that asks for patience
+LEAST_PATIENCE_S = 0.05  # with the answer to one request, however little the scan has left
 FAILURE = 4  # an exception that is a refusal only while no point has come
 
 
@@ -71,6 +74,8 @@ class ModbusScanner:
         self._poll_s = poll_s
         self._clock = clock
         self._stopped = threading.Event()
+        self._late_s = 0.0 if isinstance(self._place, HostPort) else 2 * timeout_s  # over TCP a late answer dies with its connection
+        self._quiet_until_s = -inf
         self._has_points = False
 
     def stop(self) -> None:
@@ -80,10 +85,10 @@ class ModbusScanner:
     def arrivals(self) -> Iterator[Arrival]:
         """Open the link, yield what arrives, end after `ScanClosed`."""
         settings, stopped = self._settings, self._stopped
-        kept_up = keep_up(lambda: closing(self._open()), self._scan, reconnect_s=settings.reconnect_s, stopped=stopped, clock=self._clock)
+        kept_up = keep_up(self._open, self._scan, reconnect_s=settings.reconnect_s, stopped=stopped, clock=self._clock)
         return explained(self._address, kept_up)
 
-    def _scan(self, client: ModbusBaseSyncClient, until_s: float) -> Iterator[Arrival]:
+    def _scan(self, client: "_TimedClient", until_s: float) -> Iterator[Arrival]:
         watch = Watch(self._settings.silence_s, until_s, self._clock())
         try:
             yield from self._decoder.break_off()
@@ -109,20 +114,20 @@ class ModbusScanner:
             yield from self._decoder.break_off()
             raise
 
-    def _ask(self, client: ModbusBaseSyncClient, request: bytes, watch: Watch) -> bytes | None:
+    def _ask(self, client: "_TimedClient", request: bytes, watch: Watch) -> bytes | None:
         """Return the data unit of the answer, asking again where it did not come; None when told to stop."""
         began_s, missing, busy = self._clock(), 0, 0
         while not self._stopped.is_set():
+            client.within(max(LEAST_PATIENCE_S, min(self._timeout_s, watch.left_s(self._clock()))))
             try:
                 response = _execute(client, request, self._device_id)
             except (ConnectionException, OSError) as error:  # the library lets a reset connection through as it is
                 raise LinkError(f"{self._address}: the link was lost: {error}") from error
             except ModbusIOException as error:
                 missing += 1
-                if missing >= TRIES or watch.is_over(self._clock()):
-                    raise LinkError(
-                        f"{self._address}: no answer within {self._timeout_s:g} s, {missing} times in a row: {error}"
-                    ) from error
+                if missing >= TRIES or watch.is_over(self._clock() + self._late_s):
+                    self._quiet_until_s = self._clock() + self._late_s
+                    raise LinkError(self._words_of_no_answer(missing, client.heard)) from error
                 self._let_late_answers_pass(client)
                 continue
             if not self._may_pass(response):
@@ -138,29 +143,85 @@ class ModbusScanner:
         """Tell whether an answer is an exception that may be gone when the same is asked again."""
         return response.isError() and (response.exception_code in PASSING or (response.exception_code == FAILURE and self._has_points))
 
-    def _let_late_answers_pass(self, client: ModbusBaseSyncClient) -> None:
+    def _words_of_no_answer(self, missing: int, heard: int) -> str:
+        times = f"{missing} times in a row" if missing > 1 else "once, and there was no time left to ask again"
+        if heard:
+            line = f"RTU at {self._settings.baud_rate} baud, parity {self._settings.parity}"
+            speaks = "TCP" if isinstance(self._place, HostPort) else line
+            return f"{self._address}: {heard} bytes arrived, but no answer to the request, {times}; does the device speak Modbus {speaks}?"
+        waited_s = min(self._timeout_s, self._settings.silence_s)
+        return f"{self._address}: no answer within {waited_s:g} s, {times}; is the device switched on, and its device id {self._device_id}?"
+
+    def _let_late_answers_pass(self, client: "_TimedClient") -> None:
         _close(client)
-        if isinstance(client, ModbusSerialClient):  # over TCP a late answer dies with its connection
-            self._stopped.wait(2 * self._timeout_s)
-        if not self._stopped.is_set() and not client.connect():
+        self._stopped.wait(self._late_s)
+        client.within(self._timeout_s)
+        if not self._stopped.is_set() and not client.connect() and not self._stopped.is_set():
             raise LinkError(f"{self._address}: the link was lost and does not open again")
 
-    def _open(self) -> ModbusBaseSyncClient:
+    def _open(self, until_s: float) -> "closing[_TimedClient]":
+        """Open the link for as long as the context is entered, within the silence that is borne, and not beyond `until_s`."""
         if not (log := logging.getLogger("pymodbus")).handlers:
             log.addHandler(logging.NullHandler())  # what it logs reaches the operator as an error of ours, not as stray lines
-        place = self._place
-        client: ModbusBaseSyncClient
+        self._stopped.wait(max(0.0, min(self._quiet_until_s, until_s) - self._clock()))
+        place, timeout_s = self._place, self._timeout_s
+        client: _TimedClient
         if isinstance(place, HostPort):
-            client = ModbusTcpClient(place.host.strip("[]"), port=place.port, timeout=self._timeout_s, retries=0)
+            client = _TcpClient(place, timeout_s, self._stopped)
+            client.within(min(timeout_s, self._settings.silence_s, until_s - self._clock()))
         else:
             require_port(place)
-            client = ModbusSerialClient(
-                place, timeout=self._timeout_s, retries=0, baudrate=self._settings.baud_rate, parity=self._settings.parity
-            )
+            client = _PortClient(place, timeout=timeout_s, retries=0, baudrate=self._settings.baud_rate, parity=self._settings.parity)
         client.register(FifoAnswer)
         if not client.connect():
             raise LinkError(f"{self._address}: no Modbus device opens there; is it switched on, plugged in, free, and named right?")
-        return client
+        return closing(client)
+
+
+class _TimedClient(ModbusBaseSyncClient):
+    """A client of the library whose answers may trickle in without stretching the time for them."""
+
+    _end_s = inf
+    heard = 0
+
+    def within(self, seconds: float) -> None:
+        """Set the time for opening the link, or for the whole of the next answer; `heard` counts the bytes that come in it."""
+        self._end_s = time.monotonic() + seconds
+        self.heard = 0
+
+    @property
+    def _left_s(self) -> float:
+        return max(0.0, self._end_s - time.monotonic())
+
+    def _noted(self, data: bytes) -> bytes:
+        self.heard += len(data)
+        return data
+
+
+class _TcpClient(_TimedClient, ModbusTcpClient):
+    def __init__(self, place: HostPort, timeout_s: float, stopped: threading.Event) -> None:
+        super().__init__(place.host.strip("[]"), port=place.port, timeout=timeout_s, retries=0)
+        self._place = place
+        self._stopped = stopped
+
+    def connect(self) -> bool:
+        """Open the connection, if there is none."""
+        if self.socket is None:
+            with suppress(OSError, LinkError):
+                self.socket = open_tcp(self._place, self._left_s, self._stopped)
+        return self.socket is not None
+
+    def recv(self, size: int | None) -> bytes:
+        """Return what arrives while there is time; nothing at all afterwards."""
+        self.comm_params.timeout_connect = self._left_s
+        return self._noted(super().recv(size))
+
+
+class _PortClient(_TimedClient, ModbusSerialClient):
+    def recv(self, size: int | None) -> bytes:
+        """Return what arrives while there is time; nothing at all afterwards."""
+        self.comm_params.timeout_connect = self._left_s
+        return self._noted(super().recv(size))
 
 
 class _Closable(Protocol):

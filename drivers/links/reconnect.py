@@ -21,7 +21,7 @@ Link = TypeVar("Link")
 
 
 def keep_up(
-    open_link: Callable[[], AbstractContextManager[Link]],
+    open_link: Callable[[float], AbstractContextManager[Link]],
     scan: Callable[[Link, float], Iterator[Arrival]],
     *,
     reconnect_s: float,
@@ -30,16 +30,19 @@ def keep_up(
 ) -> Iterator[Arrival]:
     """Yield what `scan` yields over the link that `open_link` opens, again and again while either raises `LinkError`.
 
-    `scan` is told until when, by the clock, it may wait for news. Give up, with the last `LinkError`, when there were none for
-    `reconnect_s` seconds; 0: at the first one. What arrived over a link that brought no news is marked by a further `LinkDown`.
+    Both are told until when, by the clock, they may wait, for the link to open and for news. Give up, with the last `LinkError`, when
+    there were none for `reconnect_s` seconds; 0: at the first one. What arrived over a link that brought no news is marked by a
+    further `LinkDown`. A link that was told to stop before it was open raises nothing.
     """
     down_since_s: float | None = None
     wait_s = FIRST_WAIT_S
     while not stopped.is_set():
-        heard, opened = False, list[Arrival]()
+        heard, entered, opened = False, False, list[Arrival]()
+        until_s = inf if down_since_s is None else down_since_s + reconnect_s
         try:
-            with open_link() as link:
-                for arrival in scan(link, inf if down_since_s is None else down_since_s + reconnect_s):
+            with open_link(until_s) as link:
+                entered = True
+                for arrival in scan(link, until_s):
                     heard = True
                     if down_since_s is not None and is_news(arrival):
                         yield LinkUp(clock() - down_since_s)
@@ -52,6 +55,8 @@ def keep_up(
                     opened = opened if down_since_s is not None else []
                 return
         except LinkError as error:
+            if stopped.is_set() and not entered:
+                return
             if reconnect_s <= 0:
                 raise
             yield from opened

@@ -8,7 +8,8 @@ import os
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, suppress
+from typing import Protocol
 
 import serial
 
@@ -16,11 +17,10 @@ from drivers.errors import DeviceError, LinkError, ProtocolError
 from drivers.links.address import HostPort, device_address, require_port
 from drivers.links.link_settings import LinkSettings
 from drivers.links.reconnect import keep_up
+from drivers.links.tcp_line import POLL_S, WRITE_S, TcpLine, open_tcp
 from drivers.links.watch import Watch, explained
 from drivers.source import Arrival, Decoder, ScanClosed, WireBytes
 
-POLL_S = 0.05  # how long a read waits before it looks whether to stop
-LARGEST_READ = 1 << 16
 USUAL = LinkSettings(115_200, "N")
 
 
@@ -57,10 +57,10 @@ class SerialScanner:
     def arrivals(self) -> Iterator[Arrival]:
         """Open the link, yield what arrives, end with `ScanClosed`."""
         settings, stopped = self._settings, self._stopped
-        kept_up = keep_up(self._opened, self._scan, reconnect_s=settings.reconnect_s, stopped=stopped, clock=self._clock)
+        kept_up = keep_up(self._open, self._scan, reconnect_s=settings.reconnect_s, stopped=stopped, clock=self._clock)
         return explained(self._address, kept_up)
 
-    def _scan(self, port: serial.Serial, until_s: float) -> Iterator[Arrival]:
+    def _scan(self, port: "_Line", until_s: float) -> Iterator[Arrival]:
         watch = Watch(self._settings.silence_s, until_s, self._clock())
         try:
             while not self._stopped.is_set():
@@ -79,7 +79,7 @@ class SerialScanner:
             yield from self._decoder.break_off()
             raise
 
-    def _say_goodbye(self, port: serial.Serial) -> None:
+    def _say_goodbye(self, port: "_Line") -> None:
         """Send what the device has to hear at the end of the scan; a device that is gone by then need not hear it."""
         with suppress(LinkError):
             self._write(port, self._decoder.request())
@@ -90,59 +90,72 @@ class SerialScanner:
         if not watch.is_over(now_s):
             return
         if watch.garbled and (not watch.heard_sound or now_s - watch.last_byte_s < silence_s / 2):
+            line = (
+                ""
+                if isinstance(self._place, HostPort)
+                else f"baud rate ({self._settings.baud_rate}), parity ({self._settings.parity}) and "
+            )
             raise ProtocolError(
-                f"{self._address}: bytes arrive but for {silence_s:g} s not one valid frame; "
-                f"check baud rate ({self._settings.baud_rate}), parity ({self._settings.parity}) and the format of the device"
+                f"{self._address}: bytes arrive but for {silence_s:g} s not one valid frame; check {line}the format of the device"
             )
         if watch.told and not watch.garbled:
             raise LinkError(f"{self._address}: bytes arrive, but for {silence_s:g} s no new point and no moving heartbeat; is it scanning?")
         raise LinkError(f"{self._address}: silent for {silence_s:g} s; is the device switched on and scanning?")
 
-    @contextmanager
-    def _opened(self) -> Iterator[serial.Serial]:
-        """Open the port for as long as the context is entered."""
-        port = self._open()
-        held = getattr(port, "_socket", None)  # the library leaves it open where the other end was closed first
+    def _open(self, until_s: float) -> "closing[_Line]":
+        """Open the line for as long as the context is entered, within the silence that is borne, and not beyond `until_s`."""
         try:
-            yield port
-        finally:
-            port.close()
-            if held is not None:
-                held.close()
-
-    def _open(self) -> serial.Serial:
-        options = {"exclusive": True} if os.name == "posix" else {}
-        if isinstance(self._place, HostPort):
-            name = f"socket://{self._place.host}:{self._place.port}"
-        else:
-            name = self._place
-            require_port(name)
-        try:
-            return serial.serial_for_url(
-                name, baudrate=self._settings.baud_rate, parity=self._settings.parity, timeout=POLL_S, write_timeout=1.0, **options
-            )
+            if isinstance(self._place, HostPort):
+                within_s = min(self._settings.silence_s, until_s - self._clock())
+                return closing(TcpLine(open_tcp(self._place, within_s, self._stopped)))
+            require_port(self._place)
+            return closing(_PortLine(self._place, self._settings))
         except (serial.SerialException, OSError, ValueError) as error:
             hint = "is it plugged in, free, and named right? `cmmlink ports` lists the ports"
+            if isinstance(self._place, HostPort):
+                hint = "is it switched on, free and in the network, and are host and port right?"
             raise LinkError(f"{self._address}: cannot be opened: {error}; {hint}") from error
 
-    def _read(self, port: serial.Serial) -> bytes:
+    def _read(self, port: "_Line") -> bytes:
         """Return what is there, at the latest after POLL_S."""
         try:
-            if not isinstance(self._place, HostPort):
-                return bytes(port.read(max(1, port.in_waiting)))
-            data = port.read(1)  # a socket does not tell how much is there: wait for the first byte, then take the rest
-            if data:
-                port.timeout = 0
-                data += port.read(LARGEST_READ)
-                port.timeout = POLL_S
-            return bytes(data)
+            return port.read()
         except (serial.SerialException, OSError) as error:
             raise LinkError(f"{self._address}: the link was lost: {error}") from error
 
-    def _write(self, port: serial.Serial, data: bytes) -> None:
+    def _write(self, port: "_Line", data: bytes) -> None:
         if not data:
             return
         try:
             port.write(data)
         except (serial.SerialException, OSError) as error:
             raise LinkError(f"{self._address}: the link was lost: {error}") from error
+
+
+class _Line(Protocol):
+    """An open line. `read` returns what is there, at the latest after POLL_S; both raise OSError or SerialException."""
+
+    def read(self) -> bytes: ...
+
+    def write(self, data: bytes) -> None: ...
+
+    def close(self) -> None: ...
+
+
+class _PortLine:
+    """A serial port of this computer."""
+
+    def __init__(self, name: str, settings: LinkSettings) -> None:
+        options = {"exclusive": True} if os.name == "posix" else {}
+        self._port = serial.serial_for_url(
+            name, baudrate=settings.baud_rate, parity=settings.parity, timeout=POLL_S, write_timeout=WRITE_S, **options
+        )
+
+    def read(self) -> bytes:
+        return bytes(self._port.read(max(1, self._port.in_waiting)))
+
+    def write(self, data: bytes) -> None:
+        self._port.write(data)
+
+    def close(self) -> None:
+        self._port.close()

@@ -47,7 +47,11 @@ class Watch:
 
     def is_over(self, now_s: float) -> bool:
         """Tell whether the patience is at its end."""
-        return now_s - self._last_news_s > self._silence_s or now_s > self._until_s
+        return self.left_s(now_s) < 0
+
+    def left_s(self, now_s: float) -> float:
+        """How long the patience still lasts."""
+        return min(self._last_news_s + self._silence_s, self._until_s) - now_s
 
 
 def explained(address: str, arrivals: Iterable[Arrival]) -> Iterator[Arrival]:

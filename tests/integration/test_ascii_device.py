@@ -103,7 +103,7 @@ def test_a_silent_device_is_told_from_a_slow_one(tmp_path: Path) -> None:
 
 def test_bytes_of_another_format_are_called_so(tmp_path: Path) -> None:
     garbled = simulated("serial", "127.0.0.1:0", tmp_path, "--fault=flip:0.5", "--fault=stall:30@900")
-    with garbled as device, pytest.raises(ProtocolError, match="not one valid frame; check baud rate"):
+    with garbled as device, pytest.raises(ProtocolError, match="not one valid frame; check the format"):
         scanned(device, silence_s=0.2)
 
 

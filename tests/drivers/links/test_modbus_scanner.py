@@ -13,6 +13,7 @@ from pymodbus.pdu.register_message import ReadInputRegistersResponse
 
 from drivers.codecs.register_decoder import RegisterDecoder
 from drivers.errors import DeviceRefused, LinkError
+from drivers.links import modbus_scanner
 from drivers.links.modbus_scanner import FifoAnswer, ModbusScanner
 from drivers.maps import shipped_map
 from drivers.source import PointBatch, ScanClosed
@@ -30,7 +31,7 @@ def answers(monkeypatch: pytest.MonkeyPatch, replies: list[ModbusPDU | Exception
             raise reply
         return reply
 
-    monkeypatch.setattr(ModbusTcpClient, "connect", lambda _: True)
+    monkeypatch.setattr(modbus_scanner._TcpClient, "connect", lambda _: True)
     monkeypatch.setattr(ModbusTcpClient, "read_input_registers", read)
     return ModbusScanner("127.0.0.1:1", RegisterDecoder(RIFTEK, count=3), poll_s=0.0, timeout_s=0.0).arrivals()
 

@@ -28,7 +28,7 @@ class Waits(threading.Event):
 def run(opens: list[bool], scans: list[list[Arrival | Exception]], reconnect_s: float, stopped: Waits) -> Iterator[Arrival]:
     tries, links = iter(opens), iter(scans)
 
-    def opened() -> nullcontext[int]:
+    def opened(until_s: float) -> nullcontext[int]:
         if not next(tries):
             raise LinkError("no such port")
         return nullcontext(1)

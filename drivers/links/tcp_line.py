@@ -1,0 +1,90 @@
+"""A TCP connection that opens within a stated time, may be given up at any moment, and stands for a serial line.
+
+Operating systems wait a minute or more for a host that never answers, and libraries have limits of their own: neither knows how
+long a scan may be silent.
+"""
+
+import errno
+import os
+import selectors
+import socket
+import threading
+import time
+
+from drivers.errors import LinkError
+from drivers.links.address import HostPort
+
+POLL_S = 0.05  # how long a read waits before it looks whether to stop
+WRITE_S = 1.0
+LARGEST_READ = 1 << 16
+UNDER_WAY = (0, errno.EINPROGRESS, errno.EWOULDBLOCK, errno.EAGAIN)
+
+
+def open_tcp(place: HostPort, within_s: float, stopped: threading.Event) -> socket.socket:
+    """Connect to the first address of a host that answers, each of them with its share of the time.
+
+    The look-up of a host's name is the system's, and takes as long as the system waits for it; an address of numbers needs none.
+
+    Raises OSError where none answers, and LinkError when told to stop.
+    """
+    end_s = time.monotonic() + within_s
+    found = socket.getaddrinfo(place.host.strip("[]"), place.port, type=socket.SOCK_STREAM)
+    failure: OSError = TimeoutError(f"no answer within {within_s:.2g} s")
+    for left, (family, kind, protocol, _, address) in zip(range(len(found), 0, -1), found, strict=True):
+        connection = socket.socket(family, kind, protocol)
+        try:
+            _connect(connection, address, (end_s - time.monotonic()) / left, stopped)
+        except (OSError, LinkError) as error:
+            connection.close()
+            if not isinstance(error, OSError):
+                raise
+            failure = error if not isinstance(error, TimeoutError) else failure
+            continue
+        return connection
+    raise failure
+
+
+def _connect(connection: socket.socket, address: tuple[object, ...], within_s: float, stopped: threading.Event) -> None:
+    """Connect without blocking for longer than a look at whether to stop takes."""
+    connection.setblocking(False)
+    end_s = time.monotonic() + within_s
+    code = connection.connect_ex(address)
+    if code not in UNDER_WAY:
+        raise OSError(code, os.strerror(code))
+    with selectors.DefaultSelector() as selector:
+        selector.register(connection, selectors.EVENT_WRITE)
+        while not selector.select(POLL_S):
+            if stopped.is_set():
+                raise LinkError("told to stop before the connection was there")
+            if time.monotonic() >= end_s:
+                raise TimeoutError
+    code = connection.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
+    if code:
+        raise OSError(code, os.strerror(code))
+
+
+class TcpLine:
+    """A connection that is read and written like a serial port."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        self._connection = connection
+
+    def read(self) -> bytes:
+        """Return what is there, at the latest after POLL_S. Raises OSError where the connection is at its end."""
+        self._connection.settimeout(POLL_S)
+        try:
+            data = self._connection.recv(LARGEST_READ)
+        except TimeoutError:
+            return b""
+        if not data:
+            raise ConnectionResetError("the other end closed the connection")
+        return data
+
+    def write(self, data: bytes) -> None:
+        """Send all of the data. Raises OSError where it is not taken within WRITE_S."""
+        self._connection.settimeout(WRITE_S)
+        self._connection.sendall(data)
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._connection.close()
