@@ -3,6 +3,7 @@
 PlanError     an inspection plan cannot be used
 YamlError     a YAML text is not what its reader expects; it knows the line, its caller adds the file
 StoreError    the record of a run could not be kept or read
+  StationBusyError another process records at this station just now
 RunError      no such run is recorded
 
 A message says what, where (file, line, key), what was found and what is allowed.
@@ -19,6 +20,10 @@ class YamlError(ValueError):
 
 class StoreError(Exception):
     """The record of a run could not be kept or read."""
+
+
+class StationBusyError(StoreError):
+    """Another process records at this station just now."""
 
 
 class RunError(ValueError):

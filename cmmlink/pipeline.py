@@ -95,8 +95,12 @@ def run_inspection(
     buffer_points: int,
     clock: Callable[[], float],
     stop: threading.Event,
+    watch: Callable[[], None] = lambda: None,
 ) -> RunOutcome:
-    """Carry out one run to its end and publish every event to every sink. Setting `stop` aborts the run."""
+    """Carry out one run to its end and publish every event to every sink. Setting `stop` aborts the run.
+
+    watch : called every twentieth of a second, also while no points arrive; what it raises ends the run as an error of a sink does
+    """
     buffer: Buffer[tuple[float, Arrival]] = Buffer(buffer_points)
     failures: list[DeviceError] = []
     acquired = threading.Event()
@@ -106,7 +110,7 @@ def run_inspection(
         _publish(sinks, started)
         reader.start()
         with LiveProof(live) as proof:
-            _judge_all(source, live, proof, sinks, buffer, tally, acquired, clock, stop)
+            _judge_all(source, live, proof, sinks, buffer, tally, acquired, clock, stop, watch)
     finally:
         source.stop()
         buffer.close()
@@ -150,12 +154,14 @@ def _judge_all(
     acquired: threading.Event,
     clock: Callable[[], float],
     stop: threading.Event,
+    watch: Callable[[], None],
 ) -> None:
     """Take what arrives and judge it until acquisition has ended and the buffer is empty."""
     told = False
     while True:
         ended = acquired.is_set()  # read before the buffer is emptied: after it is set, nothing more is handed over
         taken = buffer.take(0.0 if ended else _LOOK_S)
+        watch()
         if stop.is_set():
             source.stop()
         if not taken and ended:

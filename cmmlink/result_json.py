@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from cmmlink.events import Counts, RunStarted
-from inspection import InspectionResult, Registration, Verdict
+from inspection import NOT_JUDGED, InspectionResult, JudgedRows, Registration, Verdict
 
 _PLACES = 50  # of the profile, whose numbers of points are compared
 _DENSER = 10.0
@@ -54,13 +54,14 @@ def result_json(result: InspectionResult | None, counts: Counts) -> dict[str, An
     }
 
 
-def density_notes(result: InspectionResult | None, length_mm: float) -> list[str]:
+def density_notes(rows: JudgedRows | None, length_mm: float) -> list[str]:
     """A reservation where the points lie far denser in one place of the profile than in others, for a fit by points follows them."""
-    if result is None or not result.judged:
+    judged = 0 if rows is None else int(np.count_nonzero(rows.verdicts != NOT_JUDGED))
+    if rows is None or not judged:
         return []
-    counts = np.histogram(result.station_mm[np.isfinite(result.station_mm)], bins=_PLACES, range=(0.0, length_mm))[0]
+    counts = np.histogram(rows.station_mm[np.isfinite(rows.station_mm)], bins=_PLACES, range=(0.0, length_mm))[0]
     densest, sparse = int(counts.max()), float(np.quantile(counts[counts > 0], 0.1))
-    if densest < _SHARE_OF_A_PLACE * result.judged or densest <= _DENSER * sparse:
+    if densest < _SHARE_OF_A_PLACE * judged or densest <= _DENSER * sparse:
         return []
     at = int(counts.argmax()) * length_mm / _PLACES
     return [

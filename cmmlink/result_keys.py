@@ -113,7 +113,7 @@ class Measured(Inspected):
     """The result of a run that was not recorded (`--no-record`): also how the run ended, what was measured, by whom and with what."""
 
     measured_at: str = Field(description="when the run began, in UTC, like 2026-03-14T15:09:26.000Z")
-    ending: Ending = Field(description="how the run ended; aborted (by the operator, then the verdict is uncertain), or cut short")
+    ending: Ending = Field(description="how the run ended; aborted by the operator (then the verdict is uncertain), or interrupted")
     part: str = Field(description="the name of the part")
     serial_number: str | None = Field(description="the serial number of the part")
     operator: str | None = Field(description="who measured")
@@ -277,7 +277,8 @@ class Shown(_Json):
     message: str | None = Field(description="what ended the run early, empty where nothing did")
     received: int | None = Field(description="the points received; null while the run goes on")
     verdict: VerdictName | None = Field(description="the verdict; null where there is none")
-    result: Inspected | None = Field(description="the recorded result")
+    coverage: float | None = Field(description="the share of the profile that was measured; null where no part was found")
+    result: Inspected | None = Field(description="the recorded result; null where the run gave none")
     chain_sha256: str = Field(description="the hash of the run's last record; empty while the run goes on")
     recorded: Kept = Field(description="how much was recorded")
     events: list[RecordedEvent] = Field(description="what happened on the link; damaged frames and heartbeats are counted only")

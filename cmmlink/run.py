@@ -101,7 +101,10 @@ def carry_out(
             store = stack.enter_context(open_to_record(records, now, patience_s))
             recorder = stack.enter_context(Recorder(store, RunInputs.of(plan), clock=clock, now=now))
         listeners: list[Sink] = [*([recorder] if recorder else []), *sinks, log_event]
-        outcome = run_inspection(device.source, live, listeners, started, buffer_points=plan.buffer_points, clock=clock, stop=stop)
+        watch = recorder.check if recorder else lambda: None
+        outcome = run_inspection(
+            device.source, live, listeners, started, buffer_points=plan.buffer_points, clock=clock, stop=stop, watch=watch
+        )
     evidence = recorder.evidence if recorder else None
     if evidence is not None:
         _log.info("recorded in %s as run %s, chain %s, plan %s", records, evidence.run, evidence.chain_sha256, evidence.plan_sha256)

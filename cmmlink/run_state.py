@@ -34,21 +34,23 @@ class WorstPoint:
 
 @dataclass(frozen=True, slots=True)
 class VerdictState:
-    """The verdict, or how the run ended, in words; its sign; whether it is final; and one line that says why it is so."""
+    """The verdict, or how the run ended, in words; its sign; whether it is final; why it is so, and every further reason."""
 
     word: str
     shape: Shape
     final: bool
     why: str
+    reasons: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class ZoneLimits:
-    """The tolerance zone and the expanded uncertainty of one deviation, mm."""
+    """The tolerance zone and the expanded uncertainty of one deviation, mm; how that uncertainty counts, in words."""
 
     lower_mm: float
     upper_mm: float
     uncertainty_mm: float
+    decision_rule: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +80,7 @@ class RunState:
     notes: tuple[str, ...]
     began: str
     phase: Phase
-    ending: Ending | Literal["failed"] | None
+    ending: Ending | Literal["failed", "running"] | None
     message: str
     remark: str
     link: LinkPhase

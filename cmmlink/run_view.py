@@ -7,37 +7,28 @@ one whenever they are ready. Nothing is queued and nobody waits, so a slow reade
 import math
 import threading
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cmmlink.events import Arrived, Counts, Ending, Event, Judged, ProvenOut, RunStarted
+from cmmlink.endings import Ended, count_words, reasons_of
+from cmmlink.events import Arrived, Counts, Event, Judged, ProvenOut, RunStarted
 from cmmlink.extremes import DEVIATION, FOOT_X, NORMAL_X, STATION, VERDICT, ChangedBins, Extremes, PointsVersion
 from cmmlink.plan import Plan
-from cmmlink.result_json import number, result_json
+from cmmlink.result_json import density_notes, number, result_json
 from cmmlink.run_state import LinkPhase, Phase, RegistrationState, RunKind, RunState, VerdictState, WorstPoint, ZoneLimits
 from cmmlink.words import LOOKS_OUT, NOT_MEASURED, VERDICT_NAMES, Headline, headline_of, local_words
-from drivers import Heartbeat, LinkDown, LinkUp, PointBatch, ScanClosed, ScanOpened
-from inspection import JudgedRows, LiveUpdate, NominalProfile, ToleranceZone, Verdict, coverage
+from drivers import Heartbeat, LinkDown, LinkUp, PointBatch, Rejected, ScanClosed, ScanOpened
+from inspection import LiveUpdate, NominalProfile, ToleranceZone, Verdict, coverage
 
 _COUNTED = ("received", "judged", "rejected", "lost", "damaged_bytes", "rejected_by_reason")
 _RATE_OVER_S = 1.0
 _RATE_STEP_S = 0.05
 _COVERAGE_EVERY_S = 0.25
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Ended:
-    """How a run ended: its ending, why there is no result, the result as the command line prints it, and its judged points."""
-
-    ending: Ending
-    message: str
-    result: Mapping[str, Any]
-    rows: JudgedRows | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,6 +87,7 @@ class RunView:
         self._link_detail = ""
         self._expected: int | None = None
         self._device_name = ""
+        self._arrived = 0
         self._received: deque[_Received] = deque()
         self._alive_s = -math.inf
         self._latency_s = math.nan
@@ -105,6 +97,7 @@ class RunView:
         self._proven_at: int | None = None
         self._coverage, self._coverage_s = 0.0, -math.inf
         self._ended: Ended | None = None
+        self._notes: tuple[str, ...] = ()
         self._failure = self._remark = ""
         self._published = self._snapshot()
 
@@ -134,9 +127,11 @@ class RunView:
             self._publish()
 
     def fail(self, message: str) -> None:
-        """Note that the run broke off before it could give a result."""
+        """Note that the run broke off before it could give a result; what arrived without a verdict by then has none."""
+        covered = coverage(self._extremes.stations_mm, self.context.profile)
         with self._lock:
-            self._failure, self._phase, self._link = message, "finished", "closed"
+            self._failure, self._phase, self._link, self._coverage = message, "finished", "closed", covered
+            self._counts = _settled(self._counts, self._arrived)
             self._publish()
 
     def remark(self, words: str) -> None:
@@ -182,6 +177,8 @@ class RunView:
         arrival = event.arrival
         if isinstance(arrival, (PointBatch, Heartbeat)):
             self._alive_s = event.time_s
+        if isinstance(arrival, (PointBatch, Rejected)):
+            self._arrived += len(arrival) if isinstance(arrival, PointBatch) else arrival.count
         link: LinkPhase = "down" if isinstance(arrival, LinkDown) else "closed" if isinstance(arrival, ScanClosed) else "up"
         begins = link != "down" and self._phase in ("preparing", "starting")
         if link == self._link and not begins and not isinstance(arrival, (ScanOpened, LinkUp)):
@@ -229,6 +226,7 @@ class RunView:
             self._phase, self._ended, self._counts, self._extremes = "finished", ended, counts, extremes
             self._link = "down" if ended.ending == "interrupted" else "closed"
             self._coverage, self._out = ended.result["coverage"], ended.result["out_of_tolerance"]
+            self._notes = (*self._started.notes, *density_notes(rows, self.context.profile.length_mm))
             if rows is not None:
                 self._verdict_at = self._now()
             self._publish()
@@ -261,7 +259,7 @@ class RunView:
             plan=context.plan,
             part=started.part,
             serial_number=started.serial_number,
-            notes=started.notes,
+            notes=self._notes or started.notes,
             operator=started.operator,
             device=self._device_name or started.device,
             address=started.device,
@@ -296,7 +294,7 @@ class RunView:
             worst=_worst_point(self._extremes.worst),
             verdict=self._verdict(),
             length_mm=context.profile.length_mm,
-            zone=ZoneLimits(zone.lower_mm, zone.upper_mm, zone.uncertainty_mm),
+            zone=ZoneLimits(zone.lower_mm, zone.upper_mm, zone.uncertainty_mm, zone.decision_rule),
         )
 
     def _registration(self) -> RegistrationState:
@@ -311,41 +309,44 @@ class RunView:
 
     def _verdict(self) -> VerdictState:
         ended = self._ended
-        if self._failure and self._counts.received:
-            return _state_of(headline_of(Verdict.UNCERTAIN), True, "the run broke off")
         if self._failure:
-            return _state_of(NOT_MEASURED, True, self._failure)
+            headline = headline_of(None, "interrupted", self._coverage) if self._counts.received else NOT_MEASURED
+            return _state_of(headline, True, self._failure)
         if ended is None:
             return self._verdict_so_far()
-        found = Verdict[ended.result["verdict"].upper()] if ended.result["registration"] and ended.result["received"] else None
-        early = ended.ending != "complete" and ended.result["received"] > 0
-        headline = headline_of(found, ended.ending, self._share(ended)) if early else headline_of(found)
-        return _state_of(headline, not early, _reason_of(ended, found, self.context.coverage_min))
-
-    def _share(self, ended: Ended) -> float | None:
-        """How much was measured, from 0 to 1: of the profile, or of the points announced where no part was found."""
-        if ended.result["registration"]:
-            return float(ended.result["coverage"])
-        return min(1.0, self._counts.received / self._expected) if self._expected else None
+        result = ended.result
+        found = Verdict[result["verdict"].upper()] if result["registration"] and result["received"] else None
+        early = ended.ending != "complete" and result["received"] > 0
+        headline = headline_of(found, ended.ending, result["coverage"]) if early else headline_of(found)
+        why, *further = reasons_of(ended, found)
+        return _state_of(headline, not early, why, further)
 
     def _verdict_so_far(self) -> VerdictState:
         unproven, out = headline_of(Verdict.UNCERTAIN), headline_of(Verdict.NONCONFORM)
         if self._phase == "preparing":
             return _state_of(unproven, False, "preparing the inspection")
         if self._proven_at is not None:
-            return _state_of(out, False, f"no placement of the first {_points(self._proven_at)} passes")
+            return _state_of(out, False, f"no placement of the first {count_words(self._proven_at)} passes")
         if self._out:
             is_proof = self._update is not None and self._update.state == "settled"
             headline, proven = (out, "out so far") if is_proof else (LOOKS_OUT, "so far, not proven")
-            return _state_of(headline, False, f"{_points(self._out)} {proven}")
+            return _state_of(headline, False, f"{count_words(self._out)} {proven}")
         if not self._counts.judged:
             seeking = self._update is not None and self._update.state == "seeking"
             return _state_of(unproven, False, "seeking the part" if seeking else "waiting for points")
         return _state_of(unproven, False, f"{self._coverage:.0%} measured, none out so far")
 
 
-def _state_of(headline: Headline, final: bool, why: str) -> VerdictState:
-    return VerdictState(headline.words, headline.shape, final, why)
+def _state_of(headline: Headline, final: bool, why: str, further: Sequence[str] = ()) -> VerdictState:
+    return VerdictState(headline.words, headline.shape, final, why, tuple(further))
+
+
+def _settled(counts: Counts, arrived: int) -> Counts:
+    """The counts of a run that broke off: every point that arrived is accounted for, and none waits any more."""
+    received = max(counts.received, arrived)
+    left = received - counts.judged - counts.rejected
+    reasons = {**counts.rejected_by_reason, **({"not judged": left} if left else {})}
+    return replace(counts, received=received, rejected=counts.rejected + left, pending=0, rejected_by_reason=reasons)
 
 
 def _rate_per_s(published: _Published, now_s: float) -> float:
@@ -362,25 +363,3 @@ def _worst_point(worst: NDArray[np.float64] | None) -> WorstPoint | None:
     x, y = worst[FOOT_X : FOOT_X + 2] + worst[DEVIATION] * worst[NORMAL_X : NORMAL_X + 2]
     verdict = VERDICT_NAMES[Verdict(int(worst[VERDICT]))]
     return WorstPoint(float(worst[STATION]), float(worst[DEVIATION]), float(x), float(y), verdict)
-
-
-def _reason_of(ended: Ended, verdict: Verdict | None, coverage_min: float) -> str:
-    """One line under the headline."""
-    result = ended.result
-    if not result["received"]:
-        return ended.message if ended.ending == "interrupted" and ended.message else "no point was received"
-    if verdict is None:
-        return "cut short; Replay judges what was received" if ended.ending == "interrupted" else "no part found"
-    if ended.ending != "complete":
-        so_far = f"{_points(result['out_of_tolerance'])} out" if result["out_of_tolerance"] else "none out"
-        return f"no verdict: the scan was {'aborted' if ended.ending == 'aborted' else 'cut short'}; {so_far} until then"
-    if verdict is Verdict.NONCONFORM:
-        places = f", {len(result['stretches'])} places" if len(result["stretches"]) > 1 else ""
-        return f"{_points(result['out_of_tolerance'])} out of tolerance{places}"
-    if verdict is Verdict.CONFORM:
-        return f"all {_points(result['judged'])} within tolerance"
-    return result["reasons"][0]["words"] if result["reasons"] else "the scan was cut short"
-
-
-def _points(count: int) -> str:
-    return f"{count:,} point{'s' if count != 1 else ''}"

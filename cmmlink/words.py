@@ -30,7 +30,7 @@ _SHAPES: Mapping[Verdict, Shape] = {
     Verdict.UNCERTAIN: "not-proven",
     Verdict.NONCONFORM: "not-conform",
 }
-_ENDINGS = {"aborted": "ABORTED", "interrupted": "CUT SHORT", "running": "RUNNING", "damaged": "RECORD DAMAGED"}
+_ENDINGS = {"aborted": "ABORTED", "interrupted": "INTERRUPTED", "running": "RUNNING", "damaged": "RECORD DAMAGED"}
 
 
 @dataclass(frozen=True, slots=True)

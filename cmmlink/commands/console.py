@@ -21,12 +21,13 @@ from cmmlink.console.past_runs import PastRuns
 from cmmlink.console.refused import Refused
 from cmmlink.console.station_setup import StationSetup
 from cmmlink.devices import Connect, connect, decoder_of, serial_ports
+from cmmlink.endings import Ended
 from cmmlink.errors import PlanError
 from cmmlink.from_plan import run_started
 from cmmlink.plan import CtPlan, Plan, load_ct_plan
 from cmmlink.report import prepare, write_run, write_stack
 from cmmlink.run import FinishedRun
-from cmmlink.run_view import Ended, RunContext
+from cmmlink.run_view import RunContext
 from cmmlink.stack import SectionOutcome, inspect_stack, surface_words
 from cmmlink.version import __version__
 from cmmlink.words import VERDICT_WORDS

@@ -1,9 +1,10 @@
 """Commands on what was recorded: list, show, export, evaluate again, verify."""
 
+from collections.abc import Mapping
 from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -13,26 +14,37 @@ from cmmlink.commands.output import now, print_json, terminal
 from cmmlink.devices import decoder_of
 from cmmlink.record import Replay, check_chain, describe, export_run, find_run, list_runs, open_to_read, recorded_run, replay_run
 from cmmlink.report import print_summary, write_results
-from cmmlink.words import local_words, utc_words
-from inspection import Method
+from cmmlink.result_keys import RunLine
+from cmmlink.words import headline_of, local_words, utc_words
+from inspection import Method, Verdict
 
 _DETAILS = ("run", "started", "ended", "state", "message", "verdict", "part", "serial_number", "operator", "device", "chain_sha256")
+_LONGEST_HEADLINE = len("INTERRUPTED AT 99 %")
 
 
 def runs(records: Records = None, as_json: Json = False) -> int:
     """List the recorded runs."""
     found = list_runs(records_folder(records), now)
     if as_json:
-        print_json({"runs": found})
+        print_json({"runs": [{key: entry[key] for key in RunLine.model_fields} for entry in found]})
         return 0
     for entry in found:
-        part = " ".join(filter(None, [entry["part"], entry["serial_number"]]))
-        verdict = (entry["verdict"] or "-") if entry["state"] == "complete" else "-"
         received = "-" if entry["received"] is None else entry["received"]
-        typer.echo(f"{entry['run']}  {_local(entry['started']):<25}  {entry['state']:<11}  {verdict:<10}  {received:>9} points  {part}")
+        head = f"{entry['run']}  {_local(entry['started']):<25}  {entry['state']:<11}  {_headline(entry):<{_LONGEST_HEADLINE}}"
+        typer.echo(f"{head}  {received:>9} points  {_part_in(entry)}")
     if not found:
         typer.echo(f"no run was recorded yet in {records_folder(records)}")
     return 0
+
+
+def _headline(entry: Mapping[str, Any]) -> str:
+    """The verdict of a run on record, or how early it ended, in the words of the page and the summary."""
+    verdict = Verdict[entry["verdict"].upper()] if entry["verdict"] else None
+    return headline_of(verdict, entry["state"], entry.get("coverage")).words
+
+
+def _part_in(entry: Mapping[str, Any]) -> str:
+    return " ".join(filter(None, [entry["part"], entry["serial_number"]]))
 
 
 def _local(recorded: str | None) -> str:
@@ -47,8 +59,9 @@ def show(name: RunName, records: Records = None, as_json: Json = False) -> int:
     if as_json:
         print_json(found)
         return 0
+    typer.echo(f"{_headline(found)}   {_part_in(found)}".rstrip())
     for key in _DETAILS:
-        if found[key]:
+        if found[key] and (key != "verdict" or found["state"] == "complete"):
             value = _local(found[key]) if key in ("started", "ended") else found[key]
             typer.echo(f"{key:<14} {value}{' (simulated)' if key == 'device' and found['simulated'] else ''}")
     for key in ("software", "recorded"):

@@ -117,7 +117,7 @@ class Alarms:
             self.clear_active()
             self.raise_alarm("fault", "Device failed", event.message, active=True)
         elif event.result is None:
-            self.raise_alarm("fault", "No part found", event.message)
+            self.raise_alarm("fault", "Not measured", event.message)
 
     def _drop_oldest(self) -> None:
         surplus = len(self._alarms) - _MOST_KEPT

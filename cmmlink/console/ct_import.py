@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from cmmlink.console.protocol import SectionRow, SurfaceState
+from cmmlink.endings import Ended
 from cmmlink.events import RunStarted
-from cmmlink.run_view import Ended, RunContext
+from cmmlink.run_view import RunContext
 from cmmlink.words import NOT_MEASURED, headline_of
 from inspection import Verdict
 

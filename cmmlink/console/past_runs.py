@@ -10,12 +10,14 @@ from pathlib import Path
 from typing import Any
 
 from cmmlink.console.protocol import RunRow
+from cmmlink.endings import Ended
 from cmmlink.errors import StoreError
 from cmmlink.events import Counts, RunStarted, Sink
 from cmmlink.plan import Device, Plan
 from cmmlink.record import (
     Replay,
     Store,
+    end_missing,
     find_run,
     list_runs,
     open_to_read,
@@ -29,7 +31,7 @@ from cmmlink.record import (
 from cmmlink.record import export_run as export_files
 from cmmlink.result_json import result_json
 from cmmlink.run_state import RunKind
-from cmmlink.run_view import Ended, RunContext
+from cmmlink.run_view import RunContext
 from cmmlink.words import headline_of, local_words
 from drivers import Decoder
 from inspection import NominalProfile, Verdict
@@ -81,7 +83,7 @@ class PastRuns:
         with open_to_read(self.folder, self.now) as store:
             recorded = recorded_run(store, find_run(store, run))
             bodies = [record.body for record in store.records(recorded.run, "deviations")]
-        end = recorded.end or {"state": "interrupted", "message": "the run is being recorded", "received": 0}
+            end = recorded.end or end_missing(store, recorded.run)
         received = end["received"] or 0
         counts = Counts(received=received, rejected=received, rejected_by_reason={"not judged": received})
         result = recorded.result or result_json(None, counts)
@@ -91,7 +93,12 @@ class PastRuns:
             recorded_profile(plan, recorded),
             datetime.fromisoformat(recorded.header["started"]).astimezone(),
             RunStarted.from_header(recorded.header),
-            Ended(end["state"], end["message"], result, unpack_judged(bodies) if bodies else None),
+            Ended(
+                end["state"],
+                end["message"],
+                result,
+                unpack_judged(bodies) if bodies else None,
+            ),
         )
 
     def replay_run(self, run: str, sinks: Sequence[Sink], stop: threading.Event) -> str:
@@ -123,7 +130,7 @@ def _result_of(store: Store, run: str) -> dict[str, Any]:
 
 def _row_of(entry: dict[str, Any], result: dict[str, Any]) -> RunRow:
     worst, zone = result.get("worst") or {}, result.get("tolerance") or {}
-    verdict = Verdict[entry["verdict"].upper()] if entry["verdict"] and result.get("registration") else None
+    verdict = Verdict[entry["verdict"].upper()] if entry["verdict"] and result.get("registration") else None  # older records say more
     headline = headline_of(verdict, entry["state"], result.get("coverage"))
     return RunRow(
         entry["run"],
@@ -132,7 +139,7 @@ def _row_of(entry: dict[str, Any], result: dict[str, Any]) -> RunRow:
         entry["serial_number"] or "",
         entry["state"],
         entry["received"] or 0,
-        entry["verdict"],
+        entry["verdict"] if verdict is not None else None,
         headline.words,
         headline.shape,
         entry["state"] == "complete" and verdict is not None,

@@ -1,6 +1,7 @@
 """Reads the records of a station: the list of runs, one run in full, and whether anything was altered.
 
 A run whose end is missing is closed as interrupted by whoever opens the records next, unless it is being recorded just now.
+Where that cannot be written, it is read as interrupted all the same.
 """
 
 import dataclasses
@@ -14,7 +15,7 @@ from typing import Any
 
 from platformdirs import user_data_path
 
-from cmmlink.errors import RunError, StoreError
+from cmmlink.errors import RunError, StationBusyError, StoreError
 from cmmlink.record.bodies import PlacedArrival, unpack_arrivals, unpack_document, unpack_points, unpack_reads
 from cmmlink.record.chain import Record, is_damaged
 from cmmlink.record.recorder import end_draft
@@ -22,6 +23,8 @@ from cmmlink.record.station_lock import PATIENCE_S
 from cmmlink.record.store import FILE_NAME, Store
 from drivers import Arrival, PointBatch, Rejected, WireBytes
 
+_FROM_HEADER = ("run", "started", "part", "serial_number")
+_FROM_END = ("state", "received", "verdict", "coverage")
 _CUT_OFF = "the program ended before the run did: power failure, crash or kill"
 
 
@@ -62,25 +65,29 @@ def open_to_read(folder: Path, now: Callable[[], datetime], *, close_interrupted
         raise RunError(f"{folder}: there are no records here; --records DIR says where they are")
     with Store(folder, writing=False, epoch_s=lambda: now().timestamp()) as store:
         unfinished = any(end is None for _, end in store.begins_and_ends())
+    recording = False
     if unfinished and close_interrupted:
         try:
             with open_to_record(folder, now):
                 pass
-        except StoreError:  # the run is being recorded just now, or the medium is write-protected: leave the run open
+        except StationBusyError:
+            recording = True
+        except StoreError:  # the disk is full, or the medium write-protected: nobody records, and the run stays without its end
             pass
     with Store(folder, writing=False, epoch_s=lambda: now().timestamp()) as store:
+        store.recording = recording
         yield store
 
 
 def list_runs(folder: Path, now: Callable[[], datetime]) -> list[dict[str, Any]]:
-    """Every run, oldest first: run, started, part, serial_number, state, received, verdict; none where nothing was recorded yet.
+    """Every run, oldest first: run, started, part, serial_number, state, received, verdict, coverage; none where nothing was recorded yet.
 
-    The state of a run that another process records just now is "running".
+    The state of a run that another process records just now is "running"; a run that gave no result has no verdict.
     """
     if not (folder / FILE_NAME).is_file():
         return []
     with open_to_read(folder, now) as store:
-        return [_entry(begin, end) for begin, end in store.begins_and_ends()]
+        return [_entry(store, begin, end) for begin, end in store.begins_and_ends()]
 
 
 def find_run(store: Store, name: str) -> str:
@@ -133,12 +140,12 @@ def registrations_of(store: Store, run: str) -> list[dict[str, Any]]:
 def describe(store: Store, run: str) -> dict[str, Any]:
     """Everything about a run except its points, as plain values."""
     recorded = recorded_run(store, run)
-    end = recorded.end or {"state": "running", "message": "", "received": None, "verdict": None}
+    end = recorded.end or end_missing(store, run)
     moments = list(arrivals_of(store, run))
     totals = store.totals(run)
     return {
         **recorded.header,
-        **{key: end.get(key) for key in ("state", "ended", "message", "received", "verdict")},
+        **{key: end.get(key) for key in ("state", "ended", "message", "received", "verdict", "coverage")},
         "result": recorded.result,
         "chain_sha256": recorded.chain_sha256,
         "recorded": {
@@ -174,13 +181,19 @@ def _is_telling(arrival: Arrival) -> bool:
     )  # there may be thousands: they are only counted here
 
 
-def _entry(begin: Record, end: Record | None) -> dict[str, Any]:
+def _entry(store: Store, begin: Record, end: Record | None) -> dict[str, Any]:
     if is_damaged(begin) or (end is not None and is_damaged(end)):
-        return {"run": begin.run, "state": "damaged"} | dict.fromkeys(("started", "part", "serial_number", "received", "verdict"))
+        return {"run": begin.run, "state": "damaged"} | dict.fromkeys((*_FROM_HEADER[1:], *_FROM_END[1:]))
     header = unpack_document(begin.body)
-    closing = unpack_document(end.body) if end else {"state": "running", "received": None, "verdict": None}
-    entry = {key: header.get(key) for key in ("run", "started", "part", "serial_number")}
-    return entry | {key: closing.get(key) for key in ("state", "received", "verdict")}
+    closing = unpack_document(end.body) if end else end_missing(store, begin.run)
+    return {key: header.get(key) for key in _FROM_HEADER} | {key: closing.get(key) for key in _FROM_END}
+
+
+def end_missing(store: Store, run: str) -> dict[str, Any]:
+    """What stands in place of a run's end: it goes on, or it was interrupted and that could not be written."""
+    if store.recording:
+        return {"state": "running", "message": "the run is being recorded", "received": None, "verdict": None}
+    return {"state": "interrupted", "message": _CUT_OFF, "received": _count_received(store, run), "verdict": None}
 
 
 def _close_interrupted(store: Store, now: Callable[[], datetime]) -> None:

@@ -1,8 +1,9 @@
 """The recorder: a sink that keeps a run while it goes on.
 
 The run's thread only hands over; one thread of the recorder packs and commits every tenth of a second. Acknowledged means
-committed. Nothing is dropped: a full queue makes the run wait, and when the disk fails the next event raises StoreError
-in the run's thread, which stops the scan.
+committed. Nothing is dropped: a full queue makes the run wait, and when the disk fails the next event or the next `check`
+raises StoreError in the run's thread, which stops the scan. A run that gave no result is kept with its points and the reason,
+without a verdict.
 """
 
 import hashlib
@@ -138,6 +139,11 @@ class Recorder:
         elif isinstance(event, RunFinished) and self.run:
             self._end(event)
 
+    def check(self) -> None:
+        """Raise StoreError when the record cannot be kept any more, also while nothing arrives."""
+        if self._failure is not None:
+            raise self._no_record()
+
     def __enter__(self) -> "Recorder":
         return self
 
@@ -146,14 +152,19 @@ class Recorder:
         if self._writer is None:
             return
         self._stop_writing()
-        if self._failure is None:
-            self._store.append([self._end_draft("interrupted", f"the program failed: {error!r}", self._pack.counts())])
+        why = f"the program failed: {error!r}" if self._failure is None else f"the record could not be kept: {self._failure}"
+        try:
+            self._store.append([self._end_draft("interrupted", why, self._pack.counts())])
+        except StoreError:
+            if self._failure is None:
+                raise
+            # the disk is still full: whoever reads the records finds a run without an end, which was interrupted
 
     def _begin(self) -> None:
         """Add the run to the records. A device that never opened gives no run: nothing was measured."""
         assert self._started is not None, "a run begins with RunStarted"
         began, started, inputs = self._began, self._started, self._inputs
-        self.run = f"{began:%Y%m%d-%H%M%S}-{len(self._store.begins_and_ends()) + 1:04d}"
+        self.run = f"{began:%Y%m%d-%H%M%S}-{self._store.count_runs() + 1:04d}"
         plan = inputs.plan.encode()
         header = {
             "run": self.run,
@@ -195,12 +206,12 @@ class Recorder:
 
     def _end(self, finished: RunFinished) -> None:
         self._stop_writing()
-        if self._failure is not None:
-            raise self._no_record()
+        self.check()
         result = result_json(finished.result, finished.counts)
         sha256 = result_sha256(result, finished.result)
         drafts = [self._draft("deviations", body, count) for count, body in (pack_judged(finished.result) if finished.result else ())]
-        drafts.append(self._draft("result", pack_document(result)))
+        if finished.result is not None:
+            drafts.append(self._draft("result", pack_document(result)))
         drafts.append(self._end_draft(finished.ending, finished.message, result, sha256))
         try:
             end = self._store.append(drafts)[-1]
@@ -285,13 +296,15 @@ class _Packing:
 
 
 def end_draft(run: str, state: str, message: str, now: datetime, result: Mapping[str, Any], sha256: str = "") -> Draft:
-    """The record that closes a run: its state, the number of points received, and the verdict if there is one."""
+    """The record that closes a run: its state, the number of points received, and verdict and coverage where the part was found."""
+    found = bool(result.get("received") and result.get("registration"))
     document = {
         "state": state,
         "message": message,
         "ended": utc_words(now),
         "received": result.get("received", 0),
-        "verdict": result.get("verdict") if result.get("received") else None,
+        "verdict": result.get("verdict") if found else None,
+        "coverage": result.get("coverage") if found else None,
         "result_sha256": sha256,
     }
     return Draft(run, "end", pack_document(document))

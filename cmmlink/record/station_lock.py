@@ -7,13 +7,13 @@ import os
 import sqlite3
 from pathlib import Path
 
-from cmmlink.errors import StoreError
+from cmmlink.errors import StationBusyError, StoreError
 
 PATIENCE_S = 0.5  # another process may hold the lock for a moment to close an interrupted run
 
 
 class StationLock:
-    """Holds the lock from its making to `release`. Raises StoreError when another process holds it."""
+    """Holds the lock from its making to `release`. Raises StationBusyError when another process holds it, StoreError where none can be."""
 
     def __init__(self, path: Path, patience_s: float = PATIENCE_S) -> None:
         """`patience_s` is how long another process may hold it before that counts as taken."""
@@ -24,7 +24,7 @@ class StationLock:
             holder = _holder(self._connection)
             self._connection.close()
             if error.sqlite_errorcode & 0xFF == sqlite3.SQLITE_BUSY:
-                raise StoreError(
+                raise StationBusyError(
                     f"{path.parent}: {holder} records at this station already; wait until it has finished, "
                     "or keep the records of this run elsewhere with --records DIR"
                 ) from None

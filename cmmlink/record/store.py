@@ -41,7 +41,10 @@ _PATIENCE_S = 5.0  # for another connection's transaction
 
 
 class Store:
-    """An open station file. `writing` takes the station's lock for as long as the store is open."""
+    """An open station file. `writing` takes the station's lock for as long as the store is open.
+
+    recording : whether another process was found recording when the file was opened to be read
+    """
 
     def __init__(
         self,
@@ -54,6 +57,7 @@ class Store:
     ) -> None:
         """`epoch_s` gives seconds since 1970. Raises StoreError: locked, newer, unusable folder, not a file of records."""
         self.path = folder / FILE_NAME
+        self.recording = False
         self._epoch_s = epoch_s
         self._lock: StationLock | None = None
         self._head: tuple[int, bytes] = (0, GENESIS)  # number and hash of the last record
@@ -114,6 +118,12 @@ class Store:
         query = "SELECT kind, count(*), sum(count) FROM record WHERE run = ? GROUP BY kind"
         with _translate_errors(self.path):
             return {kind: (records, count) for kind, records, count in self._connection.execute(query, (run,))}
+
+    def count_runs(self) -> int:
+        """How many runs there are."""
+        with _translate_errors(self.path):
+            (count,) = self._connection.execute("SELECT count(*) FROM record WHERE kind = 'run'").fetchone()
+            return int(count)
 
     def begins_and_ends(self) -> list[tuple[Record, Record | None]]:
         """The first and, unless it is open, the last record of every run, oldest run first."""

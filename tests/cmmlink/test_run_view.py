@@ -82,7 +82,7 @@ def test_phases_follow_the_device_and_the_operator(played: Played) -> None:
     assert view.over
     state = view.state()
     assert (state.phase, state.ending, state.message) == ("finished", "complete", "the points do not fit")
-    assert (state.verdict.word, state.verdict.final, state.verdict.why) == ("NOT MEASURED", True, "no part found")
+    assert (state.verdict.word, state.verdict.final, state.verdict.why) == ("NOT MEASURED", True, "the points do not fit")
 
 
 def test_rate_and_sign_of_life_fade_when_nothing_comes(played: Played) -> None:

@@ -10,7 +10,7 @@ from inspection import Verdict
 @pytest.mark.parametrize("ending", ["aborted", "interrupted"])
 def test_no_verdict_stands_above_a_run_that_did_not_come_to_its_end(verdict: Verdict | None, ending: str) -> None:
     headline = headline_of(verdict, ending, 0.3299)
-    assert headline.words == {"aborted": "ABORTED AT 32 %", "interrupted": "CUT SHORT AT 32 %"}[ending]
+    assert headline.words == {"aborted": "ABORTED AT 32 %", "interrupted": "INTERRUPTED AT 32 %"}[ending]
     assert headline.shape == "ended-early"
 
 

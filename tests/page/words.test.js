@@ -36,11 +36,11 @@ test("banners stack: one thing never hides another", () => {
 });
 
 test("the card belongs to what the view shows", () => {
-  const verdict = { word: "CONFORM", shape: "conform", final: true, why: "all within" };
+  const verdict = { word: "CONFORM", shape: "conform", final: true, why: "all within", reasons: ["also this"] };
   const run = { ...RUN, kind: "run", phase: "finished", part: "blade", serial_number: "B-1", began: "then", verdict };
   const station = { can_start: true, choice: { name: "a.yaml", part: "vane" }, serial_number: "B-2" };
   const heard = { ...HEARD, run, station };
-  assert.equal(cardOf(heard).word, "CONFORM");
+  assert.deepEqual([cardOf(heard).word, cardOf(heard).reasons], ["CONFORM", ["also this"]]);
   const next = cardOf({ ...heard, view: "part" });
   assert.deepEqual([next.part, next.serial, next.word, next.run], ["vane", "B-2", "READY", null]);
   assert.match(next.before, /B-1.*CONFORM.*then/);

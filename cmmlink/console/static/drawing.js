@@ -28,7 +28,7 @@ export class Drawing {
     this.nominal = NO_NOMINAL;
     this.points = new Points();
     /** @type {ZoneLimits} */
-    this.zone = { lower_mm: 0, upper_mm: 0, uncertainty_mm: 0 };
+    this.zone = { lower_mm: 0, upper_mm: 0, uncertainty_mm: 0, decision_rule: "" };
     /** @type {WorstPoint | null} */
     this.worst = null;
     this.outdated = { ground: true, marks: true, cursor: true };

@@ -14,7 +14,7 @@ import { CODE_OF } from "./verdicts.js";
  * What stands at the right of the page: whose verdict, and the verdict.
  * @typedef {{ part: string, serial: string, names: (string | undefined)[], word: string,
  * shape: RunState["verdict"]["shape"], final: boolean,
- *   why: string, phase: string, badge: string, before: string, run: RunState | null }} Card
+ *   why: string, reasons: readonly string[], phase: string, badge: string, before: string, run: RunState | null }} Card
  */
 /**
  * What the station says, as far as it was heard.
@@ -32,9 +32,10 @@ import { CODE_OF } from "./verdicts.js";
  */
 
 const NONE = "\u2013";
+const LONG_WORD = 9; // letters; a longer word is set smaller, so that it stays in its card
 /** @type {Card} */
 const NO_CARD = { part: "", serial: "", names: [], word: "",
-  shape: "none", final: false, why: "", phase: "", badge: "", before: "", run: null };
+  shape: "none", final: false, why: "", reasons: [], phase: "", badge: "", before: "", run: null };
 const SIGNS = { over: "\u25b2", under: "\u25bc", "not-proven": "\u25c6", in: "\u25cf", near: "\u25cf" };
 const PHASES = { preparing: "preparing", starting: "connecting", measuring: "so far", ending: "ending", finished: "" };
 
@@ -57,6 +58,8 @@ export function showRun(heard) {
   byId("kind").hidden = !card.badge;
   put("kind", card.badge);
   showVerdict(card);
+  showRemarks(card);
+  put("rule", run ? ruleWords(run) : "");
   showWorst(run);
   showRegistration(run?.registration);
   showCoverage(run?.coverage ?? 0, run?.coverage_min ?? 0);
@@ -81,12 +84,12 @@ export function cardOf({ run, isRecorded, station, view, chosen, surface }) {
  * @returns {Card}
  */
 function cardOfRun(run) {
-  const { word, shape, final, why } = run.verdict,
+  const { word, shape, final, why, reasons } = run.verdict,
     badge = { run: "", section: "SECTION", replay: "REPLAY of", recorded: "RECORDED" }[run.kind];
   const dated = run.kind === "section" || !badge ? badge : `${badge} ${run.began}`;
   const phase = final ? "" : PHASES[run.phase];
   return { part: run.part, serial: run.serial_number, names: [run.plan, run.operator], word, shape, final,
-    why, phase, badge: dated, before: "", run };
+    why, reasons, phase, badge: dated, before: "", run };
 }
 
 /**
@@ -127,12 +130,45 @@ function showVerdict({ word, shape, final, why, phase }) {
   const card = byId("verdict");
   document.body.dataset.verdict = shape;
   card.dataset.final = String(final);
+  card.dataset.long = String(word.split(" ").some((part) => part.length > LONG_WORD));
   showSymbol(within(card, ".shape"), `shape-${shape}`);
   put("verdict-word", word);
   put("verdict-why", why);
   byId("verdict-why").title = why; // a long one is cut
   put("provisional", phase);
   byId("provisional").hidden = !phase;
+}
+
+/**
+ * Every further reason of the verdict, and all that was assumed about nominal and points.
+ * @param {Card} card
+ */
+function showRemarks({ reasons, run }) {
+  const notes = run?.notes ?? [];
+  byId("remarks").hidden = !reasons.length && !notes.length;
+  showList("reasons", reasons);
+  showList("notes", notes);
+}
+
+/**
+ * @param {string} id of a heading and its list
+ * @param {readonly string[]} sentences
+ */
+function showList(id, sentences) {
+  const part = byId(id), list = within(part, "ul"), shown = JSON.stringify(sentences);
+  part.hidden = !sentences.length;
+  if (part.dataset.shown === shown) return;
+  part.dataset.shown = shown;
+  list.replaceChildren(...sentences.map((sentence) => make("li", sentence)));
+}
+
+/**
+ * The zone that a run is judged by, and how the uncertainty counts.
+ * @param {RunState} run
+ */
+export function ruleWords({ zone }) {
+  const digits = digitsFor(zone);
+  return `zone ${signed(zone.lower_mm, digits)} .. ${signed(zone.upper_mm, digits)} mm; ${zone.decision_rule}`;
 }
 
 /**

@@ -120,19 +120,21 @@ export interface WorstPoint {
   readonly verdict: "conform" | "uncertain" | "nonconform";
 }
 
-/** The verdict, or how the run ended, in words; its sign; whether it is final; and one line that says why it is so. */
+/** The verdict, or how the run ended, in words; its sign; whether it is final; why it is so, and every further reason. */
 export interface VerdictState {
   readonly word: string;
   readonly shape: "conform" | "not-proven" | "not-conform" | "ended-early" | "none";
   readonly final: boolean;
   readonly why: string;
+  readonly reasons: readonly string[];
 }
 
-/** The tolerance zone and the expanded uncertainty of one deviation, mm. */
+/** The tolerance zone and the expanded uncertainty of one deviation, mm; how that uncertainty counts, in words. */
 export interface ZoneLimits {
   readonly lower_mm: number;
   readonly upper_mm: number;
   readonly uncertainty_mm: number;
+  readonly decision_rule: string;
 }
 
 /** Everything that is shown of a run in numbers and words, as it was at one moment. kind : a run that is measured, or what poses as none: a replay, a run from the records, a section of a surface notes : what was assumed about the nominal and the points began : when the points were measured: date, time of day and offset from UTC ending : null while the run is on; message says why a run has no result, or what failed link_detail : why the link was lost, or how long it was away; empty while it never was streaming : whether the device shows itself alive now expected : number of points the device announced latency_s : how long the newest judged point waited for its verdict verdict_at_ms : when the newest verdict was given, ms since 1970 */
@@ -149,7 +151,7 @@ export interface RunState {
   readonly notes: readonly string[];
   readonly began: string;
   readonly phase: "preparing" | "starting" | "measuring" | "ending" | "finished";
-  readonly ending: "complete" | "aborted" | "interrupted" | "failed" | null;
+  readonly ending: "complete" | "aborted" | "interrupted" | "failed" | "running" | null;
   readonly message: string;
   readonly remark: string;
   readonly link: "connecting" | "up" | "down" | "closed";

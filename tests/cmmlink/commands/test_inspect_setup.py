@@ -1,11 +1,15 @@
 """How `inspect` is told what a file of points holds, what it says it assumed, and that a wrong set-up is not measured."""
 
 import json
+import time
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from cmmlink.console.past_runs import PastRuns
+from cmmlink.endings import reasons_of
 from tests.cmmlink.command import Ended, cmmlink
 from tests.cmmlink.commands.oval_files import TOLERANCE
 from tests.cmmlink.oval_part import oval_points
@@ -67,6 +71,27 @@ def test_no_files_are_written_where_nothing_was_measured(nominal: Path) -> None:
     out = nominal.parent / "out"
     assert inspect_rows(nominal, POINTS / 25.4, "--out", out).code == 2
     assert not out.exists() or not list(out.rglob("*.*"))
+
+
+def test_what_was_not_measured_is_on_record_with_its_reason_and_without_a_verdict(nominal: Path, tmp_path: Path) -> None:
+    records = ("--records", tmp_path / "records")
+    message = inspect_rows(nominal, POINTS / 25.4, *records).json()["error"]["message"]
+    (entry,) = cmmlink("runs", *records, "--json").json()["runs"]
+    assert (entry["state"], entry["received"], entry["verdict"]) == ("complete", len(POINTS), None)
+    assert "NOT MEASURED" in cmmlink("runs", *records).out
+    shown = cmmlink("show", "last", *records, "--json").json()
+    assert (shown["verdict"], shown["result"], shown["recorded"]["points"]) == (None, None, len(POINTS))
+    assert message.endswith(shown["message"])
+    assert "NOT MEASURED" in cmmlink("show", "last", *records).out
+    past = PastRuns(tmp_path / "records", lambda _: None, time.monotonic, lambda: datetime.now().astimezone())
+    (row,) = past.runs()
+    assert (row.word, row.shape, row.counted, row.verdict) == ("NOT MEASURED", "none", False, None)
+    opened = past.open_run("last")
+    assert reasons_of(opened.ended, None) == [shown["message"]]
+    cmmlink("export", "last", *records, "--out", tmp_path / "out")
+    assert not {"result.json", "deviations.csv"} & {path.name for path in (tmp_path / "out").iterdir()}
+    again = cmmlink("replay", "last", *records, "--json")
+    assert (again.code, again.json()["identical"], again.json()["registration"]) == (2, True, None)
 
 
 def test_notes_stand_in_the_summary_the_json_and_the_file(nominal: Path) -> None:

@@ -68,6 +68,7 @@ def test_runs_lists_the_run_with_the_promised_keys(station: Station) -> None:
     assert entry == {"part": "blade", "serial_number": "0012", "state": "complete", "received": 600, "verdict": "conform"}
     words = cmmlink("runs", "--records", station.records).out
     assert "complete" in words
+    assert "  CONFORM  " in words
     assert "blade 0012" in words
 
 
@@ -85,6 +86,7 @@ def test_show_tells_what_the_run_rests_on(station: Station) -> None:
     assert found["recorded"]["points"] == 600
     assert found["recorded"]["events"] == {"ScanOpened": 1, "ScanClosed": 1}
     words = cmmlink("show", found["run"], "--records", station.records).out
+    assert words.startswith("CONFORM   blade 0012\n")
     assert "conform" in words
     assert "lower_mm: -0.05" in words
 

@@ -54,7 +54,7 @@ def test_run_that_ends_badly_raises_an_alarm(alarms: Alarms) -> None:
     alarms(RunFinished("interrupted", None, Counts(), "COM3 is gone"))
     alarms(RunFinished("complete", None, Counts(), "the points do not fit"))
     assert [(alarm.what, alarm.detail) for alarm in alarms.newest_first()] == [
-        ("No part found", "the points do not fit"),
+        ("Not measured", "the points do not fit"),
         ("Device failed", "COM3 is gone"),
     ]
 

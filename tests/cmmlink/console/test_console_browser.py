@@ -160,8 +160,9 @@ def test_device_that_fails_ends_the_run_as_not_proven(bench: Bench, keep: Keep) 
     bench.device.source.put(
         opened(2000), *batches(measured(bench.profile, 2000, seed=1), 50)[:30], LinkError("COM3 does not answer any more")
     )
-    expect(page.locator("#verdict-word")).to_have_text(re.compile(r"CUT SHORT AT 7\d %"))
-    expect(page.locator("#verdict-why")).to_have_text("no verdict: the scan was cut short; none out until then")
+    expect(page.locator("#verdict-word")).to_have_text(re.compile(r"INTERRUPTED AT 7\d %"))
+    expect(page.locator("#verdict-why")).to_have_text("no verdict: the scan was interrupted; none out until then")
+    expect(page.locator("#reasons li").first).to_have_text("COM3 does not answer any more")
     expect(page.locator("#alarm-text")).to_have_text("Device failed: COM3 does not answer any more")
     expect(page.locator("#received")).to_have_text("1,500")
     keep(page, "device-failed")
@@ -184,9 +185,9 @@ def test_no_part_found_is_said(bench: Bench, keep: Keep) -> None:
     rng = np.random.default_rng(5)
     noise = np.column_stack([rng.uniform(-300, 300, (600, 2)), np.zeros(600)])
     bench.device.source.put(opened(600), *batches(noise, 50), CLOSED)
-    expect(page.locator("#verdict-why")).to_have_text("no part found")
+    expect(page.locator("#verdict-why")).to_contain_text("the points do not fit the nominal")
     expect(page.locator("#verdict-word")).to_have_text("NOT MEASURED")
-    expect(page.locator("#alarm-text")).to_contain_text("No part found: the points do not fit the nominal")
+    expect(page.locator("#alarm-text")).to_contain_text("Not measured: the points do not fit the nominal")
     keep(page, "no-part-found")
 
 
@@ -202,12 +203,19 @@ def test_full_disk_stops_the_run_and_says_so(make_bench: MakeBench, tmp_path: Pa
     monkeypatch.setattr(Store, "append", append_until_full)
     bench = make_bench(records=PastRuns(tmp_path / "records", lambda _: None, monotonic, lambda: datetime.now().astimezone()))
     page = bench.started()
-    bench.device.source.put(opened(2000), *batches(measured(bench.profile, 2000, seed=1), 50), CLOSED)
-    expect(page.locator("#alarm-text")).to_have_text(re.compile("Record not kept: .*no space left on the device"))
-    # the store may fail before or after the first points are judged
-    expect(page.locator("#verdict-word")).to_have_text(re.compile("NOT PROVEN|NOT MEASURED"))
+    points = batches(measured(bench.profile, 2000, seed=1), 50)
+    bench.device.source.put(opened(2000), *points[:10])
+    expect(page.locator("#received")).to_have_text("500")
+    bench.device.source.put(*points[10:22])  # and now the device pauses: no further event tells the run of the disk
+    expect(page.locator("#alarm-text")).to_have_text(re.compile("Record not kept: .*no space left on the device"), timeout=2000)
+    expect(page.locator("#verdict-word")).to_have_text(re.compile(r"INTERRUPTED AT [45]\d %"))
+    expect(page.locator("#verdict-why")).to_contain_text("Record not kept: the record of this run cannot be kept, so it has no result")
     expect(page.locator("#lamp-faults")).to_contain_text("FAULT")
+    assert number(page, "received") == number(page, "judged") + number(page, "rejected") == 1100
+    assert bench.station.wait(5.0)
     keep(page, "disk-full")
+    page.keyboard.press("3")
+    expect(page.locator("#runs tbody tr")).to_have_text([re.compile("^INTERRUPTED.*interrupted")])
 
 
 def test_invalid_plan_is_shown_with_its_line(make_bench: MakeBench, keep: Keep) -> None:

@@ -12,9 +12,10 @@ import pytest
 from cmmlink.console.ct_import import CtImport, Section
 from cmmlink.console.refused import Refused
 from cmmlink.console.station import Station
+from cmmlink.endings import Ended
 from cmmlink.events import Counts, RunStarted
 from cmmlink.result_json import result_json
-from cmmlink.run_view import Ended, RunContext
+from cmmlink.run_view import RunContext
 from inspection import NominalProfile, NurbsCurve, ToleranceZone, discretize
 
 from .played import Device, setup_of

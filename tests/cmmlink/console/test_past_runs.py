@@ -1,13 +1,15 @@
 """The runs on record as the console asks for them."""
 
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
 from cmmlink.console.past_runs import PastRuns
-from cmmlink.errors import RunError
+from cmmlink.errors import RunError, StoreError
 from cmmlink.events import RunFinished
+from cmmlink.record import Draft, Record, Store
 from cmmlink.words import local_words
 from tests.cmmlink.recorded import Script, no_decoder, record, scan_arrivals, today
 
@@ -33,13 +35,33 @@ def test_a_run_that_is_being_recorded_is_listed_as_running_and_later_as_what_it_
     outcome, _ = record(past.folder, Script(*scan_arrivals()), before=[look])
     row, opened = during[0]
     assert (row.state, row.verdict, row.worst_mm) == ("running", None, None)
-    assert (opened.ended.ending, opened.ended.rows) == ("interrupted", None)
+    assert (opened.ended.ending, opened.ended.rows) == ("running", None)
     assert opened.ended.result["verdict"] == "uncertain"
     after = past.runs()[0]
     assert (after.run, after.state, after.received) == (row.run, "complete", outcome.counts.received)
     assert outcome.result is not None
     assert after.verdict == outcome.result.verdict.word
     assert past.open_run("last").ended.ending == "complete"
+
+
+def test_a_run_whose_end_a_full_disk_does_not_take_is_interrupted_and_never_running(
+    past: PastRuns, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    append = Store.append
+
+    def append_until_the_end(store: Store, drafts: Sequence[Draft]) -> list[Record]:
+        if any(draft.kind in ("result", "end") for draft in drafts):
+            raise StoreError("no space left on the device")
+        return append(store, drafts)
+
+    monkeypatch.setattr(Store, "append", append_until_the_end)
+    with pytest.raises(StoreError, match="600 points are safe"):
+        record(past.folder, Script(*scan_arrivals(600)))
+    (row,) = past.runs()
+    assert (row.state, row.word, row.counted, row.received) == ("interrupted", "INTERRUPTED", False, 612)
+    assert past.open_run("last").ended.ending == "interrupted"
+    monkeypatch.undo()
+    assert past.runs()[0].state == "interrupted"  # and now its end is written
 
 
 def test_runs_are_listed_newest_first_with_their_own_limits(past: PastRuns) -> None:
