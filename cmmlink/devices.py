@@ -44,7 +44,7 @@ def source_of(plan: Plan) -> ScanSource:
     """The source of a plan's device; a file of points is read here. Raises PlanError or PointFileError."""
     device = plan.device
     if isinstance(device, FileDevice):
-        return PointFileSource(device.file, device.scale, unit=device.unit, columns=device.columns)
+        return PointFileSource(device.file, device.scale, unit=device.unit, columns=device.columns, invalid=device.invalid)
     try:
         return _source_with_axis(device)
     except ValueError as error:

@@ -37,15 +37,18 @@ def name_place(plan_file: Path, key: str) -> Iterator[None]:
 def profile_of(plan: Plan) -> NominalProfile:
     """The nominal that a plan names, discretised as it says."""
     nominal = plan.nominal
-    file = load_nominal(nominal.file, nominal.mm_per_unit, nominal.closed)
-    return discretize_file(file, nominal.file, nominal, plan.discretisation)
+    return discretize_file(load_from(nominal, nominal.file), nominal.file, nominal, plan.discretisation)
+
+
+def load_from(nominal: Nominal, path: Path) -> NominalFile:
+    """The nominal in the file `path`, read as a plan says."""
+    return load_nominal(path, nominal.scale, nominal.closed, nominal.unit)
 
 
 def notes_on_nominal(plan: Plan) -> tuple[str, ...]:
     """What was assumed or mended when the nominal of a plan was read, each with the name of its file."""
     nominal = plan.nominal
-    unit = (f"read in {nominal.unit}, as asked",) if nominal.unit else ()
-    return tuple(f"{nominal.file.name}: {note}" for note in (*unit, *load_nominal(nominal.file, nominal.mm_per_unit, nominal.closed).notes))
+    return tuple(f"{nominal.file.name}: {note}" for note in load_from(nominal, nominal.file).notes)
 
 
 def discretize_file(file: NominalFile, path: Path, nominal: Nominal, finely: Discretisation) -> NominalProfile:

@@ -150,6 +150,7 @@ class Replayed(Inspected):
     identical: bool | None = Field(description="whether the result is the recorded one to the last bit; null where none was recorded")
     changed: list[Change] = Field(description="the settings and software that are not those of the recorded run")
     differs: list[Change] = Field(description="what of the result is not as recorded")
+    notes: list[str] = Field(description="what was assumed about the nominal and the points when they were recorded, and their density")
 
 
 class SectionInspected(Inspected):

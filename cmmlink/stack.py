@@ -18,8 +18,7 @@ import numpy as np
 from cmmlink.buffer import CAPACITY_POINTS
 from cmmlink.errors import PlanError
 from cmmlink.events import Counts
-from cmmlink.from_plan import discretize_file, run_started, section_inspection_of
-from cmmlink.nominal_files import load_nominal
+from cmmlink.from_plan import discretize_file, load_from, run_started, section_inspection_of
 from cmmlink.outline import Outline, outline_of
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan import CtPlan, Discretisation
@@ -155,7 +154,8 @@ def inspect_stack(
         heights = _heights(plan, mesh)
         _check_own_nominals(plan, heights)
         on_start(len(heights))
-        notes = [*mesh.warnings, *profiles.notes]
+        read_in = [f"{plan.mesh.file.name}: read in {plan.mesh.unit}, as asked"] if plan.mesh.unit else []
+        notes = [*read_in, *mesh.warnings, *profiles.notes]
         sections = []
         for cut in _slices(plan, mesh, heights, open3d, notes):
             sections.append(_inspect(plan, cut, profiles, clock, stop))
@@ -184,7 +184,7 @@ class _Open3D:
 
 
 def _read(plan: CtPlan, open3d: Callable[[], Open3DProcess]) -> SurfaceMesh:
-    path, scale = plan.mesh.file, plan.mesh.scale
+    path, scale = plan.mesh.file, plan.mesh.mm_per_unit
     suffix = path.suffix.lower()
     if suffix == ".stl":
         return read_stl(path, scale)
@@ -241,7 +241,7 @@ class _Profiles:
 
     def _load(self, path: Path) -> None:
         nominal = self._plan.nominal
-        file = load_nominal(path, nominal.mm_per_unit, nominal.closed)
+        file = load_from(nominal, path)
         self.notes += [f"{path.name}: {note}" for note in file.notes]
         self._profiles[path] = discretize_file(file, path, nominal, Discretisation())
 

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial import ConvexHull, KDTree, QhullError
 
 from inspection.coarse import FEWEST_POINTS
 from inspection.deviations import deviations
@@ -30,6 +30,10 @@ _FAR_SIZES = 2.0  # of the nominal's size from the middle of the points: no poin
 _FAR_SPREADS = 4.0  # and so many times the distance within which nine of ten points lie
 _FEW = 0.1  # of the points: more than these are not a few
 _NAMED_ROWS = 5
+_MARK_SIZES, _MARK_STEPS = 0.03, 5.0  # of the nominal's size, and of the steps between points: nothing measured lies so alone
+_MOST_MARKS = 5  # different values: a device has one or two
+_MOST_OF_ALL = 0.9
+_TYPICAL = 1000  # points that show how near to each other they lie
 _PLANE_LIMIT = 0.01  # of the nominal's size: heights that differ by less leave one section
 _THIN = 0.1  # of the heights' range: points nearer to a plane lie in it
 _LEVEL_MM = 0.5  # between two heights that are two sections
@@ -66,7 +70,7 @@ def check_points(rows: ScanRows, terms: Terms) -> Rows:
     if len(usable) < FEWEST_POINTS:
         return usable[:0]
     space = np.column_stack([rows.points[usable], rows.height[usable]])
-    far = _far_points(space, terms.nominal)
+    far = _far_points(space, terms.nominal) | _marks(space, terms.nominal)
     if far.any() and not terms.reject_outliers:
         raise NotMeasured(_words_of_far(space, usable, far))
     _check_plane(space[~far], rows.plane, terms)
@@ -85,7 +89,7 @@ def check_fit(points_mm: Array, registration: Registration, terms: Terms) -> Non
     if direct is None:
         return
     size = terms.nominal.size_mm
-    if found.rms_mm > MISFIT * size and direct.rms_mm < _FITS_INSTEAD * found.rms_mm:
+    if terms.known_pose is not None and found.rms_mm > MISFIT * size and direct.rms_mm < _FITS_INSTEAD * found.rms_mm:
         raise NotMeasured(_words_of_pose(found.rms_mm, direct, registration))
     _check_mirrored(kept, direct, terms)
     if max(direct.rms_mm, found.rms_mm) > MISFIT * size:
@@ -131,6 +135,30 @@ def _far_points(space_mm: Array, nominal: NominalProfile) -> NDArray[np.bool_]:
     return far if np.count_nonzero(far) <= _FEW * len(far) else np.zeros(len(far), dtype=bool)
 
 
+def _marks(space_mm: Array, nominal: NominalProfile) -> NDArray[np.bool_]:
+    """Which points (m, 3) are marks for no point: at zero, or several at the very same place, and apart from all others.
+
+    A measured point repeats its digits at most where others lie beside it. The order of the points says nothing here.
+    """
+    _, places, counts = np.unique(space_mm[:, 0], return_inverse=True, return_counts=True)
+    seen = np.flatnonzero((counts[places] > 1) | ~space_mm[:, :2].any(axis=1))
+    marks = np.zeros(len(space_mm), dtype=bool)
+    if not len(seen):
+        return marks
+    same, places, counts = np.unique(space_mm[seen], axis=0, return_inverse=True, return_counts=True)
+    candidates = same[(counts > 1) | ~same[:, :2].any(axis=1)]
+    others = np.unique(space_mm, axis=0)
+    if not len(candidates) or len(others) < FEWEST_POINTS:
+        return marks
+    tree = KDTree(others)
+    away = np.asarray(tree.query(candidates, k=2)[0])[:, 1]
+    typical = float(np.quantile(np.asarray(tree.query(others[:: max(1, len(others) // _TYPICAL)], k=2)[0])[:, 1], 0.95))
+    apart = candidates[away > max(_MARK_SIZES * nominal.size_mm, _MARK_STEPS * typical)]
+    for mark in apart[:_MOST_MARKS]:
+        marks |= (space_mm == mark).all(axis=1)
+    return marks if np.count_nonzero(marks) <= _MOST_OF_ALL * len(marks) else np.zeros(len(marks), dtype=bool)
+
+
 def _words_of_far(space_mm: Array, usable: Rows, far: NDArray[np.bool_]) -> str:
     which = np.flatnonzero(far)
     rows = ", ".join(str(row + 1) for row in usable[which[:_NAMED_ROWS]]) + (" ..." if len(which) > _NAMED_ROWS else "")
@@ -138,7 +166,8 @@ def _words_of_far(space_mm: Array, usable: Rows, far: NDArray[np.bool_]) -> str:
     few = f"{len(which)} of {len(far)} points lie" if len(which) > 1 else f"1 of {len(far)} points lies"
     return (
         f"{few} far from all others (row{'s' if len(which) > 1 else ''} {rows}; the first at x {x:g}, y {y:g} mm): are these samples "
-        "that mean no point? Give the value that marks them (invalid), or fit without them (--reject-outliers)"
+        "that mean no point? Give the value that marks them (invalid: --invalid V for a file, in the register map for a device), or fit "
+        "without them (--reject-outliers)"
     )
 
 

@@ -45,6 +45,9 @@ Unit = Annotated[UnitName | None, typer.Option("--unit", help="Unit of the point
 NominalUnit = Annotated[UnitName | None, typer.Option("--nominal-unit", help="Unit of the nominal file, in place of --scale.")]
 PlaneName = Literal["xy", "xz", "yz"]
 Plane = Annotated[PlaneName, typer.Option("--plane", help="The plane that the points of the section lie in.")]
+Invalid = Annotated[
+    list[float] | None, typer.Option("--invalid", metavar="V", help="A coordinate that means no point, like -9999; as often as wanted.")
+]
 ColumnsText = Annotated[str | None, typer.Option("--columns", metavar="x=2,y=3", help="Columns of x, y and z in the file, from 1.")]
 Headless = Annotated[bool, typer.Option("--headless", help="No page, no live table.")]
 NoBrowser = Annotated[bool, typer.Option("--no-browser", help="Serve the page and print its address, but open no browser.")]

@@ -64,6 +64,8 @@ def show(name: RunName, records: Records = None, as_json: Json = False) -> int:
         if found[key] and (key != "verdict" or found["state"] == "complete"):
             value = _local(found[key]) if key in ("started", "ended") else found[key]
             typer.echo(f"{key:<14} {value}{' (simulated)' if key == 'device' and found['simulated'] else ''}")
+    for note in found.get("notes", ()):
+        typer.echo(f"note: {note}")
     for key in ("software", "recorded"):
         typer.echo(f"{key:<14} {', '.join(f'{name} {value}' for name, value in found[key].items() if value)}")
     for event in found["events"]:
@@ -104,6 +106,7 @@ def replay(
         again = replay_run(store, recorded, decoder_of, tolerance=tolerance, method=method)
     document = again.result_json | {"replay_of": recorded.run, "chain_sha256": recorded.chain_sha256, "identical": again.identical}
     document |= {"ending": again.outcome.ending, "measured_at": utc_words(datetime.fromisoformat(recorded.header["started"]))}
+    document |= {"notes": list(again.notes)}
     document |= {"changed": [asdict(change) for change in again.changed], "differs": [asdict(change) for change in again.differs]}
     if out is not None:
         write_results(out, document, again.outcome.result, again.profile, f"{recorded.header['part']}, run {recorded.run} replayed")
@@ -118,7 +121,7 @@ def replay(
 
 def _print_replay(again: Replay, run_id: str) -> None:
     heading = f"run {run_id}, evaluated again"
-    print_summary(terminal(), again.outcome.result, again.outcome.counts, heading, again.outcome.ending)
+    print_summary(terminal(), again.outcome.result, again.outcome.counts, heading, again.outcome.ending, again.notes)
     for title, changes in (("changed", again.changed), ("differs", again.differs)):
         for change in changes:
             typer.echo(f"{title}: {change.key} {change.recorded} -> {change.replayed}")

@@ -15,24 +15,25 @@ from cmmlink.commands.options import Closed, Json, PlanFile, Records, records_fo
 from cmmlink.commands.output import now, print_json
 from cmmlink.commands.support_bundle import pack_bundle
 from cmmlink.demo import plan_file as demo_plan_file
-from cmmlink.devices import serial_ports, source_of, words_of
+from cmmlink.devices import connect, serial_ports, words_of
 from cmmlink.errors import PlanError
-from cmmlink.from_plan import check_plan, name_place, profile_of
+from cmmlink.from_plan import check_plan, name_place, notes_on_nominal, profile_of
 from cmmlink.nominal_files import NominalFile, load_nominal, material_side
 from cmmlink.plan import load_plan
 from cmmlink.version import __version__
-from drivers import LinkError
+from drivers import LinkError, UnitName
 from inspection import rehearse
 
 
 def nominal(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="The nominal profile: UIUC dat, points, or nurbs yaml.")],
     scale: Annotated[float, typer.Option(metavar="S", help="Units of the file to mm.")] = 1.0,
+    unit: Annotated[UnitName | None, typer.Option(help="Unit of the file, in place of --scale, above what the file states.")] = None,
     closed: Closed = None,
     as_json: Json = False,
 ) -> int:
     """Show what was understood of a nominal file."""
-    understood = load_nominal(file, scale, closed)
+    understood = load_nominal(file, scale, closed, unit)
     if as_json:
         print_json(_nominal_json(understood))
         return 0
@@ -65,11 +66,13 @@ def check(plan_file: PlanFile) -> int:
     """Check a plan and the files that it names. The device is not contacted."""
     plan = load_plan(plan_file)
     profile = check_plan(plan, plan_file)
-    with name_place(plan_file, "device"):
-        source_of(plan)
+    with name_place(plan_file, "device"), connect(plan) as device:
+        notes = (*notes_on_nominal(plan), *device.notes)
     zone = plan.tolerance.zone
     typer.echo(f"{plan_file} can be run: {plan.part.name}, zone {zone.lower_mm:+g} .. {zone.upper_mm:+g} mm, {words_of(plan.device)}")
     typer.echo(f"nominal {profile.length_mm:.3f} mm long, {len(profile)} samples, material on the {profile.material}")
+    for note in notes:
+        typer.echo(f"  note: {note}")
     return 0
 
 

@@ -21,6 +21,7 @@ from cmmlink.commands.options import (
     GapMax,
     Json,
     NominalScale,
+    NominalUnit,
     Out,
     RejectOutliers,
     Rule,
@@ -34,13 +35,16 @@ from cmmlink.plan import CtPlan, CutterName, NominalAt, load_ct_plan
 from cmmlink.report import STYLES, prepare, write_stack
 from cmmlink.stack import SectionOutcome, StackOutcome, inspect_stack
 from cmmlink.words import VERDICT_WORDS
+from drivers import UnitName
 from inspection import FitName, Material, Method
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _MOST_WARNINGS = 20
 _OPTION_OF = {
     "mesh.scale": "--mesh-scale",
+    "mesh.unit": "--mesh-unit",
     "nominal.scale": "--scale",
+    "nominal.unit": "--nominal-unit",
     "tolerance.uncertainty_mm": "--uncertainty",
     "tolerance": "--tolerance",
     "sections.normal": "--normal",
@@ -97,7 +101,9 @@ def ct(
     fit: Annotated[FitName, typer.Option(help="How each section comes onto its nominal.")] = "best-fit",
     uncertainty: Uncertainty = 0.0,
     scale: NominalScale = 1.0,
+    nominal_unit: NominalUnit = None,
     mesh_scale: Annotated[float, typer.Option(metavar="S", help="Units of the surface file to mm.")] = 1.0,
+    mesh_unit: Annotated[UnitName | None, typer.Option(help="Unit of the surface file, in place of --mesh-scale.")] = None,
     closed: Closed = None,
     material: Annotated[Material | None, typer.Option(help="Side of the material, seen along the nominal.")] = None,
     coverage_min: Annotated[float, typer.Option(help="Share of a nominal to be there before conform is proven.")] = 0.95,
@@ -124,8 +130,8 @@ def ct(
         raise PlanError(f"{mesh}: a surface needs --nominal FILE and --tolerance LO HI")
     settings: dict[str, object] = {
         "part": {"name": mesh.stem},
-        "mesh": {"file": mesh, "scale": mesh_scale},
-        "nominal": {"file": nominal, "scale": scale, "closed": closed, "material": material},
+        "mesh": {"file": mesh, "scale": mesh_scale, "unit": mesh_unit},
+        "nominal": {"file": nominal, "scale": scale, "unit": nominal_unit, "closed": closed, "material": material},
         "tolerance": {"lower_mm": tolerance[0], "upper_mm": tolerance[1], "uncertainty_mm": uncertainty},
         "sections": {
             "normal": normal,
@@ -231,10 +237,12 @@ def _print_stack(console: Console, stack: StackOutcome) -> None:
     for section in stack.sections:
         console.print(_line(section))
     told = [f"height {section.slice.asked_mm:g} mm: {text}" for section in stack.sections for text in section.warnings]
-    for text in [*told[:_MOST_WARNINGS], *stack.notes]:
+    for text in told[:_MOST_WARNINGS]:
         console.print(f"  {text}", style="yellow", markup=False)
     if len(told) > _MOST_WARNINGS:
         console.print(f"  and {len(told) - _MOST_WARNINGS} more warnings, all of them with --json", style="yellow")
+    for note in stack.notes:
+        console.print(f"  note: {note}", markup=False)
 
 
 def _line(section: SectionOutcome) -> str:

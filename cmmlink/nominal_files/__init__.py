@@ -4,7 +4,8 @@ A format is a module of this package with two names, found by looking through th
 file and nothing else:
 
     SUFFIXES : tuple[str, ...]                                                    lower case, with the dot
-    def read(text: str, scale: float, closed: bool | None) -> NominalFile         raises NominalError, naming the line
+    def read(text: str, scale: float, closed: bool | None, unit: UnitName | None) -> NominalFile
+                                                                                  raises NominalError, naming the line
 """
 
 import importlib
@@ -18,7 +19,7 @@ import numpy as np
 
 from cmmlink.errors import YamlError
 from cmmlink.nominal_files.curve_words import notes_of, refuse_crossings
-from drivers import PointFileError, read_text
+from drivers import PointFileError, UnitName, mm_per, read_text
 from inspection import NominalError, NurbsCurve, check_curve
 
 _ALMOST_CLOSED = 0.05  # of the length: the widest gap, as of a blunt trailing edge, at which a curve still has an inside
@@ -43,14 +44,15 @@ class NominalFormat(Protocol):
 
     SUFFIXES: tuple[str, ...]
 
-    def read(self, text: str, scale: float, closed: bool | None) -> NominalFile:
-        """Understand the text of a file."""
+    def read(self, text: str, scale: float, closed: bool | None, unit: UnitName | None) -> NominalFile:
+        """Understand the text of a file; `scale` is that of the `unit`, where one was given in words."""
 
 
-def load_nominal(path: Path, scale: float = 1.0, closed: bool | None = None) -> NominalFile:
+def load_nominal(path: Path, scale: float = 1.0, closed: bool | None = None, unit: UnitName | None = None) -> NominalFile:
     """Read a nominal profile; the suffix of the file says its format.
 
     scale  : turns the file's unit into mm (the chord, for airfoils in chord units)
+    unit   : the same in words, above whatever the file states; not beside a scale
     closed : True joins the end to the beginning, False keeps the curve open, None follows the file, which closes a blunt edge,
              and asks about a gap that may be either
 
@@ -60,6 +62,8 @@ def load_nominal(path: Path, scale: float = 1.0, closed: bool | None = None) -> 
     """
     if not (np.isfinite(scale) and scale > 0):
         raise NominalError(f"the scale must be a positive number, not {scale:g}")
+    if unit is not None and scale != 1.0:
+        raise NominalError(f"unit {unit} and scale {scale:g} are both given; expected one of them")
     reader = _format_of(path)
     try:
         text = read_text(path)
@@ -67,7 +71,8 @@ def load_nominal(path: Path, scale: float = 1.0, closed: bool | None = None) -> 
         raise NominalError(str(error)) from None
     try:
         with np.errstate(over="raise", divide="raise", invalid="raise"):
-            return _checked(reader.read(text, scale, closed))
+            file = _checked(reader.read(text, mm_per(unit) if unit else scale, closed, unit))
+        return replace(file, notes=(f"read in {unit}, as asked", *file.notes)) if unit else file
     except (PointFileError, YamlError, NominalError) as error:
         raise NominalError(f"{path}: {error}") from None
     except FloatingPointError:

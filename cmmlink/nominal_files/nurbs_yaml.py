@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from cmmlink.nominal_files import NominalFile
 from cmmlink.plan import read_model
+from drivers import UnitName
 from inspection import NominalError, NurbsCurve
 
 SUFFIXES = (".yaml", ".yml")
@@ -37,7 +38,7 @@ class _Curve(BaseModel):
     closed: bool | None = None
 
 
-def read(text: str, scale: float, closed: bool | None) -> NominalFile:
+def read(text: str, scale: float, closed: bool | None, unit: UnitName | None) -> NominalFile:
     """Take the curve as it stands. `closed` None: as the file says, else whether it ends where it begins."""
     given = read_model(text, _Curve)
     points = np.array(given.control_points_mm) * scale

@@ -4,7 +4,7 @@ import numpy as np
 
 from cmmlink.nominal_files import NominalFile
 from cmmlink.nominal_files.through_points import through_points
-from drivers import parse_columns, points_of
+from drivers import UnitName, parse_columns, points_of
 from inspection import NominalError
 
 SUFFIXES = (".asc", ".csv", ".txt", ".xyz")
@@ -12,10 +12,10 @@ SUFFIXES = (".asc", ".csv", ".txt", ".xyz")
 _FLAT = 1e-6  # of the size: z may vary by less
 
 
-def read(text: str, scale: float, closed: bool | None) -> NominalFile:
+def read(text: str, scale: float, closed: bool | None, unit: UnitName | None) -> NominalFile:
     """Interpolate the points, in the order of the file."""
     columns = parse_columns(text)
-    points, notes = points_of(columns, scale)
+    points, notes = points_of(columns, scale, unit)
     size, height = float(np.ptp(points[:, :2], axis=0).max()), points[:, 2]
     if float(np.ptp(height)) > _FLAT * size:
         line = columns.line_numbers[int(np.argmax(np.abs(height - height[0]) > _FLAT * size))]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from cmmlink.nominal_files import NominalFile
 from cmmlink.nominal_files.dat_lines import DatLines, leave_out_words
 from cmmlink.nominal_files.through_points import through_points
-from drivers import convert_to_mm, parse_columns
+from drivers import UnitName, convert_to_mm, parse_columns
 from inspection import NominalError
 
 SUFFIXES = (".dat",)
@@ -32,7 +32,7 @@ _FEWEST_POINTS = 4
 _JUMP = 0.8  # of the chord: a step from edge to edge, where one side ends and the next begins
 
 
-def read(text: str, scale: float, closed: bool | None) -> NominalFile:
+def read(text: str, scale: float, closed: bool | None, unit: UnitName | None) -> NominalFile:
     """Interpolate the one loop, or the two sides joined at the leading edge."""
     given = leave_out_words(text)
     columns, notes = parse_columns("\n".join(given.lines)), list(given.notes)
@@ -45,7 +45,7 @@ def read(text: str, scale: float, closed: bool | None) -> NominalFile:
     blocks = _blocks(table, lines, given.lines, counts)
     kind, (points, order) = _loop(blocks, notes)
     points_mm = convert_to_mm(points, order, scale)
-    if scale == 1.0 and np.ptp(points_mm, axis=0).max() <= _CHORD_UNITS:
+    if scale == 1.0 and unit is None and np.ptp(points_mm, axis=0).max() <= _CHORD_UNITS:
         notes.append("no scale given: a chord of 1 is taken as 1 mm")
     return through_points(points_mm, order, closed, kind, (*columns.notes, *notes))
 

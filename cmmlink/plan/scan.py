@@ -16,7 +16,7 @@ from cmmlink.buffer import CAPACITY_POINTS
 from cmmlink.errors import PlanError, YamlError
 from cmmlink.plan.yaml_model import Positive, Settings, line_of, read_model
 from cmmlink.result_folder import check_placeholders
-from drivers import AxisName, PointFileError, UnitName, device_address, mm_per, read_text, shipped_maps
+from drivers import AxisName, PointFileError, UnitName, device_address, read_text, shipped_maps
 from inspection import FitName, Material, Method, RuleName, ToleranceZone, WeightName
 
 Vector = tuple[float, float, float]
@@ -79,11 +79,6 @@ class Nominal(Settings):
     material: Material | None = Field(
         default=None, description="the side of the material, seen along the direction of travel; null: inside a closed profile"
     )
-
-    @property
-    def mm_per_unit(self) -> float:
-        """How many mm a unit of the file is."""
-        return mm_per(self.unit) if self.unit else self.scale
 
 
 class Tolerance(Settings):
@@ -193,6 +188,9 @@ class FileDevice(Settings):
     columns: dict[AxisName, Annotated[int, Field(ge=1)]] | None = Field(
         default=None,
         description="the columns of x, y and z, counted from 1, like {x: 2, y: 3}; null: as the file names them, or the first",
+    )
+    invalid: tuple[float, ...] = Field(
+        default=(), description="values of a coordinate that mean no point, as they stand in the file, like [-9999]; such rows are rejected"
     )
 
 

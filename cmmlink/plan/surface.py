@@ -10,9 +10,9 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from cmmlink.errors import PlanError, YamlError
-from cmmlink.plan.scan import OUT, Deciding, Nominal, Part, Registration, ResultFolder, Tolerance
+from cmmlink.plan.scan import OUT, Deciding, Nominal, Part, Registration, ResultFolder, Tolerance, Unit
 from cmmlink.plan.yaml_model import Positive, Settings, read_model
-from drivers import PointFileError, read_text
+from drivers import PointFileError, mm_per, read_text
 
 CutterName = Literal["auto", "open3d", "numpy"]
 
@@ -22,6 +22,12 @@ class Mesh(Settings):
 
     file: Path = Field(description="the surface file: STL, PLY or OBJ")
     scale: Positive = Field(default=1.0, description="how many mm a unit of the file is")
+    unit: Unit = Field(default=None, description="the unit of the file in words, in place of scale: mm, um or inch; null: mm")
+
+    @property
+    def mm_per_unit(self) -> float:
+        """How many mm a unit of the file is."""
+        return mm_per(self.unit) if self.unit else self.scale
 
 
 class NominalAt(Settings):

@@ -23,7 +23,7 @@ from cmmlink.record.bodies import PlacedArrival
 from cmmlink.record.reader import RecordedRun, arrivals_of, points_of, reads_of
 from cmmlink.record.recorder import result_sha256, software
 from cmmlink.record.store import Store
-from cmmlink.result_json import result_json
+from cmmlink.result_json import density_notes, result_json
 from drivers import Arrival, Capture, Decoder, LinkDown, LinkUp, PointBatch
 from inspection import NominalProfile
 
@@ -44,6 +44,7 @@ class Replay:
     changed   : settings and software that are not those of the recorded run
     differs   : values of the result that are not as recorded
     identical : to the last bit of every deviation; None where the recorded run has no result to compare with
+    notes     : what was assumed about nominal and points when they were recorded
     """
 
     outcome: RunOutcome
@@ -52,6 +53,7 @@ class Replay:
     changed: tuple[Change, ...]
     differs: tuple[Change, ...]
     identical: bool | None
+    notes: tuple[str, ...]
 
 
 def replay_run(
@@ -88,7 +90,9 @@ def replay_run(
     if recorded.end is not None and recorded.end["result_sha256"]:
         identical = result_sha256(replayed, outcome.result) == recorded.end["result_sha256"]
     changes = (*_settings_changed(plan, changed), *_software_changed(recorded.header["software"]))
-    return Replay(outcome, profile, replayed, changes, _differences(recorded.result, replayed) if not identical else (), identical)
+    differs = _differences(recorded.result, replayed) if not identical else ()
+    notes = (*started.notes, *density_notes(outcome.result, profile.length_mm))
+    return Replay(outcome, profile, replayed, changes, differs, identical, notes)
 
 
 def recorded_plan(recorded: RecordedRun) -> Plan:

@@ -5,7 +5,7 @@ stay rows: their coordinates are NaN, so that the inspection rejects and counts 
 """
 
 import tokenize
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
@@ -60,13 +60,14 @@ class PointFileSource:
         *,
         unit: UnitName | None = None,
         columns: Mapping[AxisName, int] | None = None,
+        invalid: Collection[float] = (),
     ) -> None:
         if batch_points < 1:
             raise ValueError(f"a batch holds at least one point, not {batch_points}")
         self._name = path.name
         self._batch_points = batch_points
         self._stopped = Event()
-        self._file = read_points(path, scale, unit=unit, columns=columns)
+        self._file = read_points(path, scale, unit=unit, columns=columns, invalid=invalid)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -90,13 +91,19 @@ class PointFileSource:
 
 
 def read_points(
-    path: Path, scale: float = 1.0, *, unit: UnitName | None = None, columns: Mapping[AxisName, int] | None = None
+    path: Path,
+    scale: float = 1.0,
+    *,
+    unit: UnitName | None = None,
+    columns: Mapping[AxisName, int] | None = None,
+    invalid: Collection[float] = (),
 ) -> PointFile:
     """Read measured points (m, 3) in mm from csv, txt, asc, xyz or npy. Two columns are x and y, at z = 0.
 
     scale   : how many mm a unit of the file is
     unit    : the same in words, above whatever the file states; not beside a scale
     columns : which columns (from 1) are x, y and z, where the file itself does not tell
+    invalid : values that mean no point, as they stand in the file; a row with one of them as a coordinate has no numbers
 
     Raises PointFileError: file, line, what was found, what is expected.
     """
@@ -105,21 +112,50 @@ def read_points(
     if npy and not read_bytes(path):
         raise PointFileError(f"{path}: the file is empty")
     try:
-        return _read_npy(path, unit, scale, columns) if npy else _read_table(text, unit, scale, columns)
+        read = _Asked(scale, unit, columns, tuple(invalid))
+        return _read_npy(path, read) if npy else _read_table(text, read)
     except PointFileError as error:
         raise PointFileError(f"{path}: {error}") from None
 
 
-def _read_table(text: str, unit: UnitName | None, scale: float, columns: Mapping[AxisName, int] | None) -> PointFile:
-    table = parse_columns(text, axes_of(columns).values())
-    chosen, notes = choose_axes(table, columns)
-    points = _points_with_gaps(table.values, chosen, table.line_numbers, _mm_per_unit(table, scale, unit))
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """What is said of a file beside it."""
+
+    scale: float
+    unit: UnitName | None
+    columns: Mapping[AxisName, int] | None
+    invalid: tuple[float, ...]
+
+
+def _read_table(text: str, asked: _Asked) -> PointFile:
+    table = parse_columns(text, axes_of(asked.columns).values())
+    chosen, notes = choose_axes(table, asked.columns)
+    values, marked = _without_marks(table.values, chosen, asked.invalid)
+    points = _points_with_gaps(values, chosen, table.line_numbers, _mm_per_unit(table, asked.scale, asked.unit))
     _refuse_fewer_than_two(points)
-    return PointFile(points, (*table.notes, *notes, *_note_of_unit(table, unit), *_note_of_gaps(points)))
+    read_in = [f"read in {asked.unit}, as asked"] if asked.unit else []
+    unit = [*read_in, *_note_of_other_unit(table, asked.scale, asked.unit)]
+    return PointFile(points, (*table.notes, *notes, *unit, *marked, *_note_of_gaps(table.values, chosen)))
+
+
+def _without_marks(values: Array, chosen: Mapping[AxisName, int], invalid: Sequence[float]) -> tuple[Array, list[str]]:
+    """Values (m, c) whose rows are NaN where a chosen column holds a value that means no point, and how many rows each of them took."""
+    if not invalid:
+        return values, []
+    kept, notes = values.copy(), []
+    for value in dict.fromkeys(invalid):
+        rows = (values[:, list(chosen.values())] == value).any(axis=1)
+        kept[rows] = np.nan
+        count = count_of(int(np.count_nonzero(rows)), "row")
+        notes.append(f"{count} {'holds' if count == '1 row' else 'hold'} {value:g}, which means no point: rejected")
+    return kept, notes
 
 
 def points_of(columns: Columns, scale: float, unit: UnitName | None = None) -> tuple[Array, tuple[str, ...]]:
     """Return points (m, 3) in mm from the columns x, y and z, found by their names or else the first ones, and notes.
+
+    unit : its name, where it was given in words; it goes above what the text states, and scale is then its length
 
     Raises PointFileError when it is not clear which columns those are, or when a coordinate is no usable number.
     """
@@ -128,13 +164,13 @@ def points_of(columns: Columns, scale: float, unit: UnitName | None = None) -> t
     factor = _mm_per_unit(columns, scale, unit)
     for axis, place in chosen.items():
         points[:, "xyz".index(axis)] = convert_to_mm(columns.values[:, [place]], columns.line_numbers, factor)[:, 0]
-    return points, (*columns.notes, *notes, *_note_of_unit(columns, unit))
+    return points, (*columns.notes, *notes, *_note_of_other_unit(columns, scale, unit))
 
 
 def _mm_per_unit(table: Columns | None, scale: float, unit: UnitName | None) -> float:
     """How many mm a unit of the file is: as asked, else as the file states it. Raises PointFileError where it states another than mm."""
     if unit is not None:
-        if scale != 1.0:
+        if scale not in (1.0, MM_PER_UNIT[unit]):
             raise PointFileError(f"unit {unit} and scale {scale:g} are both given; expected one of them")
         return MM_PER_UNIT[unit]
     stated = [*units_of_names(table.names), *table.units] if table else []
@@ -151,12 +187,13 @@ def _mm_per_unit(table: Columns | None, scale: float, unit: UnitName | None) -> 
     raise PointFileError(f"{only.place} {only.word}; expected mm: give {by_name}the scale {only.mm:g}")
 
 
-def _note_of_unit(table: Columns, unit: UnitName | None) -> list[str]:
-    """Say what unit was taken where it was asked for, and where the file states another."""
-    if unit is None:
+def _note_of_other_unit(table: Columns, scale: float, unit: UnitName | None) -> list[str]:
+    """Say where the text states another unit than the one, or the scale, that was asked for."""
+    asked_mm = MM_PER_UNIT[unit] if unit else scale
+    others = [each for each in (*units_of_names(table.names), *table.units) if each.mm != asked_mm]
+    if not others or (unit is None and scale == 1.0):
         return []
-    others = [each for each in (*units_of_names(table.names), *table.units) if each.unit != unit]
-    return [f"read in {unit}, as asked" + (f", although {others[0].place} {others[0].word}" if others else "")]
+    return [f"{others[0].place} {others[0].word}: not followed, since {f'unit {unit}' if unit else f'scale {scale:g}'} was asked for"]
 
 
 def _points_with_gaps(
@@ -174,8 +211,8 @@ def _points_with_gaps(
     return points
 
 
-def _note_of_gaps(points: Array) -> list[str]:
-    missing = int(np.count_nonzero(np.isnan(points).any(axis=1)))
+def _note_of_gaps(values: Array, chosen: Mapping[AxisName, int]) -> list[str]:
+    missing = int(np.count_nonzero(~np.isfinite(values[:, list(chosen.values())]).all(axis=1)))
     return [f"{count_of(missing, 'row')} without numbers: rejected"] if missing else []
 
 
@@ -199,7 +236,7 @@ def _refuse_fewer_than_two(points: Sequence[object] | Array) -> None:
         raise PointFileError(f"{count_of(len(points), 'point')}; expected at least two")
 
 
-def _read_npy(path: Path, unit: UnitName | None, scale: float, columns: Mapping[AxisName, int] | None) -> PointFile:
+def _read_npy(path: Path, asked: _Asked) -> PointFile:
     """Read an array (m, 2) or (m, 3) from an npy file, or a wider one where columns are given.
 
     The file is mapped first, so that a header that promises too much costs no memory.
@@ -208,6 +245,7 @@ def _read_npy(path: Path, unit: UnitName | None, scale: float, columns: Mapping[
         array = np.lib.format.open_memmap(path, mode="r")
     except _NPY_ERRORS:
         raise PointFileError("not a readable npy file of numbers; expected an array (m, 2) or (m, 3)") from None
+    columns = asked.columns
     flat = isinstance(array, np.ndarray) and array.ndim == 2 and array.dtype.kind in "fiu"
     if not flat or (columns is None and array.shape[1] not in (2, 3)):
         found = f"{array.dtype} array of shape {array.shape}" if isinstance(array, np.ndarray) else "an archive"
@@ -216,5 +254,7 @@ def _read_npy(path: Path, unit: UnitName | None, scale: float, columns: Mapping[
     values = np.array(array, dtype=np.float64)
     _refuse_fewer_than_two(values)
     chosen = axes_of(columns) or dict(zip(("x", "y", "z"), range(values.shape[1]), strict=False))
-    points = _points_with_gaps(values, chosen, np.arange(len(values)), _mm_per_unit(None, scale, unit), "row")
-    return PointFile(points, tuple(_note_of_gaps(points)))
+    kept, marked = _without_marks(values, chosen, asked.invalid)
+    points = _points_with_gaps(kept, chosen, np.arange(len(values)), _mm_per_unit(None, asked.scale, asked.unit), "row")
+    read_in = [f"read in {asked.unit}, as asked"] if asked.unit else []
+    return PointFile(points, (*read_in, *marked, *_note_of_gaps(values, chosen)))

@@ -170,6 +170,43 @@ def test_samples_that_mean_no_point_are_rejected_on_request(nominal: NominalProf
     assert result.verdict == Verdict.UNCERTAIN
 
 
+@pytest.mark.parametrize("rows", [[17], [17, 203], [0, 399], list(range(40, 60)), list(range(0, 400, 3))])
+def test_marks_that_lie_near_the_part_are_named_by_row_wherever_they_stand(nominal: NominalProfile, rows: list[int]) -> None:
+    """At zero, which is 30 mm inside this part and no farther from its middle than the part itself, and in any order of the points."""
+    points = scan(nominal) - ROOM - np.array([40.0, 15.0])
+    points[rows] = 0.0
+    words = "1 of 400 points lies" if len(rows) == 1 else f"{len(rows)} of 400 points lie"
+    for order in (np.arange(400), np.random.default_rng(2).permutation(400)):
+        told = refusal(points[order], nominal)
+        assert words in told
+        assert str(int(np.flatnonzero(np.isin(order, rows))[0]) + 1) in told
+        assert "--invalid V" in told
+
+
+def test_one_value_again_and_again_is_a_mark_and_other_stray_points_are_not(nominal: NominalProfile) -> None:
+    points = scan(nominal)
+    inside = points.mean(axis=0)
+    points[[17, 203]] = inside
+    assert "2 of 400 points lie far from all others (rows 18, 204; " in refusal(points, nominal)
+    points[203] += 3.0
+    assert judge(points, nominal).verdict == Verdict.NONCONFORM
+
+
+def test_points_that_repeat_are_no_marks(nominal: NominalProfile) -> None:
+    points = scan(nominal)
+    still = np.vstack([points, np.repeat(points[100:101], 300, axis=0), points[:1]])
+    assert judge(still, nominal).verdict == Verdict.CONFORM
+    few = scan(nominal, count=12)
+    assert judge(np.vstack([few, few[:3]]), nominal).rejected_by_reason == {}
+
+
+@pytest.mark.parametrize("rows", [range(0, 400, 2), range(0, 400, 3)])
+def test_a_fit_that_was_asked_for_is_not_told_to_be_asked_for(nominal: NominalProfile, rows: range) -> None:
+    points = scan(nominal)
+    points[list(rows), 0] = 5e-324
+    assert "datum" not in refusal(points, nominal)
+
+
 @pytest.mark.parametrize("radius", [0.5, 1.0, 1.5])
 def test_ball_centres_are_named(nominal: NominalProfile, radius: float) -> None:
     told = refusal(scan(nominal, radius), nominal)

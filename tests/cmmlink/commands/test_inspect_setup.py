@@ -110,3 +110,28 @@ def test_dense_places_are_reserved(nominal: Path) -> None:
     facts = inspect_rows(nominal, dwell, "--fit", "none").json()
     assert any("times as dense at station" in note for note in facts["notes"])
     assert not any("dense" in note for note in inspect_rows(nominal, POINTS, "--fit", "none").json()["notes"])
+
+
+def test_samples_that_mean_no_point_are_rejected_where_their_value_is_given(nominal: Path) -> None:
+    rows = POINTS.copy()
+    rows[[5, 30]] = -9999.0
+    assert "--invalid V" in inspect_rows(nominal, rows).json()["error"]["message"]
+    facts = inspect_rows(nominal, rows, "--invalid", -9999, "--fit", "none").json()
+    assert (facts["rejected"], facts["verdict"]) == (2, "uncertain")
+    assert "rows.csv: 2 rows hold -9999, which means no point: rejected" in facts["notes"]
+    assert {reason["kind"] for reason in facts["reasons"]} == {"rejected"}
+
+
+def test_notes_stand_in_summary_result_record_and_replay(nominal: Path, tmp_path: Path) -> None:
+    note, records = "rows.csv: read in um, as asked", ("--records", tmp_path / "records")
+    options = ("--unit", "um", "--fit", "none", "--out", tmp_path / "out")
+    facts = inspect_rows(nominal, POINTS * 1000, *options, *records).json()
+    assert note in facts["notes"]
+    assert note in json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))["notes"]
+    file = nominal.parent / "rows.csv"
+    assert f"note: {note}" in cmmlink("inspect", file, "--nominal", nominal, *TOLERANCE, *options, *records).out
+    for command in ("replay", "show"):
+        assert f"note: {note}" in cmmlink(command, "last", *records).out
+        assert note in cmmlink(command, "last", *records, "--json").json()["notes"]
+    assert cmmlink("replay", "last", *records, "--out", tmp_path / "again").code == 0
+    assert note in json.loads((tmp_path / "again" / "result.json").read_text(encoding="utf-8"))["notes"]

@@ -3,6 +3,7 @@
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.cmmlink.command import Ended, cmmlink
@@ -22,6 +23,34 @@ def test_nominal_shows_what_was_understood(nominal: Path) -> None:
 
 def test_a_scaled_nominal_is_as_much_longer(nominal: Path) -> None:
     assert cmmlink("nominal", nominal, "--scale", 25.4, "--json").json()["length_mm"] == pytest.approx(25.4 * LENGTH_MM, rel=1e-9)
+
+
+@pytest.mark.parametrize(("head", "unit", "factor"), [("# units: inch\n", "mm", 1.0), ("x_mm,y_mm\n", "inch", 25.4), ("", "um", 0.001)])
+def test_a_unit_that_is_given_goes_above_what_a_nominal_states_and_is_noted(tmp_path: Path, head: str, unit: str, factor: float) -> None:
+    rows = "".join(f"{x:.9f},{y:.9f}\n" for x, y in [*oval_points(0.0), oval_points(0.0)[0]])
+    file = tmp_path / "nominal.csv"
+    file.write_text(head + rows, encoding="utf-8")
+    facts = cmmlink("nominal", file, "--unit", unit, "--json").json()
+    assert facts["length_mm"] == pytest.approx(factor * LENGTH_MM, rel=1e-4)
+    assert facts["notes"][0] == f"read in {unit}, as asked"
+    assert any("not followed" in note for note in facts["notes"]) == bool(head)
+    assert "both given" in cmmlink("nominal", file, "--unit", unit, "--scale", 2).refused()
+
+
+def test_check_says_what_was_assumed(tmp_path: Path) -> None:
+    write_points(tmp_path / "nominal.csv", np.vstack([oval_points(0.0), oval_points(0.0)[:1]]))
+    (tmp_path / "points.txt").write_text("".join(f"{x:.4f};{y:.4f}\n" for x, y in oval_points(0.0)).replace(".", ","), encoding="utf-8")
+    plan = tmp_path / "plan.yaml"
+    plan.write_text(
+        "part: {name: a}\nnominal: {file: nominal.csv, unit: mm}\ntolerance: {lower_mm: -1, upper_mm: 1}\n"
+        "device: {type: file, file: points.txt, invalid: [-9999]}\n",
+        encoding="utf-8",
+    )
+    ended = cmmlink("check", plan)
+    assert ended.code == 0
+    assert "  note: nominal.csv: read in mm, as asked\n" in ended.out
+    assert "  note: points.txt: decimal commas\n" in ended.out
+    assert "  note: points.txt: 0 rows hold -9999, which means no point: rejected\n" in ended.out
 
 
 def test_ports_lists_what_the_system_has(monkeypatch: pytest.MonkeyPatch) -> None:

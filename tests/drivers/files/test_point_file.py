@@ -155,7 +155,8 @@ def test_a_unit_stated_in_words_is_asked_about_and_taken_when_given(tmp_path: Pa
     np.testing.assert_array_equal(read_points(path, scale=25.4).points_mm, POINTS * 25.4)
     as_mm = read_points(path, unit="mm")
     np.testing.assert_array_equal(as_mm.points_mm, POINTS)
-    assert any("read in mm, as asked, although" in note for note in as_mm.notes)
+    assert "read in mm, as asked" in as_mm.notes
+    assert any("not followed, since unit mm was asked for" in note for note in as_mm.notes)
 
 
 @pytest.mark.parametrize(
@@ -426,3 +427,27 @@ def test_hostile_npy_is_read_or_refused(tmp_path: Path, header: bytes, cut: int,
     made_up = b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header
     for content in (bytes(damaged[:cut]), made_up, b"\x93NUMPY" + header):
         read_or_refused(written(tmp_path, content, "a.npy"))
+
+
+@pytest.mark.parametrize("form", ["text", "npy"])
+def test_values_that_mean_no_point_are_rows_without_numbers(tmp_path: Path, form: str) -> None:
+    rows = np.array([[1.5, 2.0, 0.0], [-9999.0, -9999.0, -9999.0], [3.0, 4.5, 0.0], [5.0, 0.25, 32767.0], [6.0, -9999.5, 0.0]])
+    path = tmp_path / ("points.npy" if form == "npy" else "points.csv")
+    if form == "npy":
+        np.save(path, rows)
+    else:
+        path.write_text("x,y,z\n" + "".join(",".join(map(str, row)) + "\n" for row in rows) + "nan,nan,nan\n", encoding="utf-8")
+    file = read_points(path, invalid=(-9999.0, 32767.0, 7.0))
+    there = [0, 2, 4]
+    np.testing.assert_array_equal(file.points_mm[there], rows[there])
+    assert np.isnan(file.points_mm[[1, 3]]).all()
+    counted = [note for note in file.notes if "means no point" in note]
+    assert [note.split(",")[0] for note in counted] == ["1 row holds -9999", "1 row holds 32767", "0 rows hold 7"]
+    assert ("1 row without numbers: rejected" in file.notes) == (form == "text")
+
+
+def test_a_unit_or_a_scale_that_was_asked_for_goes_above_what_the_file_states_and_says_so(tmp_path: Path) -> None:
+    path = written(tmp_path, "# units: inch\n1 2\n3 4.5\n")
+    assert read_points(path, unit="um").notes == ("read in um, as asked", "line 1 states inch: not followed, since unit um was asked for")
+    assert read_points(path, 2.0).notes == ("line 1 states inch: not followed, since scale 2 was asked for",)
+    assert read_points(path, 25.4).notes == ()
