@@ -42,10 +42,15 @@ def open_line(address: str) -> Line:
     """Open `pty` or `host:port` (port 0: any free one)."""
     if address == "pty":
         return PtyLine()
+    return TcpLine(*host_and_port(address))
+
+
+def host_and_port(address: str) -> tuple[str, int]:
+    """Take `host:port` apart. Raises ValueError where a host or a port is missing: none would serve every network."""
     host, _, port = address.rpartition(":")
-    if not host or not port.isdigit():
+    if not host or "/" in host or not (port.isascii() and port.isdigit()) or int(port) > 65535:
         raise ValueError(f"address {address!r}: expected pty or host:port")
-    return TcpLine(host, int(port))
+    return host, int(port)
 
 
 class TcpLine:

@@ -26,7 +26,7 @@ from pymodbus.server.base import ModbusBaseServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 from simulators.faults import Injector
-from simulators.line import PtyLine
+from simulators.line import PtyLine, host_and_port
 from simulators.motion import Walk, walk
 from simulators.settings import Announce, SimulatorSettings
 
@@ -140,10 +140,13 @@ class _Service:
             serial = ModbusSerialServer(context, port=self._relay.inner, baudrate=115_200, custom_pdu=[request])
             await serial.serve_forever(background=True)
             return serial
-        host, _, port = self._address.rpartition(":")
-        server = ModbusTcpServer(context, address=(host, int(port)), custom_pdu=[request], trace_packet=self._damage)
-        await server.serve_forever(background=True)
-        if not int(port):
+        host, port = host_and_port(self._address)
+        server = ModbusTcpServer(context, address=(host, port), custom_pdu=[request], trace_packet=self._damage)
+        try:
+            await server.serve_forever(background=True)
+        except RuntimeError as error:  # what pymodbus makes of a host that is none of this computer, or of a port in use
+            raise OSError(str(error)) from None
+        if not port:
             transport = server.transport
             assert isinstance(transport, asyncio.Server)
             self._address = f"{host}:{transport.sockets[0].getsockname()[1]}"

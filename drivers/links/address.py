@@ -19,6 +19,7 @@ NUMBERS = re.compile(r"\[[0-9A-Fa-f:.]{2,45}\]")
 WINDOWS_PORT = re.compile(r"COM[1-9][0-9]{0,2}", re.IGNORECASE)
 WORD = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 DEVICES = Path("/dev")
+KINDS = Path("/sys/dev/char")
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +42,7 @@ def device_address(text: str) -> HostPort | str:
         return HostPort(host, int(port))
     if WORD.fullmatch(text):
         return text
-    if "://" not in text and text.isprintable() and text.startswith("/"):
+    if "://" not in text and text.isprintable() and text.startswith("/") and not text.startswith("//"):  # a share of another computer
         if os.path.exists(text) and not _is_character_device(text):
             raise ValueError(f"address {text!r:.200} is no serial port but another file; `cmmlink ports` lists the ports")
         return text
@@ -63,9 +64,16 @@ def _is_host(text: str) -> bool:
 
 
 def _is_character_device(name: str) -> bool:
-    """Tell whether `name`, or what it is a link to, is a character device below /dev, as ports and pseudo-terminals are."""
+    """Tell whether `name`, or what it is a link to, is a character device below /dev, as ports and pseudo-terminals are.
+
+    Where the system says what kind of device it is (Linux), only terminals are: to open a watchdog restarts the computer.
+    """
     try:
         path = Path(name).resolve()
-        return path.is_relative_to(DEVICES) and stat.S_ISCHR(path.stat().st_mode)
+        status = path.stat()
+        if not (path.is_relative_to(DEVICES) and stat.S_ISCHR(status.st_mode)):
+            return False
+        kind = KINDS / f"{os.major(status.st_rdev)}:{os.minor(status.st_rdev)}" / "subsystem"
+        return not kind.exists() or kind.resolve().name == "tty"
     except (OSError, RuntimeError, ValueError):
         return False

@@ -85,6 +85,6 @@ def test_an_unplugged_line_is_gone_and_comes_back_under_its_address(line: Line) 
 
 
 def test_an_address_that_is_none_is_refused() -> None:
-    for address in ("", "host", "host:port", ":5"):
+    for address in ("", "host", "host:port", ":5", "spy://x?file=y:5", "host:\u0665", "host:65536", "host:-1"):
         with pytest.raises(ValueError, match="expected pty or host:port"):
             open_line(address)

@@ -8,6 +8,7 @@ import pytest
 
 import simulators
 from simulators import known_devices
+from simulators.settings import settings_from
 
 ROOT = Path(simulators.__file__).parents[1]
 
@@ -37,3 +38,12 @@ def test_a_device_that_is_not_known_is_one_message(arguments: list[str], complai
     assert ended.returncode == 1
     assert ended.stderr.startswith(complaint)
     assert ended.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("address", [":502", "spy://x?file=y", "host:\u0665", "127.0.0.1:99999"])
+@pytest.mark.parametrize("device", ["modbus-ring", "serial"])
+def test_a_simulated_device_serves_nothing_but_what_its_address_names(device: str, address: str, tmp_path: Path) -> None:
+    path = tmp_path / "path.csv"
+    path.write_text("x_mm,y_mm\n0,0\n1,0\n", encoding="utf-8")
+    with pytest.raises(ValueError, match="expected pty or host:port"):
+        known_devices()[device](settings_from(["--address", address, "--path", str(path)]), lambda _: None)

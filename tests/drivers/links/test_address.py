@@ -1,6 +1,7 @@
 """What is an address of a device, and what is refused before any library sees it."""
 
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -90,3 +91,45 @@ def test_only_a_character_device_below_dev_is_opened(tmp_path: Path, monkeypatch
     finally:
         os.close(master)
         os.close(slave)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux says what kind of device a file is")
+@pytest.mark.parametrize("name", ["/dev/null", "/dev/zero", "/dev/full", "/dev/random", "/dev/urandom", "/dev/shm/../null"])
+def test_a_device_that_is_no_terminal_is_no_port(name: str, tmp_path: Path) -> None:
+    (tmp_path / "port").symlink_to(name)
+    for address in (name, str(tmp_path / "port")):
+        with pytest.raises(ValueError, match="no serial port but another file"):
+            device_address(address)
+
+
+SCHEMES = ("alt", "cp2110", "hwgrep", "loop", "rfc2217", "socket", "spy", "file")
+SPELLINGS = ("{}", "{} ", " {}", "\t{}", "{}\n", "\u200b{}", "\ufeff{}")
+
+
+@pytest.mark.parametrize("scheme", [*SCHEMES, *(scheme.upper() for scheme in SCHEMES), *(scheme.title() for scheme in SCHEMES)])
+def test_every_way_to_write_a_url_is_refused(scheme: str, tmp_path: Path) -> None:
+    for rest in ("://x?file={}", "://", "://{}", "://localhost:502", "/{}", ":{}", ":\\\\{}"):
+        for spelling in SPELLINGS:
+            with pytest.raises(ValueError, match="address"):
+                device_address(spelling.format(scheme + rest.format(tmp_path / "record")))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "\\\\server\\share\\x",
+        "\\\\.\\PhysicalDrive0",
+        "//server/share",
+        "C:\\x",
+        "C:/x",
+        "COM\u0661",
+        "COM\u00b9",
+        "host:\u0665\u0660\u0662",
+        "host:5\n",
+        "..",
+        "~/x",
+    ],
+)
+def test_paths_of_other_systems_and_digits_of_other_scripts_are_refused(text: str) -> None:
+    with pytest.raises(ValueError, match="address"):
+        device_address(text)
