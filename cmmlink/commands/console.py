@@ -1,22 +1,25 @@
 """The console brought to the operator: the command `console`, and a single run shown on the page."""
 
+import os
 import re
+import signal
 import sys
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from platformdirs import user_data_path
 
 from cmmlink.buffer import CAPACITY_POINTS
 from cmmlink.commands.options import NoBrowser, Records, records_folder
 from cmmlink.commands.output import Output, now, report_outcome, stop_on_ctrl_c
 from cmmlink.console.ct_import import Section
-from cmmlink.console.launch import CONSOLE_PORT, graphical_browser, kept_token, serve, stay_while_seen
+from cmmlink.console.launch import CONSOLE_PORT, graphical_browser, serve, stay_while_seen
+from cmmlink.console.listening import Access
 from cmmlink.console.past_runs import PastRuns
 from cmmlink.console.refused import Refused
 from cmmlink.console.station_setup import StationSetup
@@ -42,20 +45,35 @@ _LONGEST_PLAN = 200_000
 
 def serve_console(
     folder: Annotated[Path, typer.Argument(metavar="[FOLDER]", help="Folder of the station's plans.")] = Path(),
-    host: Annotated[str, typer.Option(help="Address to serve; another than 127.0.0.1 opens the console to the network.")] = "127.0.0.1",
+    host: Annotated[
+        str, typer.Option(help="Address to serve. One that others can reach needs --certificate or --unencrypted.")
+    ] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="0 takes a free one.")] = CONSOLE_PORT,
     no_browser: NoBrowser = False,
+    certificate: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Serve https with this certificate, PEM with its key in it or in --key.")
+    ] = None,
+    key: Annotated[Path | None, typer.Option(metavar="FILE", help="The certificate's private key, PEM.")] = None,
+    unencrypted: Annotated[bool, typer.Option("--unencrypted", help="Serve other computers without a certificate.")] = False,
     records: Records = None,
 ) -> int:
-    """Serve the operator console: plans, runs, history and CT import of this station on one page."""
+    """Serve the operator console: plans, runs, history and CT import of this station on one page.
+
+    The address that it prints opens one page, once, within a minute. Enter prints another, and `new` turns out every page first.
+    """
     if not folder.is_dir():
         raise PlanError(f"{folder}: there is no such folder; give the folder that holds the plans")
     past = _past_runs(records)
     scans, surfaces = (lambda: _plans_in(folder, surfaces=False)), (lambda: _plans_in(folder, surfaces=True))
     setup = StationSetup(scans, connect, serial_ports, past, time.monotonic, now, surfaces, inspect_surface, _write_for())
-    token = kept_token(user_data_path("cmmlink", appauthor=False))
-    with stop_on_ctrl_c() as stop, serve(setup, __version__, host, port, token) as server:
+    if key is not None and certificate is None:
+        raise PlanError("--key belongs to a certificate; give that with --certificate")
+    access = Access(host, port, certificate, key, unencrypted)
+    with stop_on_ctrl_c() as stop, serve(setup, __version__, access) as server:
         _show(server, no_browser)
+        typed = _standard_input()
+        if typed is not None:
+            threading.Thread(target=_give_addresses, args=(server, typed), name="addresses", daemon=True).start()
         while not stop.wait(_LOOK_S):
             pass
     return 0
@@ -135,14 +153,40 @@ def _write_for(out: Path | None = None) -> Callable[[Plan, FinishedRun], None]:
 
 
 def _show(server: "ConsoleServer", no_browser: bool) -> None:
-    """Say where the page is, and open it."""
-    sys.stderr.write(f"console: {server.address}\n")
-    if server.remote:
-        sys.stderr.write("WARNING: the console is open to the network, unencrypted; whoever knows this address can control it\n")
+    """Say where the page is, and open it. The browser's address is its own, because the printed one may be used elsewhere."""
+    sys.stderr.write(f"console: {server.new_address()}\n")
+    if server.encryption is not None:
+        sys.stderr.write(f"certificate: SHA-256 {server.encryption.fingerprint}\n")
+    elif server.remote:
+        sys.stderr.write("WARNING: the console is open to the network, unencrypted; whoever listens there can control it\n")
     sys.stderr.flush()
     browser = None if no_browser else graphical_browser()
     if browser is not None:
-        browser.open(server.address)
+        browser.open(server.new_address())
+
+
+def _give_addresses(server: "ConsoleServer", typed: int) -> None:
+    """Print another address for every line that is typed; `new` turns out every page before.
+
+    typed : a descriptor, because a buffered file that is being read when the program ends is a fatal error of Python
+    """
+    if hasattr(signal, "SIGTTIN"):  # a program in the background would be stopped, with its measurement, for reading here
+        signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGTTIN])  # of this thread; reading fails instead
+    with suppress(OSError):
+        while lines := os.read(typed, 4096).splitlines():
+            for line in lines:
+                if line.strip().lower() == b"new":
+                    server.renew()
+                sys.stderr.write(f"console: {server.new_address()}\n")
+            sys.stderr.flush()
+
+
+def _standard_input() -> int | None:
+    """The descriptor of standard input, None where there is none."""
+    try:
+        return sys.stdin.fileno()
+    except (AttributeError, OSError, ValueError):
+        return None
 
 
 def _plans_in(folder: Path, surfaces: bool) -> dict[str, Path]:

@@ -1,17 +1,15 @@
-"""Who may come in: the addresses that are served, the pages that are ours, the token, and the security headers of every answer."""
+"""Who is served: the addresses that are ours, the pages that are ours. And the security headers of every answer."""
 
 import contextlib
-import hmac
 import socket
 from collections.abc import Callable
 
-from starlette.datastructures import Headers, MutableHeaders
+from starlette.datastructures import Headers
 from starlette.responses import PlainTextResponse, Response
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
-_LOOPBACK = ("127.0.0.1", "::1", "localhost")
-_HEADERS = {
+HEADERS = {
     "content-security-policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
     "x-content-type-options": "nosniff",
@@ -24,45 +22,37 @@ _HEADERS = {
 
 
 class Guard:
-    """Refuses requests that are not meant for us, and puts the security headers on every answer.
+    """Refuses requests that are not meant for us.
 
-    host, port : where the server listens
+    host, port : where the server listens; remote : whether other computers can reach it
     """
 
-    def __init__(self, app: ASGIApp, host: str, port: int) -> None:
+    def __init__(self, app: ASGIApp, host: str, port: int, remote: bool) -> None:
         self._app = app
-        self._is_ours = hosts_served(host, port)
+        self._is_ours = hosts_served(host, port, remote)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Refuse a request, or pass it on."""
         headers = Headers(scope=scope)
         host, origin = headers.get("host", ""), headers.get("origin")
+        scheme = "https" if scope["scheme"] in ("https", "wss") else "http"
         refusal: Response | None = None
         if not self._is_ours(host):
             refusal = PlainTextResponse("this address is not served here", 400)
-        elif (scope["type"] == "websocket" or origin is not None) and origin != f"http://{host}":
+        elif (scope["type"] == "websocket" or origin is not None) and origin != f"{scheme}://{host}":
             refusal = PlainTextResponse("pages of other origins are not served", 403)
-        if scope["type"] == "websocket":
-            await (WebSocket(scope, receive, send).send_denial_response(refusal) if refusal else self._app(scope, receive, send))
-            return
-        await (refusal or self._app)(scope, receive, _with_headers(send))
+        if refusal is not None and scope["type"] == "websocket":
+            await WebSocket(scope, receive, send).send_denial_response(refusal)
+        else:
+            await (refusal or self._app)(scope, receive, send)
 
 
-def is_remote(host: str) -> bool:
-    """Whether a server that listens at `host` can be reached from other machines."""
-    return host not in _LOOPBACK
-
-
-def knows_token(given: object, token: str) -> bool:
-    """Whether somebody gave the right token; takes as long for a wrong one."""
-    return isinstance(given, str) and hmac.compare_digest(given.encode(), token.encode())
-
-
-def hosts_served(host: str, port: int) -> Callable[[str], bool]:
+def hosts_served(host: str, port: int, remote: bool) -> Callable[[str], bool]:
     """Which Host headers are ours: names of this machine, with our port."""
-    remote = is_remote(host)
-    names = {"127.0.0.1", "localhost", "[::1]"} | ({socket.gethostname().lower(), host.lower()} if remote else set())
-    own = {f"{name}:{port}" for name in names} | (names if port == 80 else set())
+    bare = host.strip("[]").lower()
+    names = {"127.0.0.1", "localhost", "[::1]", f"[{bare}]" if ":" in bare else bare}
+    names |= {socket.gethostname().lower()} if remote else set()
+    own = {f"{name}:{port}" for name in names} | (names if port in (80, 443) else set())
 
     def is_ours(header: str) -> bool:
         # A foreign name that resolves to us (rebinding) is never a bare address, so addresses may pass where we serve others.
@@ -71,21 +61,12 @@ def hosts_served(host: str, port: int) -> Callable[[str], bool]:
     return is_ours
 
 
-def _with_headers(send: Send) -> Send:
-    async def send_with_headers(message: Message) -> None:
-        if message["type"] == "http.response.start":
-            MutableHeaders(scope=message).update(_HEADERS)
-        await send(message)
-
-    return send_with_headers
-
-
 def _is_address(host: str, port: int) -> bool:
     name, _, given = host.rpartition(":")
     if given != str(port):
         return False
     for family, text in ((socket.AF_INET, name), (socket.AF_INET6, name.strip("[]"))):
-        with contextlib.suppress(OSError):
+        with contextlib.suppress(OSError, ValueError):
             socket.inet_pton(family, text)
             return True
     return False

@@ -1,14 +1,12 @@
-"""The page brought to the operator: its address and token, the browser, and how long to stay."""
+"""The page brought to the operator: its address, the browser, and how long to stay."""
 
-import os
-import secrets
 import threading
 import webbrowser
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING
 
+from cmmlink.console.listening import Access
 from cmmlink.console.station import Station
 from cmmlink.console.station_setup import StationSetup
 from cmmlink.errors import PlanError
@@ -23,17 +21,16 @@ _GONE_S = 5.0  # a page that is loaded anew is away for a moment only
 
 
 @contextmanager
-def serve(setup: StationSetup, version: str, host: str = "127.0.0.1", port: int = 0, token: str | None = None) -> Iterator["ConsoleServer"]:
-    """Serve a station's page. Raises PlanError where the address cannot be had."""
+def serve(setup: StationSetup, version: str, access: Access | None = None) -> Iterator["ConsoleServer"]:
+    """Serve a station's page. Raises PlanError where the address cannot be had or needs more than was given."""
     from cmmlink.console.server import ConsoleServer  # noqa: PLC0415 - the web server takes a while that only a page need pay
 
-    station = Station(setup)
+    station, access = Station(setup), access or Access()
     try:
-        server = ConsoleServer(station, version, host, port, token)
+        server = ConsoleServer(station, version, access)
     except OSError as error:
-        raise PlanError(
-            f"the console cannot be served at {host}:{port} ({error.strerror}); choose another with --host and --port"
-        ) from None
+        place = f"{access.host}:{access.port}"
+        raise PlanError(f"the console cannot be served at {place} ({error.strerror}); choose another with --host and --port") from None
     server.start()
     try:
         yield server
@@ -42,26 +39,6 @@ def serve(setup: StationSetup, version: str, host: str = "127.0.0.1", port: int 
             station.job.abort()
             station.job.wait(_GONE_S)
         server.stop()
-
-
-def kept_token(folder: Path) -> str:
-    """Token of this user's console, made once and readable by its owner alone: a page outlives a restart of the program."""
-    file = folder / "console-token"
-    try:
-        token = file.read_text(encoding="ascii").strip()
-        if len(token) >= 32:
-            return token
-        file.unlink()
-    except (OSError, UnicodeDecodeError):
-        pass
-    token = secrets.token_urlsafe(24)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with os.fdopen(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="ascii") as opened:
-            opened.write(token)
-    except OSError:
-        return token  # it serves until the program ends
-    return token
 
 
 def graphical_browser() -> webbrowser.BaseBrowser | None:

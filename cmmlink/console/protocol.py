@@ -1,7 +1,8 @@
 """The messages between the station and its pages.
 
 What the station says is JSON text, told apart by `type`, and two binary messages with what is drawn. What a page says is JSON
-text, told apart by `do`; each gets one `Answer` with the same `number`. The first message of a page is its token alone.
+text, told apart by `do`; each gets one `Answer` with the same `number`. The first message of a page is its token alone, or the
+code of a one-time address, which is answered with the token (`Admitted`).
 `Hello` opens every connection: with it everything that the station said before is void, and the station says all of it again.
 
 `declarations.py` writes this file's types and constants for the page's scripts.
@@ -14,7 +15,7 @@ from typing import Any, Literal
 from cmmlink.run_state import RunState
 from cmmlink.words import VERDICT_NAMES, VERDICT_WORDS, Shape, VerdictName
 
-WRONG_TOKEN = 4401  # the station closes a page's socket with this code when the token is wrong
+WRONG_TOKEN = 4401  # the station closes a page's socket with this code when its token is wrong, or its address was used or is too old
 TOO_MANY_PAGES = 1013
 
 # A binary message begins with these fields, little-endian; then come columns, one after the other, `rows` values each.
@@ -30,6 +31,14 @@ CLOSED = 1  # flag of a nominal
 Severity = Literal["fault", "warning"]
 
 WORDS_OF_VERDICTS = {VERDICT_NAMES[verdict]: VERDICT_WORDS[verdict] for verdict in VERDICT_WORDS}
+
+
+@dataclass(frozen=True, slots=True)
+class Admitted:
+    """The answer to a one-time address: the token, which the page keeps for as long as its tab is open."""
+
+    token: str
+    type: Literal["admitted"] = "admitted"
 
 
 @dataclass(frozen=True, slots=True)
@@ -270,12 +279,12 @@ class ImportSurface:
 
 @dataclass(frozen=True, slots=True)
 class Plain:
-    """A command that needs no more words."""
+    """A command that needs no more words. The answer to `another page` is the code of a one-time address."""
 
-    do: Literal["start", "end", "abort", "test", "take control", "live", "devices"]
+    do: Literal["start", "end", "abort", "test", "take control", "live", "devices", "another page"]
 
 
-Message = Hello | Alive | Answer | Control | StationState | AlarmList | ShownRun | History | SurfaceState
+Message = Admitted | Hello | Alive | Answer | Control | StationState | AlarmList | ShownRun | History | SurfaceState
 Command = Choose | Enter | Acknowledge | OfRun | OpenSection | ImportSurface | Plain
 
 

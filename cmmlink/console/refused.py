@@ -19,3 +19,8 @@ def answer_errors() -> Iterator[None]:
         yield
     except (StoreError, RunError, PlanError, InspectionError, PointFileError, OSError) as error:
         raise Refused(str(error)) from None
+
+
+def words_of(error: OSError) -> str:
+    """What the system refused, for the operator; where it happened stands in the log and is nothing for a page."""
+    return f"the station's computer refuses it: {error.strerror or type(error).__name__}"

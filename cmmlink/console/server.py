@@ -1,7 +1,8 @@
 """The server of the page: its files, one socket a page, and which page is in control.
 
-Safe by default: only the addresses it was told to serve, only pages it served itself, only browsers that know the token
-(guard.py). Of the machine's files it reads none but its own page; plans and records come through the station.
+Safe by default: only the addresses it was told to serve and only pages it served itself (guard.py), only browsers that know the token
+(keys.py), and of those and all others only so many (connections.py). Of the machine's files it reads none but its own page; plans and
+records come through the station.
 
 Its event loop waits for nothing but its sockets: it reads snapshots that the station has published, and whatever takes time - a
 command, packing what is drawn, looking for plans - is done by other threads.
@@ -9,34 +10,33 @@ command, packing what is drawn, looking for plans - is done by other threads.
 
 import asyncio
 import json
-import secrets
-import socket
-import sys
-import tempfile
+import logging
 import threading
 import time
-from collections.abc import Awaitable, Iterator
-from dataclasses import asdict, dataclass, field
+from collections.abc import Iterator
+from dataclasses import asdict
 from importlib import resources
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import anyio.to_thread
 import uvicorn
 from starlette.applications import Starlette
-from starlette.background import BackgroundTask
-from starlette.requests import Request
-from starlette.responses import FileResponse, PlainTextResponse, Response
+from starlette.requests import HTTPConnection, Request
+from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from cmmlink.console.commands import Received, action_of, read_json, receive
-from cmmlink.console.drawing import nominal_message, points_message
-from cmmlink.console.guard import Guard, is_remote, knows_token
+from cmmlink.console.connections import LARGEST_COMMAND, LARGEST_HEAD, BoundedServer, PageProtocol, Visitor
+from cmmlink.console.guard import Guard
+from cmmlink.console.keys import Keys
+from cmmlink.console.listening import Access, encryption_of, listen_at
+from cmmlink.console.open_page import OpenPage
 from cmmlink.console.protocol import (
     TOO_MANY_PAGES,
     WRONG_TOKEN,
+    Admitted,
     Alive,
     Answer,
     Control,
@@ -49,19 +49,21 @@ from cmmlink.console.protocol import (
     ShownRun,
     json_of,
 )
-from cmmlink.console.refused import Refused
+from cmmlink.console.refused import Refused, words_of
+from cmmlink.console.run_archive import RunArchives
 from cmmlink.console.station import Station
-from cmmlink.extremes import PointsVersion
-from cmmlink.run_view import RunView
+
+_log = logging.getLogger(__name__)
 
 _PERIOD_S = 1 / 30  # at most so often a page is sent something
 _ALIVE_S = 0.5
 _LIST_PLANS_S = 1.0
 _TOKEN_WITHIN_S = 5.0
-_LARGEST_COMMAND = 16 * 1024
 _MOST_PAGES = 16
+_EXPORT_S = 3600.0
+_MOST_COMMANDS = 200  # a page may send within a second
+_TOO_MANY_COMMANDS = 1008  # close code
 _BROKEN_DOWN = 1011  # close code: the page connects again and is sent everything
-_UNSEEN = PointsVersion(-1, 0)
 _MEDIA = {
     "html": "text/html; charset=utf-8",
     "css": "text/css; charset=utf-8",
@@ -70,39 +72,26 @@ _MEDIA = {
 }
 
 
-@dataclass(eq=False)
-class _Page:
-    """One connected browser: what it was sent, and what it looks at. Belongs to the event loop.
-
-    generation : of the points it was sent last; counted for each page, because runs number theirs alike
-    """
-
-    socket: WebSocket
-    number: int
-    opened: RunView | None = None
-    nominal_of: RunView | None = None
-    seen: PointsVersion = _UNSEEN
-    generation: int = 0
-    sent: dict[str, Message] = field(default_factory=dict)
-    sending: asyncio.Lock = field(default_factory=asyncio.Lock)
-
-
 class ConsoleServer:
     """Serves one station to browsers, in a thread of its own.
 
-    host, port : where to listen; port 0 takes a free one
-    token      : what a page must know; it stands in the address's fragment, which browsers do not send
-    version    : of the software; a page of another version loads itself anew
+    version : of the software; a page of another version loads itself anew
+    access  : where to listen, and how
+    token   : what a page must know; a new one where none is given. No address holds it (keys.py)
     """
 
-    def __init__(self, station: Station, version: str, host: str = "127.0.0.1", port: int = 0, token: str | None = None) -> None:
+    def __init__(self, station: Station, version: str, access: Access | None = None, token: str | None = None) -> None:
+        """Raises PlanError where the access is not allowed, OSError where the address cannot be had."""
         self.station, self._version = station, version
-        self.token = token or secrets.token_urlsafe(24)
-        self.remote = is_remote(host)
-        self._host, self._socket = host, _listen_at(host, port)
+        self._access = access or Access()
+        self._keys = Keys(time.monotonic, token)
+        certificate = self._access.certificate
+        self.encryption = None if certificate is None else encryption_of(certificate, self._access.key)
+        self._socket, self.remote = listen_at(self._access)
         self.port: int = self._socket.getsockname()[1]
-        self._pages: list[_Page] = []
-        self._controller: _Page | None = None
+        self._pages: list[OpenPage] = []
+        self._archives = RunArchives(station.export_run)
+        self._controller: OpenPage | None = None
         self._seen = 0
         self._ever = threading.Event()
         self._stopped = threading.Event()
@@ -112,22 +101,33 @@ class ConsoleServer:
             log_level="critical",
             access_log=False,
             server_header=False,
-            ws="websockets-sansio",
-            ws_max_size=_LARGEST_COMMAND,
+            ws=PageProtocol,
+            ws_max_size=LARGEST_COMMAND,
             ws_per_message_deflate=False,
+            h11_max_incomplete_event_size=LARGEST_HEAD,
             lifespan="off",
             timeout_graceful_shutdown=1,
             proxy_headers=False,
         )
-        self._server = uvicorn.Server(config)
-        self._thread = threading.Thread(target=self._server.run, kwargs={"sockets": [self._socket]}, name="console", daemon=True)
+        self._server = BoundedServer(config, self._socket, self.encryption)
+        self._thread = threading.Thread(target=self._server.run, name="console", daemon=True)
         self._lister = threading.Thread(target=self._keep_listing_plans, name="plans", daemon=True)
 
+    def new_address(self) -> str:
+        """What to open in a browser: an address that opens one page, once, within a minute."""
+        return f"{self._place}/#{self._keys.new_code()}"
+
+    def renew(self) -> None:
+        """Turn out every page, and let none in that was in before; each needs a new address."""
+        self._keys.renew()
+        for page in tuple(self._pages):
+            page.expelled = True
+
     @property
-    def address(self) -> str:
-        """What to open in a browser, token included."""
-        shown = "127.0.0.1" if self._host in ("0.0.0.0", "::", "localhost") else f"[{self._host}]" if ":" in self._host else self._host
-        return f"http://{shown}:{self.port}/#{self.token}"
+    def _place(self) -> str:
+        host = self._access.host.strip().strip("[]")
+        shown = "127.0.0.1" if host in ("0.0.0.0", "::", "localhost") else f"[{host}]" if ":" in host else host
+        return f"{'https' if self.encryption else 'http'}://{shown}:{self.port}"
 
     @property
     def pages(self) -> int:
@@ -167,37 +167,27 @@ class ConsoleServer:
                 WebSocketRoute("/live", self._live),
             ]
         )
-        return Guard(app, self._host, self.port)
+        return Guard(app, self._access.host.strip(), self.port, self.remote)
 
     async def _export(self, request: Request) -> Response:
-        if not knows_token(request.headers.get("authorization", "").removeprefix("Bearer "), self.token):
+        if not self._keys.knows(request.headers.get("authorization", "").removeprefix("Bearer ")):
             return PlainTextResponse("the token is wrong or missing", 401)
-        try:
-            archive, folder = await anyio.to_thread.run_sync(self._pack_run, request.path_params["run"])
-        except Refused as refusal:
-            return PlainTextResponse(str(refusal), 404)
-        return FileResponse(archive, media_type="application/zip", background=BackgroundTask(folder.cleanup))
-
-    def _pack_run(self, run: str) -> tuple[Path, tempfile.TemporaryDirectory[str]]:
-        """Write a run as an archive into a folder that is to be cleaned up. Raises Refused."""
-        folder = tempfile.TemporaryDirectory()
-        try:
-            return self.station.export_run(run, Path(folder.name)), folder
-        except Refused:
-            folder.cleanup()
-            raise
+        _visitor(request).admit(_EXPORT_S)
+        return await self._archives.answer(request.path_params["run"])
 
     async def _live(self, websocket: WebSocket) -> None:
         """One page, from its token to its end."""
         await websocket.accept()
-        if not await self._gives_token(websocket):
-            await websocket.close(WRONG_TOKEN, "wrong token")
+        if not await self._admits(websocket):
+            await websocket.close(WRONG_TOKEN, "this address was used, or is too old")
             return
+        visitor = _visitor(websocket)
+        visitor.admit()
         if len(self._pages) >= _MOST_PAGES:
             await websocket.close(TOO_MANY_PAGES, "too many pages are open")
             return
         self._seen += 1
-        page = _Page(websocket, self._seen)
+        page = OpenPage(websocket, visitor, self._seen)
         self._pages.append(page)
         self._controller = self._controller or page
         self._ever.set()
@@ -208,14 +198,24 @@ class ConsoleServer:
             if self._controller is page:
                 self._controller = None
 
-    async def _gives_token(self, websocket: WebSocket) -> bool:
+    async def _admits(self, websocket: WebSocket) -> bool:
+        """Whether the first message holds the token, or the code of a one-time address, which is answered with the token."""
         try:
             first = read_json(await asyncio.wait_for(websocket.receive_text(), _TOKEN_WITHIN_S))
-        except (TimeoutError, WebSocketDisconnect, KeyError):
+            if "once" not in first:
+                return self._keys.knows(first.get("token"))
+            redeemed = self._keys.redeem(first["once"])
+            if redeemed == "used":
+                what = "Two pages were opened at an address that opens one. If the other is not yours, restart the console"
+                self.station.alarms.raise_alarm("warning", "An address was used twice", what)
+            if redeemed != "opened":
+                return False
+            await websocket.send_text(json_of(Admitted(self._keys.token)))
+        except (TimeoutError, WebSocketDisconnect, KeyError, RuntimeError):
             return False
-        return knows_token(first.get("token"), self.token)
+        return True
 
-    async def _serve(self, page: _Page) -> None:
+    async def _serve(self, page: OpenPage) -> None:
         """Show and listen until the page is gone; a defect in showing closes its socket, so that it connects again."""
         tasks = [asyncio.create_task(self._show(page)), asyncio.create_task(self._listen(page))]
         try:
@@ -229,19 +229,29 @@ class ConsoleServer:
                 self.station.alarms.raise_alarm("fault", "Defect in the program", repr(defect))
                 await page.socket.close(_BROKEN_DOWN, "the station cannot show this page")
 
-    async def _listen(self, page: _Page) -> None:
+    async def _listen(self, page: OpenPage) -> None:
+        began_s, commands = time.monotonic(), 0
         while True:
             try:
                 received = receive(await page.socket.receive_text())
             except (WebSocketDisconnect, KeyError):
                 return
+            now_s, commands = time.monotonic(), commands + 1
+            if now_s - began_s > 1.0:
+                began_s, commands = now_s, 1
+            if commands > _MOST_COMMANDS:
+                await page.socket.close(_TOO_MANY_COMMANDS, "too many commands in a second")
+                return
             try:
                 ok, message = True, await self._obey(page, received)
             except Refused as refusal:
                 ok, message = False, str(refusal)
-            await _send(page, json_of(Answer(received.number, received.do, ok, message)))
+            except OSError as error:
+                _log.exception("command %r failed", received.do)
+                ok, message = False, words_of(error)
+            await page.send(json_of(Answer(received.number, received.do, ok, message)))
 
-    async def _obey(self, page: _Page, received: Received) -> str:
+    async def _obey(self, page: OpenPage, received: Received) -> str:
         """Carry out one command; returns its answer in words. Raises Refused."""
         command = received.command()
         action = action_of(command, self.station)
@@ -259,7 +269,7 @@ class ConsoleServer:
             return await self._obey_plain(page, command)
         return "opened"
 
-    async def _obey_plain(self, page: _Page, command: Plain) -> str:
+    async def _obey_plain(self, page: OpenPage, command: Plain) -> str:
         """Carry out what any page may ask of the server."""
         if command.do == "take control":
             self._controller = page
@@ -267,26 +277,29 @@ class ConsoleServer:
         if command.do == "live":
             page.opened = None
             return "the station as it is now"
+        if command.do == "another page":
+            return self._keys.new_code()
         found = await anyio.to_thread.run_sync(self.station.devices)
         return json.dumps([asdict(Device(address, description)) for address, description in found])
 
-    async def _show(self, page: _Page) -> None:
+    async def _show(self, page: OpenPage) -> None:
         """Send what changed, never more than the newest, at most 30 times a second."""
-        await _send(page, json_of(Hello(self._version, page.number, self.remote)))
+        await page.send(json_of(Hello(self._version, page.number, self.remote)))
         alive_s = 0.0
-        while True:
+        while not page.expelled:
             began_s = time.monotonic()
-            await self._show_points(page)
+            await page.show_points(page.opened or self.station.view)
             for message in self._newest(page):
                 if page.sent.get(message.type) != message:
                     page.sent[message.type] = message
-                    await _send(page, await anyio.to_thread.run_sync(json_of, message))
+                    await page.send(await anyio.to_thread.run_sync(json_of, message))
             if began_s - alive_s >= _ALIVE_S:
                 alive_s = began_s
-                await _send(page, json_of(Alive(self.station.now_ms())))
+                await page.send(json_of(Alive(self.station.now_ms())))
             await asyncio.sleep(max(_PERIOD_S - (time.monotonic() - began_s), 0.005))
+        await page.socket.close(WRONG_TOKEN, "the console was given a new token")
 
-    def _newest(self, page: _Page) -> Iterator[Message]:
+    def _newest(self, page: OpenPage) -> Iterator[Message]:
         """What the page is shown now: snapshots that the station has published."""
         station, view = self.station, page.opened or self.station.view
         yield Control(self._controller is page, self._controller is not None, len(self._pages))
@@ -295,33 +308,6 @@ class ConsoleServer:
         yield ShownRun(view.state() if view else None, page.opened is not None)
         yield station.history
         yield station.ct.state
-
-    async def _show_points(self, page: _Page) -> None:
-        view = page.opened or self.station.view
-        if view is None:
-            return
-        if page.nominal_of is not view:
-            page.nominal_of, page.seen = view, _UNSEEN
-            await _send(page, await anyio.to_thread.run_sync(nominal_message, view.context.profile))
-        if page.seen != view.newest_points:
-            packed = await anyio.to_thread.run_sync(_pack_changes, view, page.seen, page.generation)
-            page.seen, page.generation = packed.seen, packed.generation
-            await _send(page, packed.message)
-
-
-class _Packed(NamedTuple):
-    """Points packed for one page, and what the page has seen with them."""
-
-    message: bytes
-    seen: PointsVersion
-    generation: int
-
-
-def _pack_changes(view: RunView, seen: PointsVersion, generation: int) -> _Packed:
-    """Pack the points that changed after what a page has `seen`; `generation` is that of the message before."""
-    changed, verdict_at = view.points_since(seen)
-    generation += changed.seen.generation != seen.generation
-    return _Packed(points_message(changed, generation, verdict_at), changed.seen, generation)
 
 
 def _static_files() -> list[Any]:
@@ -333,22 +319,8 @@ def _file_response(file: tuple[bytes, str] | None) -> Response:
     return Response(file[0], media_type=file[1]) if file else PlainTextResponse("there is no such page", 404)
 
 
-def _listen_at(host: str, port: int) -> socket.socket:
-    """A bound socket. Raises OSError when the address is taken or is none of this machine."""
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    listening = socket.socket(family, socket.SOCK_STREAM)
-    try:
-        if sys.platform != "win32":  # there it would let another program take over the port
-            listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listening.bind((host, port))
-        listening.listen()  # from here on nobody is turned away, though it may take a moment until somebody answers
-    except OSError:
-        listening.close()
-        raise
-    return listening
-
-
-async def _send(page: _Page, message: str | bytes) -> None:
-    async with page.sending:
-        sent: Awaitable[None] = page.socket.send_text(message) if isinstance(message, str) else page.socket.send_bytes(message)
-        await sent
+def _visitor(connection: HTTPConnection) -> Visitor:
+    """The connection that a request came over."""
+    visitor = connection.scope["state"]["visitor"]
+    assert isinstance(visitor, Visitor)
+    return visitor

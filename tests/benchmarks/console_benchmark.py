@@ -154,7 +154,7 @@ def serve(answer: Connection, rate: int, held: int, alone: bool) -> None:
             station.show(Alone(plan_file, source).start())
         else:
             station.start()
-        answer.send(server.address)
+        answer.send(server.new_address())
         while (question := answer.recv()) != "end":
             assert station.view is not None
             received = station.view.state().received

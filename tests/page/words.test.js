@@ -16,7 +16,7 @@ test("the most urgent thing stands in the banner", () => {
   const watching = { controls: false, taken: true };
   const bannerOf = (heard) => bannersOf(heard)[0];
   assert.deepEqual(bannersOf(HEARD), []);
-  assert.match(bannerOf({ ...HEARD, link: "refused", run: lost }).words, /not valid/);
+  assert.match(bannerOf({ ...HEARD, link: "refused", run: lost }).words, /no access/);
   assert.match(bannerOf({ ...HEARD, link: "stale", run: lost }).words, /STALE/);
   assert.match(bannerOf({ ...HEARD, link: "away" }).words, /STALE/);
   assert.match(bannerOf({ ...HEARD, run: lost, control: watching }).words, /LINK LOST/);

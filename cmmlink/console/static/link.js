@@ -1,4 +1,4 @@
-// The socket to the station: token first, then messages both ways. It comes back by itself when the server does.
+// The socket to the station: code or token first, then messages both ways. It comes back by itself when the server does.
 
 import { WRONG_TOKEN } from "./protocol.js";
 
@@ -20,11 +20,12 @@ export const OUT_OF_REACH = "the station cannot be reached";
 
 export class Link {
   /**
-   * @param {string} token
+   * @param {string} code of a one-time address, empty where the page is loaded anew
    * @param {Handlers} handlers
    */
-  constructor(token, handlers) {
-    this.token = token;
+  constructor(code, handlers) {
+    this.code = code;
+    this.token = kept();
     this.handlers = handlers;
     this.number = 0;
     /** @type {Map<number, (outcome: Outcome) => void>} */
@@ -38,9 +39,9 @@ export class Link {
   }
 
   open() {
-    const socket = new WebSocket(`ws://${location.host}/live`);
+    const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live`);
     socket.binaryType = "arraybuffer";
-    socket.onopen = () => socket.send(JSON.stringify({ token: this.token }));
+    socket.onopen = () => socket.send(JSON.stringify(this.code ? { once: this.code } : { token: this.token }));
     socket.onmessage = (message) => this.take(message.data);
     socket.onclose = (event) => this.lose(event.code);
     return socket;
@@ -54,6 +55,7 @@ export class Link {
     if (data instanceof ArrayBuffer) return this.handlers.onBinary(data);
     /** @type {Message} */
     const message = JSON.parse(data);
+    if (message.type === "admitted") return this.enter(message.token);
     if (message.type === "answer") this.settle(message);
     this.handlers.onMessage(message);
   }
@@ -62,10 +64,22 @@ export class Link {
   lose(code) {
     for (const settle of this.waiting.values()) settle({ ok: false, message: OUT_OF_REACH });
     this.waiting.clear();
-    if (code === WRONG_TOKEN) return this.turn("refused");
+    if (code === WRONG_TOKEN && !(this.code && this.token)) {
+      keep("");
+      return this.turn("refused");
+    }
+    if (code === WRONG_TOKEN) this.enter(this.token); // the address was used by this very tab before it was loaded anew
     this.turn("away");
     setTimeout(() => (this.socket = this.open()), this.waitMs);
     this.waitMs = Math.min(this.waitMs * 1.5, LONGEST_WAIT_MS);
+  }
+
+  /** The address has done its work: it goes, and the token stays with this tab. @param {string} token */
+  enter(token) {
+    this.token = token;
+    this.code = "";
+    keep(token);
+    history.replaceState(null, "", location.pathname);
   }
 
   look() {
@@ -98,5 +112,26 @@ export class Link {
     const number = answer.number ?? -1;
     this.waiting.get(number)?.(answer);
     this.waiting.delete(number);
+  }
+}
+
+// The token outlives loading the page anew, in this tab alone. A browser may keep nothing; then it is gone with the page.
+
+const KEY = "cmmlink-token";
+
+function kept() {
+  try {
+    return sessionStorage.getItem(KEY) ?? "";
+  } catch {
+    return "";
+  }
+}
+
+/** @param {string} token */
+function keep(token) {
+  try {
+    sessionStorage.setItem(KEY, token);
+  } catch {
+    // the page works until it is closed
   }
 }

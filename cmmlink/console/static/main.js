@@ -76,7 +76,7 @@ function onMessage(message) {
 function greet(hello) {
   if (version && version !== hello.version) location.reload();
   version = hello.version;
-  heard.isRemote = hello.remote;
+  heard.isRemote = hello.remote && location.protocol !== "https:";
   heard.run = heard.station = heard.control = cursor = null;
   scan.clear();
 }
@@ -195,6 +195,12 @@ function say({ ok, message }) {
   put("said", `${ok ? "\u2713" : "\u2715"} ${message}`);
 }
 
+/** Get an address for one more page, here or at another computer. */
+async function invite() {
+  const { ok, message } = await link.ask({ do: "another page" });
+  say({ ok, message: ok ? `For one more page, within a minute: ${location.origin}/#${message}` : message });
+}
+
 async function start() {
   if (document.body.dataset.view === "part") {
     const answer = await partView.enter();
@@ -295,6 +301,7 @@ function pressKey(event) {
 
 document.addEventListener("keydown", pressKey);
 for (const button of viewButtons()) button.addEventListener("click", () => go(button.dataset.go ?? ""));
+buttonOf("another-page").addEventListener("click", invite);
 buttonOf("start").addEventListener("click", start);
 buttonOf("end").addEventListener("click", () => ask({ do: "end" }));
 buttonOf("abort").addEventListener("click", () => ask({ do: "abort" }));

@@ -27,12 +27,14 @@ import { CODE_OF } from "./verdicts.js";
  * @property {RunRow | null} chosen the run chosen in the history
  * @property {SurfaceState | null} surface
  * @property {boolean} hasFault
- * @property {boolean} isRemote whether the station is open to the network
+ * @property {boolean} isRemote whether the station is open to the network, unencrypted
  * @property {LinkState} link
  */
 
 const NONE = "\u2013";
 const LONG_WORD = 9; // letters; a longer word is set smaller, so that it stays in its card
+const NEEDS_ADDRESS = "This page has no access. An address opens one page, once, within a minute: "
+  + "press Enter where the console runs, or Another page on a page that is open, and open the new address here.";
 /** @type {Card} */
 const NO_CARD = { part: "", serial: "", names: [], word: "",
   shape: "none", final: false, why: "", reasons: [], phase: "", badge: "", before: "", run: null };
@@ -327,7 +329,7 @@ function bannerElement({ words, kind, button, act }, onPress) {
 export function bannersOf({ run, isRecorded, control, isRemote, link }) {
   /** @type {(words: string, kind: Banner["kind"], button?: string, act?: Banner["act"]) => Banner} */
   const banner = (words, kind, button = "", act = "live") => ({ words, kind, button, act });
-  if (link === "refused") return [banner("This address is not valid any more: open the one the program printed.", "fault")];
+  if (link === "refused") return [banner(NEEDS_ADDRESS, "fault")];
   if (link === "connecting") return [banner("Connecting to the station \u2026", "note")];
   const banners = [];
   if (link !== "live") banners.push(banner("STALE: the station does not answer. What you see is old. Trying again \u2026", "fault"));
@@ -340,7 +342,7 @@ export function bannersOf({ run, isRecorded, control, isRemote, link }) {
   if (control && !control.controls && link === "live") {
     banners.push(banner(`Watching: ${control.taken ? "another" : "no"} page is in control.`, "note", "Take control", "take control"));
   }
-  if (isRemote) banners.push(banner("This station is open to the network: whoever knows the address can control it.", "warning"));
+  if (isRemote) banners.push(banner("This station is open to the network, unencrypted: whoever listens there can control it.", "warning"));
   return banners;
 }
 

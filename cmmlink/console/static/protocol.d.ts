@@ -20,6 +20,12 @@ export const NONCONFORM: 2;
 export const WORDS_OF_VERDICTS: { readonly conform: "CONFORM"; readonly uncertain: "NOT PROVEN"; readonly nonconform: "NOT CONFORM" };
 export const POSE_MOVES: "the pose still moves";
 
+/** The answer to a one-time address: the token, which the page keeps for as long as its tab is open. */
+export interface Admitted {
+  readonly token: string;
+  readonly type: "admitted";
+}
+
 /** The first message: which version serves, which of its pages this is, and whether the network can reach it. */
 export interface Hello {
   readonly version: string;
@@ -278,9 +284,9 @@ export interface ImportSurface {
   readonly do: "import";
 }
 
-/** A command that needs no more words. */
+/** A command that needs no more words. The answer to `another page` is the code of a one-time address. */
 export interface Plain {
-  readonly do: "start" | "end" | "abort" | "test" | "take control" | "live" | "devices";
+  readonly do: "start" | "end" | "abort" | "test" | "take control" | "live" | "devices" | "another page";
 }
 
 /** A device that can be seen now. The answer to `devices` is a JSON list of them. */
@@ -289,6 +295,6 @@ export interface Device {
   readonly description: string;
 }
 
-export type Message = Hello | Alive | Answer | Control | StationState | AlarmList | ShownRun | History | SurfaceState;
+export type Message = Admitted | Hello | Alive | Answer | Control | StationState | AlarmList | ShownRun | History | SurfaceState;
 
 export type Command = Choose | Enter | Acknowledge | OfRun | OpenSection | ImportSurface | Plain;

@@ -9,6 +9,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 from cmmlink.console.ct_import import InspectSurface
+from cmmlink.console.listening import Access
 from cmmlink.console.server import ConsoleServer
 from cmmlink.console.station import Station
 from cmmlink.console.station_setup import Records
@@ -68,7 +69,7 @@ class Bench:
         page = self.browser.new_context(viewport={"width": width, "height": height}).new_page()
         page.on("console", lambda said: self.complaints.append(said.text) if said.type in ("error", "warning") else None)
         page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        page.goto(address or self.server.address)
+        page.goto(address or self.server.new_address())
         return page
 
     def started(self, plan: str = "blade.yaml") -> Page:
@@ -93,7 +94,7 @@ def make_bench(browser: Browser, tmp_path: Path) -> Iterator[MakeBench]:
     def make(
         records: Records | None = None,
         plans: Sequence[str] = ("blade.yaml",),
-        host: str = "127.0.0.1",
+        access: Access | None = None,
         surfaces: Mapping[str, Path] | None = None,
         inspect: InspectSurface | None = None,
     ) -> Bench:
@@ -101,7 +102,7 @@ def make_bench(browser: Browser, tmp_path: Path) -> Iterator[MakeBench]:
         device = Device()
         known = surfaces or {}
         station = Station(replace(setup_of(files, device.connect, records), ct_plans=lambda: known, inspect_surface=inspect))
-        server = ConsoleServer(station, "test", host, token=TOKEN)
+        server = ConsoleServer(station, "test", access, token=TOKEN)
         server.start()
         made.append(Bench(station, server, device, profile_of(load_plan(files[plans[0]])), browser))
         return made[-1]

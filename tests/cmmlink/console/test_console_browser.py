@@ -17,6 +17,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from cmmlink.commands.console import inspect_surface
 from cmmlink.console.ct_import import Section
+from cmmlink.console.listening import Access
 from cmmlink.console.past_runs import PastRuns
 from cmmlink.console.server import ConsoleServer
 from cmmlink.errors import StoreError
@@ -234,9 +235,32 @@ def test_invalid_plan_is_shown_with_its_line(make_bench: MakeBench, keep: Keep) 
     expect(page.locator("#check-word")).to_have_text("✓ wrong.yaml can be run.")
 
 
-def test_wrong_token_is_refused(bench: Bench) -> None:
-    page = bench.page(address=bench.server.address.replace(TOKEN, "guessed"))
-    expect(page.locator("#banners")).to_contain_text("not valid")
+def test_address_opens_one_page_which_stays_open_when_it_is_loaded_anew(bench: Bench) -> None:
+    address = bench.server.new_address()
+    page = bench.page(address=address)
+    expect(page.locator("#plans div")).to_have_count(1)
+    assert page.url == address.partition("#")[0]
+    page.reload()
+    expect(page.locator("#plans div")).to_have_count(1)
+    second = bench.page(address=address)
+    expect(second.locator("#banners")).to_contain_text("press Enter where the console runs")
+    expect(second.locator("#plans div")).to_have_count(0)
+    page.goto(address)  # the tab that has the token already
+    page.reload()
+    expect(page.locator("#plans div")).to_have_count(1)
+
+
+def test_open_page_gives_an_address_for_one_more(bench: Bench) -> None:
+    page = bench.page()
+    page.locator("#another-page").click()
+    expect(page.locator("#said")).to_contain_text("within a minute: http://127.0.0.1:")
+    address = "http" + (page.locator("#said").text_content() or "").partition("http")[2]
+    expect(bench.page(address=address).locator("#plans div")).to_have_count(1)
+
+
+def test_page_without_the_token_is_refused(bench: Bench) -> None:
+    page = bench.page(address=bench.server.new_address().partition("#")[0] + "#guessed")
+    expect(page.locator("#banners")).to_contain_text("no access")
     expect(page.locator("#plans div")).to_have_count(0)
     code = page.evaluate(
         """() => new Promise(done => { const s = new WebSocket(`ws://${location.host}/live`);
@@ -338,7 +362,7 @@ def test_page_says_that_it_is_stale_and_comes_back_after_a_restart(bench: Bench)
     bench.server.stop()
     expect(page.locator("#banners")).to_contain_text("STALE")
     assert page.locator("body").get_attribute("data-stale") == "true"
-    bench.server = ConsoleServer(bench.station, "test", port=bench.server.port, token=TOKEN)
+    bench.server = ConsoleServer(bench.station, "test", Access(port=bench.server.port), token=TOKEN)
     bench.server.start()
     expect(page.locator("#banners")).to_be_hidden()
     page.locator("#plans div").click()
@@ -604,7 +628,7 @@ def surface_ring(profile: NominalProfile, station_mm: NDArray[np.float64], exces
 
 
 def test_station_open_to_the_network_says_so(make_bench: MakeBench) -> None:
-    bench = make_bench(host="0.0.0.0")
+    bench = make_bench(access=Access("0.0.0.0", unencrypted=True))
     page = bench.page()
     expect(page.locator("#banners")).to_contain_text("open to the network")
 

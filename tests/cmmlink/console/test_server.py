@@ -1,14 +1,16 @@
 """The doors of the server, tried without a browser: what a hostile page, program or network could send."""
 
+import errno
 import http.client
 import json
 import struct
 import threading
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
+from socket import create_connection
 from time import monotonic
 from typing import Any
 
@@ -17,6 +19,7 @@ from websockets import Origin
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
+from cmmlink.console.listening import Access
 from cmmlink.console.protocol import NOMINAL, POINTS
 from cmmlink.console.server import ConsoleServer
 from cmmlink.console.station import Station
@@ -140,6 +143,102 @@ def test_wrong_token_closes_with_4401_and_tells_nothing(server: ConsoleServer, f
         assert closing_code(socket) == 4401
 
 
+def test_one_time_address_is_exchanged_for_the_token_once(server: ConsoleServer) -> None:
+    once = json.dumps({"once": server.new_address().partition("#")[2]})
+    with joined(server, first=once) as socket:
+        assert json.loads(socket.recv(timeout=10)) == {"token": TOKEN, "type": "admitted"}
+        assert json.loads(socket.recv(timeout=10))["type"] == "hello"
+        with joined(server, first=once) as second:
+            assert closing_code(second) == 4401
+        assert heard(socket, "alarms")
+    assert [alarm.what for alarm in server.station.alarms.newest_first()] == ["An address was used twice"]
+
+
+@pytest.mark.parametrize("code", ["guessed", "", None, 7, [TOKEN], TOKEN])
+def test_what_is_no_code_opens_nothing(server: ConsoleServer, code: object) -> None:
+    with joined(server, first=json.dumps({"once": code, "token": TOKEN})) as socket:
+        assert closing_code(socket) == 4401
+    assert server.station.alarms.newest_first() == []
+
+
+def test_an_open_page_gets_an_address_for_one_more(server: ConsoleServer) -> None:
+    with joined(server) as socket, joined(server) as watching:
+        heard(socket, "control")
+        for page in (socket, watching):
+            code = answered(page, {"do": "another page"})["message"]
+            with joined(server, first=json.dumps({"once": code})) as other:
+                assert heard(other, "hello")
+
+
+def test_a_new_token_turns_every_page_out(server: ConsoleServer) -> None:
+    with joined(server) as socket:
+        heard(socket, "alive")
+        server.renew()
+        assert closing_code(socket) == 4401
+    with joined(server) as socket:
+        assert closing_code(socket) == 4401
+    assert got(server, "/export/last", Authorization=f"Bearer {TOKEN}").status == 401
+    with joined(server, first=json.dumps({"once": server.new_address().partition("#")[2]})) as socket:
+        assert heard(socket, "hello")
+
+
+def test_what_the_system_refuses_in_a_command_is_answered(server: ConsoleServer, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> str:
+        raise OSError(errno.EMFILE, "Too many open files", "/home/operator/records")
+
+    for name in ("start", "choose", "open_run", "devices"):
+        monkeypatch.setattr(server.station, name, refuse)
+    commands = ({"do": "start"}, {"do": "choose", "plan": "x"}, {"do": "open", "run": "x"}, {"do": "devices"})
+    with joined(server) as socket:
+        for command in commands:
+            answer = answered(socket, command)
+            assert not answer["ok"]
+            assert answer["message"] == "the station's computer refuses it: Too many open files"
+
+
+def test_a_page_that_floods_the_station_is_closed(server: ConsoleServer) -> None:
+    with joined(server) as socket:
+        with suppress(ConnectionClosed):
+            for _ in range(2000):
+                socket.send('{"do": "live"}')
+        assert closing_code(socket) == 1008
+    with joined(server) as socket:
+        assert heard(socket, "hello")
+
+
+SECURITY = ("content-security-policy", "x-content-type-options", "x-frame-options", "referrer-policy", "cross-origin-resource-policy")
+
+
+def test_every_refusal_carries_the_security_headers(server: ConsoleServer) -> None:
+    upgrade = "Upgrade: websocket\r\nConnection: Upgrade\r\n"
+    key = "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+    ours = f"Host: 127.0.0.1:{server.port}\r\nOrigin: http://127.0.0.1:{server.port}\r\n"
+    version = "Sec-WebSocket-Version: 13\r\n"
+    cases = {
+        f"GET /live HTTP/1.1\r\nHost: evil.example\r\n{upgrade}{key}{version}\r\n": 400,
+        f"GET /live HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\nOrigin: null\r\n{upgrade}{key}{version}\r\n": 403,
+        f"GET /elsewhere HTTP/1.1\r\n{ours}{upgrade}{key}{version}\r\n": 403,
+        f"GET /live HTTP/1.1\r\n{ours}{upgrade}{version}\r\n": 400,
+        f"GET /live HTTP/1.1\r\n{ours}{upgrade}{key}Sec-WebSocket-Version: 7\r\n\r\n": 400,
+        f"GET /live HTTP/1.1\r\n{ours}{upgrade}{key}{version}\r\n": 101,
+        f"GET /nowhere HTTP/1.1\r\n{ours}\r\n": 404,
+        f"POST / HTTP/1.1\r\n{ours}Content-Length: 0\r\n\r\n": 405,
+        f"GET /export/x HTTP/1.1\r\n{ours}\r\n": 401,
+        "GET / HTTP/1.1\r\n\r\n": 400,
+        "no request at all\r\n\r\n": 400,
+        "GET / HTTP/1.1\r\n" + "x" * 40_000: 400,
+    }
+    for request, status in cases.items():
+        with create_connection(("127.0.0.1", server.port), timeout=10) as caller:
+            caller.sendall(request.encode())
+            answer = http.client.HTTPResponse(caller)
+            answer.begin()
+        assert answer.status == status, request
+        for name in SECURITY:
+            assert answer.headers.get_all(name) is not None, (request[:60], name)
+            assert len(answer.headers.get_all(name) or []) == 1
+
+
 def test_message_too_large_is_refused(server: ConsoleServer) -> None:
     with joined(server) as socket:
         socket.send('{"do": "' + "x" * 100_000 + '"}')
@@ -191,11 +290,13 @@ def test_pages_are_limited_in_number(server: ConsoleServer) -> None:
 def test_server_is_bound_to_this_machine_alone(server: ConsoleServer) -> None:
     assert server._socket.getsockname()[0] == "127.0.0.1"
     assert not server.remote
-    assert server.address == f"http://127.0.0.1:{server.port}/#{TOKEN}"
+    address = server.new_address()
+    assert address.startswith(f"http://127.0.0.1:{server.port}/#")
+    assert TOKEN not in address
 
 
 def test_open_server_takes_addresses_but_no_foreign_names(tmp_path: Path) -> None:
-    server = ConsoleServer(Station(setup_of({}, Device().connect)), "test", "0.0.0.0", token=TOKEN)
+    server = ConsoleServer(Station(setup_of({}, Device().connect)), "test", Access("0.0.0.0", unencrypted=True), token=TOKEN)
     server.start()
     assert server.remote
     assert got(server, "/", Host=f"192.0.2.7:{server.port}").status == 200

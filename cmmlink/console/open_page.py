@@ -1,0 +1,75 @@
+"""One open page: what it looks at, what it was sent, and how long it may take to read."""
+
+import asyncio
+from collections.abc import Awaitable
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import anyio.to_thread
+from starlette.websockets import WebSocket
+
+from cmmlink.console.connections import Visitor
+from cmmlink.console.drawing import nominal_message, points_message
+from cmmlink.console.protocol import Message
+from cmmlink.extremes import PointsVersion
+from cmmlink.run_view import RunView
+
+_SENT_WITHIN_S = 10.0  # a page that takes longer to read one message is gone
+_UNSEEN = PointsVersion(-1, 0)
+
+
+@dataclass(eq=False)
+class OpenPage:
+    """One connected browser. Belongs to the event loop.
+
+    generation : of the points it was sent last; counted for each page, because runs number theirs alike
+    expelled   : it has to come in again, with a new address
+    """
+
+    socket: WebSocket
+    visitor: Visitor
+    number: int
+    opened: RunView | None = None
+    nominal_of: RunView | None = None
+    seen: PointsVersion = _UNSEEN
+    generation: int = 0
+    sent: dict[str, Message] = field(default_factory=dict)
+    expelled: bool = False
+    sending: asyncio.Lock = field(default_factory=asyncio.Lock)
+
+    async def send(self, message: str | bytes) -> None:
+        """Send one message. A page that does not read is gone: it may hold neither memory nor the control of the station."""
+        try:
+            async with asyncio.timeout(_SENT_WITHIN_S), self.sending:
+                sent: Awaitable[None] = self.socket.send_text(message) if isinstance(message, str) else self.socket.send_bytes(message)
+                await sent
+        except TimeoutError:
+            self.visitor.abort()
+            raise
+
+    async def show_points(self, view: RunView | None) -> None:
+        """Send the nominal of the run it looks at, and the points that changed since it was sent some."""
+        if view is None:
+            return
+        if self.nominal_of is not view:
+            self.nominal_of, self.seen = view, _UNSEEN
+            await self.send(await anyio.to_thread.run_sync(nominal_message, view.context.profile))
+        if self.seen != view.newest_points:
+            packed = await anyio.to_thread.run_sync(_pack_changes, view, self.seen, self.generation)
+            self.seen, self.generation = packed.seen, packed.generation
+            await self.send(packed.message)
+
+
+class _Packed(NamedTuple):
+    """Points packed for one page, and what the page has seen with them."""
+
+    message: bytes
+    seen: PointsVersion
+    generation: int
+
+
+def _pack_changes(view: RunView, seen: PointsVersion, generation: int) -> _Packed:
+    """Pack the points that changed after what a page has `seen`; `generation` is that of the message before."""
+    changed, verdict_at = view.points_since(seen)
+    generation += changed.seen.generation != seen.generation
+    return _Packed(points_message(changed, generation, verdict_at), changed.seen, generation)
