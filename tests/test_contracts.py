@@ -144,7 +144,7 @@ def test_every_library_that_is_imported_is_declared() -> None:
     lines = [*project["dependencies"], *project["optional-dependencies"]["open3d"]]
     declared = {re.split(r"[<>=!~\[; ]", line, maxsplit=1)[0] for line in lines}
     known = {imports_of.get(name, name) for name in declared} | set(sys.stdlib_module_names) | set(PACKAGES)
-    brought = {"pydantic_core": "pydantic", "llvmlite": "numba", "anyio": "starlette"}  # which these cannot do without
+    brought = {"pydantic_core": "pydantic", "llvmlite": "numba", "anyio": "starlette", "h11": "uvicorn"}  # which these cannot do without
     undeclared = {
         relative(path): found
         for path in SOURCES
