@@ -37,6 +37,7 @@ _TYPICAL = 1000  # points that show how near to each other they lie
 _PLANE_LIMIT = 0.01  # of the nominal's size: heights that differ by less leave one section
 _THIN = 0.1  # of the heights' range: points nearer to a plane lie in it
 _LEVEL_MM = 0.5  # between two heights that are two sections
+_FAR_STRAIGHTER = 0.1  # of the rms at the best fit
 _STRAIGHT = 1e-3  # of the length: narrower points lie on a line, through which many planes go
 _SIZES_APART = 1.25
 _FACTOR_NEAR = 1.05
@@ -89,6 +90,7 @@ def check_fit(points_mm: Array, registration: Registration, terms: Terms) -> Non
     if direct is None:
         return
     size = terms.nominal.size_mm
+    _check_straight(kept, direct)
     if terms.known_pose is not None and found.rms_mm > MISFIT * size and direct.rms_mm < _FITS_INSTEAD * found.rms_mm:
         raise NotMeasured(_words_of_pose(found.rms_mm, direct, registration))
     _check_mirrored(kept, direct, terms)
@@ -96,6 +98,16 @@ def check_fit(points_mm: Array, registration: Registration, terms: Terms) -> Non
         raise NotMeasured(
             f"the points do not fit the nominal: rms {direct.rms_mm:.4g} mm after the best registration; they span "
             f"{np.hypot(*np.ptp(kept, axis=0)):.4g} mm, the nominal {size:.4g} mm. Check the unit, the scale and the nominal"
+        )
+
+
+def _check_straight(points_mm: Array, direct: Registration) -> None:
+    """Raise NotMeasured where the points (m, 2) lie on a straight line and the nominal does not: a curve was looked at from its edge."""
+    length, width = np.linalg.svd(points_mm - points_mm.mean(axis=0), compute_uv=False) / np.sqrt(len(points_mm))
+    if width <= _STRAIGHT * length and width <= _FAR_STRAIGHTER * direct.rms_mm:
+        raise NotMeasured(
+            f"the points lie on a straight line (within {width:.2g} mm rms), the nominal does not (rms {direct.rms_mm:.4g} mm at the best "
+            "fit): are these the columns of x and y (--columns), and is this the plane of the section (--plane)?"
         )
 
 

@@ -200,6 +200,25 @@ def test_points_that_repeat_are_no_marks(nominal: NominalProfile) -> None:
     assert judge(np.vstack([few, few[:3]]), nominal).rejected_by_reason == {}
 
 
+@pytest.mark.parametrize("noise", [0.0, 0.005])
+@pytest.mark.parametrize("fit", ["best-fit", "none"])
+def test_a_section_seen_from_its_edge_is_named(nominal: NominalProfile, noise: float, fit: str) -> None:
+    points = blade_points(400)
+    points[:, 1] = 12.0 + np.random.default_rng(1).normal(0, 1, 400) * noise
+    told = refusal(points, nominal, fit=fit)
+    assert "the points lie on a straight line" in told
+    assert "--columns" in told
+    assert "--plane" in told
+
+
+def test_a_flat_profile_is_no_section_seen_from_its_edge() -> None:
+    flat = discretize(NurbsCurve.interpolate(np.column_stack([np.linspace(0, 50, 30), np.zeros(30)])), material="right")
+    x = np.linspace(0, 50, 300)
+    wave = np.column_stack([x, 0.1 * np.sin(x)])
+    assert judge(wave, flat, fit="none").verdict == Verdict.NONCONFORM
+    assert judge(wave * np.array([1.0, 0.0]) + [0.0, 0.09], flat, fit="none").verdict == Verdict.NONCONFORM
+
+
 @pytest.mark.parametrize("rows", [range(0, 400, 2), range(0, 400, 3)])
 def test_a_fit_that_was_asked_for_is_not_told_to_be_asked_for(nominal: NominalProfile, rows: range) -> None:
     points = scan(nominal)
