@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.errors import PointFileError
+from drivers.files.no_numbers import is_no_number, name_errors
 from drivers.files.stated_units import StatedUnit, axis_letters, units_of_lines, units_of_row
 
 Array = NDArray[np.float64]
@@ -25,10 +26,10 @@ Numbered = list[tuple[int, str]]  # line number and what stands on the line
 
 _SNIFFED_LINES = 100
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
-_COMMENT = re.compile(r"#(?!N/A|VALUE!|DIV/0!|REF!|NUM!|NAME\?|NULL!)|%|!|//")  # a spreadsheet's error value is no comment
+_COMMENT = re.compile(r"#|%|!|//")
 _COMMENT_STARTS = ("#", "%", "!", "/")
-_REMARK = re.compile(r"\s*(?:#(?!N/A|VALUE!|DIV/0!|REF!|NUM!|NAME\?|NULL!)|!|//).*")  # behind the numbers of a row
-_NO_NUMBER = re.compile(r"|-+|\*+|\?+|nan|null|none|#?N/?A|#(VALUE!|DIV/0!|REF!|NUM!|NAME\?|NULL!)", re.IGNORECASE)
+_REMARK = re.compile(r"\s*(?:#|!|//).*")  # behind the numbers of a row
+_PERCENT_REMARK = re.compile(r"(?<=\d)\s+%\s.*")  # of rows alone: in words, a percent sign follows its number
 _UNDERLINE = re.compile(r"[-=+|\s]+")
 _VECTOR_NAMES = tuple("xyzijk")
 
@@ -98,7 +99,7 @@ def parse_columns(text: str, places: Collection[int] = ()) -> Columns:
         raise PointFileError("no line of numbers in the file; expected two or three columns of numbers")
     reading, wanted = _find_reading(data, wanted)
     notes: list[str] = []
-    data = _drop_count(data, reading, notes)
+    data = _drop_count(_without_edges(data, reading, bool(wanted), notes), reading, notes)
     values = _values(data, reading, wanted)
     columns = values.shape[1]
     _refuse_unclear_commas(data, reading, columns)
@@ -151,31 +152,38 @@ class _Reading:
         return len(fields) > max(wanted) and all(self.is_number(fields[place]) for place in wanted)
 
     def row(self, number: int, line: str, wanted: Collection[int] = ()) -> list[float]:
-        """Return the numbers of a line, NaN for words not wanted and for a row without numbers. Raises PointFileError, naming the word."""
+        """Return the numbers of a line, NaN for words not wanted and for what says that there is none.
+
+        Raises PointFileError, naming the word.
+        """
         fields = self.fields(line)
         if wanted and len(fields) == max(wanted):
             fields.append("")  # the last field, which is empty
         asked = wanted if wanted and len(fields) > max(wanted) else range(len(fields))
-        if len(fields) > 1 and all(_NO_NUMBER.fullmatch(fields[place]) for place in asked):
+        if len(fields) > 1 and all(is_no_number(fields[place]) for place in asked):
             return [float("nan")] * len(fields)
         for place in asked:
             field = fields[place]
-            if not self.is_number(field):
-                found = f"'{shorten(field)}' is not a number" if field else f"column {place + 1} is empty"
+            if not self.is_number(field) and not is_no_number(field):
+                found = f"'{shorten(field)}' is not a number"
                 raise PointFileError(f"line {number}: {found}; expected numbers {self}{_hint_of_labels(fields, self)}")
         return [_number(field) if self.is_number(field) else float("nan") for field in fields]
 
     def __str__(self) -> str:
-        between = {None: "blanks", "\t": "tabs", ";": "semicolons", ",": "commas"}[self.delimiter]
+        between = {None: "blanks", "\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars"}[self.delimiter]
         return f"with {between} between them and decimal {'commas' if self.decimal == ',' else 'points'}"
 
 
 # In order of preference where several explain as many lines: a semicolon or a tab is never part of a number.
-_READINGS = tuple(_Reading(*marks) for marks in ((";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), (None, "."), (None, ",")))
+_MARKS = ((";", "."), (";", ","), ("\t", "."), ("\t", ","), ("|", "."), ("|", ","), (",", "."), (None, "."), (None, ","))
+_READINGS = tuple(_Reading(*marks) for marks in _MARKS)
 
 
 def _number(field: str) -> float:
     return float(field.replace(",", ".").replace("d", "e").replace("D", "e"))
+
+
+_HINT = "; name the columns in a header line, like name,x,y,z, or say which are x and y (columns x=2,y=3)"
 
 
 def _hint_of_labels(fields: Sequence[str], reading: _Reading) -> str:
@@ -183,7 +191,7 @@ def _hint_of_labels(fields: Sequence[str], reading: _Reading) -> str:
     words = [field for field in fields if not reading.is_number(field)]
     if len(fields) - len(words) < 2 or not all(re.match(r"[^\W\d_]{2}", word) for word in words):
         return ""
-    return "; name the columns in a header line, like name,x,y,z, or say which are x and y (columns x=2,y=3)"
+    return _HINT
 
 
 def _split_lines(text: str, wanted: tuple[int, ...]) -> tuple[Numbered, Numbered, Numbered, tuple[int, ...]]:
@@ -193,19 +201,47 @@ def _split_lines(text: str, wanted: tuple[int, ...]) -> tuple[Numbered, Numbered
     remarks: Numbered = []
     asked = bool(wanted)
     for number, raw in enumerate(text.split("\n"), 1):
-        line = _without_quotes(raw.strip())
+        line = name_errors(_without_quotes(raw.strip()))
         remark = _COMMENT.match(line) if line[:1] in _COMMENT_STARTS else None
         if remark:
             line = line[remark.end() :].lstrip("#%!/ ")
             remarks.append((number, line))
+        elif line and len(data) == 1 and data[0][1].isdecimal() and _is_header(line):
+            header.append((number, line))  # below the count of points
         elif line and (data or _is_data(line, wanted, bool(header))):
-            data.append((number, _REMARK.sub("", line, count=1)))
+            data.append((number, _PERCENT_REMARK.sub("", _REMARK.sub("", line, count=1))))
             continue
         elif line:
             header.append((number, line))
+        elif data and "\t" in raw:
+            data.append((number, raw.strip(" ")))  # a row of empty fields, if tabs stand between them
         if line and not data and not asked:
             wanted = _named_places(line) or wanted
     return header, data, remarks, wanted
+
+
+def _without_edges(data: Numbered, reading: _Reading, labels: bool, notes: list[str]) -> Numbered:
+    """Leave out rows of nothing but delimiters at both ends, as spreadsheets write them, and lines of words behind the last row."""
+    filled = [i for i, (_, line) in enumerate(data) if any(reading.fields(line))]
+    first, stop = filled[0], filled[-1] + 1
+    words = stop
+    while words > first + 1 and _is_footer(data[words - 1][1], reading, labels):
+        words -= 1
+    if words < stop:
+        notes.append(f"line {data[words][0]}, behind the last row, left out: '{shorten(data[words][1])}'")
+    kept = [(number, line) for number, line in data[first:words] if reading.delimiter == "\t" or line.strip()]
+    empty = [number for number, line in (*data[:first], *data[stop:]) if line.strip()]
+    if empty:
+        notes.append(f"{count_of(len(empty), 'empty row')} at the ends left out")
+    return kept
+
+
+def _is_footer(line: str, reading: _Reading, labels: bool) -> bool:
+    """Tell whether a line behind the data is words: no number is on it, nor anything in place of one alone, and it is no labelled row."""
+    fields = [field for field in re.split(r"[;,|\s]+", line) if field]
+    if (reading.delimiter and reading.delimiter in line) or (labels and not reading.delimiter):
+        return False
+    return not any(map(reading.is_number, fields)) and not all(map(is_no_number, fields))
 
 
 def _is_data(line: str, wanted: Sequence[int], below_header: bool) -> bool:
@@ -216,7 +252,12 @@ def _is_data(line: str, wanted: Sequence[int], below_header: bool) -> bool:
 
 
 def _without_quotes(line: str) -> str:
-    """Take the quotes from fields; where a quoted field holds a comma, semicolons stand between the fields instead."""
+    """Take the quotes from fields, and bars from both ends.
+
+    Where a quoted field holds a comma, semicolons stand between the fields instead.
+    """
+    if line[:1] == line[-1:] == "|" and line.strip("| "):
+        line = line[1:-1].strip()
     if line.count('"') < 2 or line.count('"') % 2:
         return line
     if not re.search(r'"[^"]*,[^"]*"\s*(,|$)', line) or ";" in line or "\t" in line:
@@ -226,7 +267,7 @@ def _without_quotes(line: str) -> str:
 
 def _named_places(line: str) -> tuple[int, ...]:
     """Where a line names the axes x and y, and perhaps z: their columns (from 0); none where it does not."""
-    for delimiter in (";", "\t", ",", None):
+    for delimiter in (";", "\t", "|", ",", None):
         letters = axis_letters([name.strip() for name in line.split(delimiter)])
         places = [place for place, letter in enumerate(letters) if letter]
         if {"x", "y"} <= set(letters) and len(places) == len({letters[place] for place in places}):
@@ -244,7 +285,7 @@ def _values(data: Numbered, reading: _Reading, wanted: Sequence[int]) -> Array:
     rows = [reading.row(number, line, wanted) for number, line in data]
     widest = max(map(len, rows))
     for (_, line), row in zip(data, rows, strict=True):
-        if wanted and reading.delimiter and line.endswith(reading.delimiter) and len(row) == widest - 1:
+        if reading.delimiter and line.endswith(reading.delimiter) and len(row) == widest - 1:
             row.append(float("nan"))  # an empty last field
     full = next((at for at, row in enumerate(rows) if not np.isnan(row).all()), 0)
     first = len(rows[full])
@@ -261,7 +302,7 @@ def _values(data: Numbered, reading: _Reading, wanted: Sequence[int]) -> Array:
 def _is_header(line: str) -> bool:
     """Tell whether a line is a header: its first word is no number, and at most half of its words are (a damaged row has more)."""
     words = [word for word in re.split(r"[;,\t ]+", line) if word]
-    if len(words) > 1 and all(map(_NO_NUMBER.fullmatch, words)):
+    if len(words) > 1 and all(map(is_no_number, words)):
         return False
     numbers = [_NUMBER.fullmatch(word) is not None for word in words]
     return line[0] != "#" and re.search(r"[^\W\d_]", line) is not None and not numbers[0] and 2 * sum(numbers) <= len(numbers)
@@ -282,7 +323,7 @@ def _find_reading(data: Numbered, wanted: tuple[int, ...]) -> tuple[_Reading, tu
     number, line = data[0]
     if re.fullmatch(_NUMBER, line) or re.fullmatch(r"[+-]?\d+,\d+", line):
         raise PointFileError(f"line {number}: one column ('{shorten(line)}'); expected two or three: x, y and perhaps z")
-    labels = next(filter(None, (_hint_of_labels(reading.fields(line), reading) for reading in _READINGS)), "")
+    labels = next((_HINT for reading in _READINGS if sum(map(reading.is_number, reading.fields(line))) > 1), "")
     raise PointFileError(f"line {number}: '{shorten(line)}' is not a row of numbers; expected two or three columns of numbers{labels}")
 
 
@@ -337,7 +378,7 @@ def _names(header: Numbered, remarks: Numbered, reading: _Reading, columns: int)
     for number, line in header[::-1] + remarks:
         if line.upper().startswith("XYZIJK"):
             return (*_VECTOR_NAMES[:columns], *[""] * (columns - len(_VECTOR_NAMES))), number
-        for delimiter in (reading.delimiter, ";", "\t", ",", None):
+        for delimiter in (reading.delimiter, ";", "\t", "|", ",", None):
             names = [name.strip().strip("\"'") for name in line.split(delimiter)]
             if len(names) == columns and len({"x", "y", "z"} & set(axis_letters(names))) > 1:
                 return tuple(names), number

@@ -88,6 +88,15 @@ WITHOUT_NUMBERS = {
     "infinite": "3 -inf 0.5",
     "overflow": "3 1e999 0.5",
     "spreadsheet": "#N/A #N/A #N/A",
+    "spreadsheet in German": "#NV #WERT! 3",
+    "spreadsheet in Spanish": "#\u00a1VALOR! #N/D #\u00bfNOMBRE?",
+    "spreadsheet in French": "3 #VALEUR! 0.5",
+    "division": "#DIV/0! 4 #DIV/0!",
+    "number error": "#NUM! #NUM! #NUM!",
+    "old runtime": "1.#QNAN -1.#IND000 1.#INF",
+    "new runtime": "-nan(ind) nan(snan) nan",
+    "words": "invalid ERR n.a.",
+    "one word": "3 missing 0.5",
     "dashes": "--- --- ---",
     "null": "NULL NULL NULL",
 }
@@ -111,7 +120,26 @@ def test_a_row_with_its_number_alone_holds_no_point(tmp_path: Path, empty: str) 
     assert np.isnan(file.points_mm[1]).all()
 
 
+@pytest.mark.parametrize("delimiter", [",", ";", "|"])
+def test_empty_fields_are_no_numbers_and_empty_rows_at_the_ends_are_none(tmp_path: Path, delimiter: str) -> None:
+    rows = ["", "", "1.5,-2.25,0.5", ",,", "3,,0.5", "3,4.125,", "3,4.125,0.5", ",,", ",,"]
+    file = read_points(written(tmp_path, "x,y,z\n".replace(",", delimiter) + "\n".join(rows).replace(",", delimiter) + "\n"))
+    np.testing.assert_array_equal(file.points_mm[[0, 4]], POINTS[:2])
+    assert np.isnan(file.points_mm[1:4]).all()
+    assert len(file.points_mm) == 5
+    assert set(file.notes) == {"3 rows without numbers: rejected", "2 empty rows at the ends left out"}
+
+
+@pytest.mark.parametrize("words", ["END", "*** end of file ***", "end of scan"])
+def test_words_behind_the_last_row_are_left_out_and_noted(tmp_path: Path, words: str) -> None:
+    file = read_points(written(tmp_path, f"1.5 -2.25 0.5\n3 4.125 0.5\n0.001 100 -0.25\n\n{words}\n"))
+    np.testing.assert_array_equal(file.points_mm, POINTS)
+    assert file.notes == (f"line 5, behind the last row, left out: '{words}'",)
+
+
 PLAIN = {
+    "remarks of percent": "1.5 -2.25 0.5 % p0\n3 4.125 0.5 % p1\n0.001 100 -0.25 % p2\n",
+    "bars": "| x | y | z |\n|---|---|---|\n| 1.5 | -2.25 | 0.5 |\n| 3 | 4.125 | 0.5 |\n| 0.001 | 100 | -0.25 |\n",
     "quoted header": '"x","y","z"\n1.5,-2.25,0.5\n3,4.125,0.5\n0.001,100,-0.25\n',
     "quoted everywhere": '"x","y","z"\n"1.5","-2.25","0.5"\n"3","4.125","0.5"\n"0.001","100","-0.25"\n',
     "quoted with decimal commas": '"x","y","z"\n"1,5","-2,25","0,5"\n"3","4,125","0,5"\n"0,001","100","-0,25"\n',
@@ -249,12 +277,12 @@ BAD: dict[str, tuple[str | bytes, str]] = {
     "huge": ("1 2\n3 1e9\n", "line 2: 1e+09 is larger than 1e+06 mm"),
     "letter for a digit": ("1 2 3\n4 5 6\n\n7 8.O 9\n", "line 4: '8.O' is not a number"),
     "first row damaged": ("O.5 1 2\n1 2 3\n", "line 1: 'O.5' is not a number"),
-    "spreadsheet error": ("#N/A;1\n2;3\n4;5\n", "line 1: '#N/A' is not a number"),
     "underscore": ("1_000 2\n3 4\n", "line 1: '1_000' is not a number"),
     "short line": ("1 2 3\n4 5 6\n7 8\n", "line 3: 2 columns, line 1 has 3"),
     "long line": ("1,2.5\n4,5.5\n7,8.5,9\n", "line 3: 3 columns, line 1 has 2"),
-    "gap": ("1;2;3\n4;;6\n", "line 2: column 2 is empty"),
-    "words at the end": ("1 2\n3 4\nend of scan\n", "line 3: 'end' is not a number"),
+    "a letter in place of a number": ("1,2,3\n4,x,6\n7,8,9\n", "line 2: 'x' is not a number"),
+    "a number and words at the end": ("1 2\n3 4\n2 points\n", "line 3: 'points' is not a number"),
+    "times without a name": ("12:00:00;1.5;2.5;3.5\n12:00:01;2.5;3.5;4.5\n", "say which are x and y (columns x=2,y=3)"),
     "thousands": ("1.234,5;2\n1.000,5;4\n", "line 1: '1.234,5;2' is not a row of numbers"),
     "unclear commas, four columns": (
         "1,5,2,5\n1,2,3,4\n",
