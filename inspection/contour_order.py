@@ -45,9 +45,9 @@ def trace_contour(points_mm: Array, step_mm: float) -> Contour:
     The direction of the walk, and where a closed contour is opened, follow from the points alone.
     """
     means = _cell_means(points_mm, step_mm)
-    edges = _edges(means)
-    lengths = np.hypot(*(means[edges[:, 0]] - means[edges[:, 1]]).T)
-    network = coo_array((lengths, (edges[:, 0], edges[:, 1])), shape=(len(means), len(means))).tocsr()
+    first, second = _edges(means).T.astype(np.int32)  # the width that the graph searches of every SciPy take
+    lengths = np.hypot(*(means[first] - means[second]).T)
+    network = coo_array((lengths, (first, second)), shape=(len(means), len(means))).tocsr()
     tree = minimum_spanning_tree(network)
     ends, share = tree.tocoo(), np.zeros(len(means))
     for side in (ends.row, ends.col):
