@@ -4,6 +4,9 @@ BIN := .venv/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 INSTALL := $(PIP) --no-build-isolation --editable
 
+# The tests start a hundred processes; where Python may keep no compiled files, each of them compiles every file anew.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: demo install test lowest platforms upgrade bench paper soak proofs
 demo: .venv/installed
 	$(BIN)/cmmlink demo --out demo-result

@@ -1,14 +1,16 @@
 """A recording process that is killed at a random moment, again and again, and what its record holds afterwards.
 
-`python -m tests.integration.killed record FOLDER ADDRESS` records one scan and says what was acknowledged, line by line;
-`python -m tests.integration.killed soak KILLS` kills such processes and checks every acknowledged point.
+`python -m tests.integration.killed soak KILLS` kills so many processes and checks every acknowledged point.
 """
 
+import itertools
+import multiprocessing
 import random
-import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
+from multiprocessing.connection import Connection
 from pathlib import Path
 
 import numpy as np
@@ -21,18 +23,37 @@ from drivers.source import PointBatch
 from tests.cmmlink.recorded import plan_with_known_pose, record, today
 from tests.integration.simulated import Simulated, simulated
 
-RATE_HZ, LONGEST_SCAN = 10_000.0, 200_000
+RATE_HZ, LONGEST_SCAN = 10_000.0, 60_000
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def record_scan(folder: Path, address: str) -> None:
-    """Record the scan of a device; what this process says is acknowledged."""
+def start_recorder(folder: Path, address: str, say: Connection) -> multiprocessing.process.BaseProcess:
+    """Start a process that records one scan. Where a system can fork, it is split off from one that has loaded everything once."""
+    can_fork = "forkserver" in multiprocessing.get_all_start_methods()
+    context = multiprocessing.get_context("forkserver" if can_fork else "spawn")
+    if can_fork:
+        context.set_forkserver_preload([__name__])
+    process = context.Process(target=record_scan, args=(folder, address, say))
+    process.start()
+    return process
 
-    def say(acknowledged: Acknowledged) -> None:
-        sys.stdout.write(f"{acknowledged.wire_bytes} {acknowledged.points}\n")
-        sys.stdout.flush()
 
-    record(folder, SerialScanner(address, AsciiDecoder()), plan=plan_with_known_pose(), acknowledge=say)
+def record_scan(folder: Path, address: str, say: Connection) -> None:
+    """Record the scan of a device and say what is acknowledged: bytes of the wire, and points."""
+
+    def acknowledge(acknowledged: Acknowledged) -> None:
+        say.send((acknowledged.wire_bytes, acknowledged.points))
+
+    record(folder, SerialScanner(address, AsciiDecoder()), plan=plan_with_known_pose(), acknowledge=acknowledge)
+
+
+def _said(listen: Connection) -> Iterator[tuple[int, int]]:
+    """What the recorder said, until its process is gone; a last message may be cut short by that."""
+    while True:
+        try:
+            yield listen.recv()
+        except (EOFError, OSError):
+            return
 
 
 def kill_one(folder: Path, rng: random.Random) -> tuple[str, int]:
@@ -42,15 +63,16 @@ def kill_one(folder: Path, rng: random.Random) -> tuple[str, int]:
         tempfile.TemporaryDirectory() as place,
         simulated("serial", "127.0.0.1:0", Path(place), count=LONGEST_SCAN, rate_hz=RATE_HZ) as device,
     ):
-        command = [sys.executable, "-m", "tests.integration.killed", "record", str(folder), device.address]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
-            assert process.stdout is not None
-            said = [process.stdout.readline() for _ in range(rng.randint(0, 4))]
+        listen, say = multiprocessing.Pipe(duplex=False)
+        process = start_recorder(folder, device.address, say)
+        say.close()
+        with listen:
+            said = [(0, 0), *itertools.islice(_said(listen), rng.randint(0, 4))]
             time.sleep(rng.uniform(0.0, 0.2))  # not to wait for anything: the moment of the kill is what is random
             process.kill()
-            said += process.stdout.readlines()
-        acknowledged = [tuple(map(int, line.split())) for line in said if line.endswith("\n")]
-        return _checked(folder, known, device, *(acknowledged[-1] if acknowledged else (0, 0)))
+            said += _said(listen)
+        process.join()
+        return _checked(folder, known, device, *said[-1])
 
 
 def _checked(folder: Path, known: int, device: Simulated, wire_bytes: int, points: int) -> tuple[str, int]:
@@ -88,7 +110,4 @@ def soak(kills: int, seed: int) -> None:
 
 
 if __name__ == "__main__":
-    if sys.argv[1] == "record":
-        record_scan(Path(sys.argv[2]), sys.argv[3])
-    else:
-        soak(int(sys.argv[2]), seed=1)
+    soak(int(sys.argv[2]), seed=1)

@@ -1,9 +1,6 @@
 """`cmmlink run` with simulated devices from plan to exit code: every point is accounted for."""
 
 import dataclasses
-import json
-import subprocess
-import sys
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
@@ -16,6 +13,7 @@ from cmmlink.devices import decoder_of
 from cmmlink.errors import StoreError
 from cmmlink.record.reader import open_to_read, recorded_run
 from cmmlink.record.replay import replay_run
+from tests.cmmlink.command import cmmlink
 from tests.cmmlink.recorded import Script, record, scan_arrivals, today
 from tests.integration.simulated import Simulated, simulated
 
@@ -36,13 +34,9 @@ def run(folder: Path, device: str, *options: str) -> tuple[int, dict[str, Any], 
     np.savetxt(folder / "nominal.csv", PART_MM[::20], delimiter=",")
     plan = folder / "plan.yaml"
     plan.write_text(PLAN.format(device=device), encoding="utf-8")
-    done = command("run", str(plan), "--json", *options)
-    assert done.stdout, done.stderr
-    return done.returncode, json.loads(done.stdout), done.stderr
-
-
-def command(*words: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-m", "cmmlink", *words], cwd=ROOT, capture_output=True, text=True, timeout=100, check=False)
+    done = cmmlink("run", plan, "--json", *options)
+    assert done.out, done.err
+    return done.code, done.json(), done.err
 
 
 def scanned_oval(folder: Path, *options: str, name: str = "modbus-ring") -> AbstractContextManager[Simulated]:
@@ -99,9 +93,9 @@ def test_a_replay_reads_registers_as_the_map_of_that_day_told(tmp_path: Path) ->
     assert (code, facts["received"]) == (0, COUNT), errors
     for changed in (shipped.replace("1.0e-5", "2.0e-5"), "no map any more"):
         own.write_text(changed, encoding="utf-8")
-        again = command("replay", facts["run"], "--records", str(tmp_path), "--json")
-        assert again.returncode == 0, again.stderr
-        assert json.loads(again.stdout)["identical"] is True
+        again = cmmlink("replay", facts["run"], "--records", tmp_path, "--json")
+        assert again.code == 0, again.err
+        assert again.json()["identical"] is True
 
 
 def test_a_map_without_a_suffix_lies_beside_the_plan_and_is_replayed_without_it(tmp_path: Path) -> None:
@@ -111,9 +105,9 @@ def test_a_map_without_a_suffix_lies_beside_the_plan_and_is_replayed_without_it(
         code, facts, errors = run(tmp_path, f"{{type: modbus, map: mymap, address: '{device.address}'}}", "--records", str(tmp_path))
     assert (code, facts["received"]) == (0, COUNT), errors
     own.unlink()
-    again = command("replay", facts["run"], "--records", str(tmp_path), "--json")
-    assert again.returncode == 0, again.stderr
-    assert json.loads(again.stdout)["identical"] is True
+    again = cmmlink("replay", facts["run"], "--records", tmp_path, "--json")
+    assert again.code == 0, again.err
+    assert again.json()["identical"] is True
 
 
 def test_a_map_in_a_record_that_cannot_be_read_is_named_with_its_run(tmp_path: Path) -> None:
@@ -136,8 +130,5 @@ def test_a_map_with_a_mistake_is_named_with_its_file(tmp_path: Path) -> None:
     np.savetxt(tmp_path / "nominal.csv", PART_MM[::20], delimiter=",")
     plan = tmp_path / "plan.yaml"
     plan.write_text(PLAN.format(device="{type: modbus, map: mine.yaml, address: '127.0.0.1:1'}"), encoding="utf-8")
-    done = command("check", str(plan))
-    assert done.returncode == 2
-    mine = tmp_path / "mine.yaml"
-    assert f"plan.yaml: line 4: device: {mine}: line 2: pattern is 'newest'; expected 'latest', 'ring', 'queue' or 'fifo'" in done.stderr
-    assert "Traceback" not in done.stderr
+    mine, said = tmp_path / "mine.yaml", cmmlink("check", plan).refused()
+    assert f"plan.yaml: line 4: device: {mine}: line 2: pattern is 'newest'; expected 'latest', 'ring', 'queue' or 'fifo'" in said
