@@ -1,9 +1,13 @@
-"""Options that point the tests of devices at hardware, and those of the console at a browser."""
+"""Options that point the tests of devices at hardware, and those of the console at a browser; what all tests of a process share."""
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from hypothesis import settings
+
+if TYPE_CHECKING:
+    from inspection import NominalProfile, NurbsCurve
 
 settings.register_profile("no deadline", deadline=None)  # machines are noisy: no test asserts a time
 settings.load_profile("no deadline")
@@ -30,4 +34,30 @@ def _records_of_their_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[
     with pytest.MonkeyPatch.context() as patch:
         for name in ("XDG_DATA_HOME", "XDG_STATE_HOME", "WIN_PD_OVERRIDE_LOCAL_APPDATA"):
             patch.setenv(name, str(tmp_path_factory.mktemp("user-data")))
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _preparations_made_once() -> Iterator[None]:
+    """Discretise a nominal, and rehearse on it, once for all runs of a process: half their time goes there, and both have tests."""
+    from inspection import discretize, rehearse
+
+    made: dict[tuple[object, ...], NominalProfile] = {}
+    rehearsed: set[tuple[object, ...]] = set()
+
+    def discretize_once(curve: "NurbsCurve", *chosen: Any) -> "NominalProfile":
+        arrays = (curve.control_points_mm, curve.knots, curve.weights)
+        key = (curve.degree, curve.closed, *(b"" if array is None else array.tobytes() for array in arrays), *chosen)
+        if key not in made:
+            made[key] = discretize(curve, *chosen)
+        return made[key]
+
+    def rehearse_once(nominal: "NominalProfile", *chosen: Any) -> None:
+        if chosen not in rehearsed:
+            rehearse(nominal, *chosen)
+            rehearsed.add(chosen)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("cmmlink.from_plan.discretize", discretize_once)
+        patch.setattr("cmmlink.run.rehearse", rehearse_once)
         yield

@@ -29,11 +29,14 @@ ROOT = Path(__file__).resolve().parents[2]
 
 def start_recorder(folder: Path, address: str, say: Connection) -> multiprocessing.process.BaseProcess:
     """Start a process that records one scan. Where a system can fork, it is split off from one that has loaded everything once."""
-    can_fork = "forkserver" in multiprocessing.get_all_start_methods()
-    context = multiprocessing.get_context("forkserver" if can_fork else "spawn")
-    if can_fork:
-        context.set_forkserver_preload([__name__])
-    process = context.Process(target=record_scan, args=(folder, address, say))
+    arguments = (folder, address, say)
+    process: multiprocessing.process.BaseProcess
+    if "forkserver" in multiprocessing.get_all_start_methods():
+        forking = multiprocessing.get_context("forkserver")
+        forking.set_forkserver_preload([__name__])
+        process = forking.Process(target=record_scan, args=arguments)
+    else:
+        process = multiprocessing.get_context("spawn").Process(target=record_scan, args=arguments)
     process.start()
     return process
 
