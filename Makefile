@@ -7,7 +7,7 @@ INSTALL := $(PIP) --no-build-isolation --editable
 # The tests start a hundred processes; where Python may keep no compiled files, each of them compiles every file anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo install test lowest platforms upgrade bench paper soak proofs
+.PHONY: demo install test lowest platforms upgrade bench paper faults powercuts kills proofs
 demo: .venv/installed
 	$(BIN)/cmmlink demo --out demo-result
 
@@ -35,8 +35,19 @@ platforms: .venv/test-installed
 upgrade: .venv/test-installed
 	.ci/upgrade $(BIN)/uv
 
+# Every call of every command to the operating system fails once, before and after its work; a run is killed at every call.
+faults: .venv/test-installed
+	$(BIN)/python -m tests.integration.fail_once
+	$(BIN)/python -m tests.integration.fail_once --after
+	$(BIN)/python -m tests.integration.fail_once --kill
+
+# Power cuts at random moments of what SQLite writes, with unsynchronised sectors lost or swapped.
+CUTS ?= 2000
+powercuts: .venv/test-installed
+	$(BIN)/python -m tests.integration.power_cuts $(CUTS)
+
 # A hundred recording processes killed at random moments; every acknowledged point must be there.
-soak: .venv/test-installed
+kills: .venv/test-installed
 	$(BIN)/python -m tests.integration.killed soak 100
 
 # The proof in mid-scan over 1,200 simulated scans of six kinds, 200 each: no part that passes may be proven out.

@@ -5,6 +5,7 @@ newest take the place of those that wait. A proof found is for display: the fina
 """
 
 import threading
+from contextlib import suppress
 
 from inspection import LiveInspection, Prefix
 
@@ -50,8 +51,10 @@ class LiveProof:
         if prefix is None:
             return
         if self._thread is None:
-            self._thread = threading.Thread(target=self._seek, name="proof", daemon=True)
-            self._thread.start()
+            seeker = threading.Thread(target=self._seek, name="proof", daemon=True)
+            with suppress(RuntimeError):  # the system has no thread to give: the run goes on without a proof in mid-scan
+                seeker.start()
+                self._thread = seeker
         with self._handed:
             self._waiting = prefix
             self._handed.notify()

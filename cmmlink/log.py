@@ -47,14 +47,15 @@ def keep_log(folder: Path) -> Iterator[None]:
     ours.setLevel(logging.INFO)
     ours.propagate = False  # never onto standard error, whatever else is installed
     ours.addHandler(into_queue)
-    writer.start()
+    is_writing = _begin_to_write(writer)
     try:
         yield
     finally:
         ours.removeHandler(into_queue)
         ours.setLevel(level)
         ours.propagate = propagate
-        writer.stop()
+        if is_writing:
+            writer.stop()
         for handler in writer.handlers:
             handler.close()
 
@@ -97,6 +98,15 @@ class _SilentFile(RotatingFileHandler):
 
     def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802
         """Give up on one line."""
+
+
+def _begin_to_write(writer: QueueListener) -> bool:
+    """Start the thread that writes; tell whether the system has one to give."""
+    try:
+        writer.start()
+    except RuntimeError:
+        return False
+    return True
 
 
 def _handler(folder: Path) -> logging.Handler:

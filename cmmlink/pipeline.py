@@ -108,7 +108,7 @@ def run_inspection(
     tally = _Tally()
     try:
         _publish(sinks, started)
-        reader.start()
+        _start(reader, failures, acquired)
         with LiveProof(live) as proof:
             _judge_all(source, live, proof, sinks, buffer, tally, acquired, clock, stop, watch)
     finally:
@@ -123,6 +123,15 @@ def run_inspection(
     counts = tally.counts(judged, reasons, buffer)
     _publish(sinks, RunFinished(ending, result, counts, str(failure or refusal or "")))
     return RunOutcome(ending, result, counts, failure, refusal)
+
+
+def _start(reader: threading.Thread, failures: list[DeviceError], acquired: threading.Event) -> None:
+    """Start reading the device; where the system has no thread to give, acquisition has failed and is over."""
+    try:
+        reader.start()
+    except RuntimeError as error:
+        failures.append(DeviceError(f"the device cannot be read: {error}; close other programs"))
+        acquired.set()
 
 
 def _acquire(

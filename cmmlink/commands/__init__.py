@@ -97,6 +97,8 @@ def _run_command() -> int | str | None:
     except OSError as error:
         code = fail(str(error) if error.filename else f"the answer could not be written: {error}", UNUSABLE)
         _silence_stdout()
+    except MemoryError:
+        code = fail("this computer has too little memory left for it; close other programs, or take fewer points at once", UNUSABLE)
     except SystemExit as ended:  # typer ends with 1 when standard output was closed, but 1 means nonconform here
         code = UNUSABLE if ended.code == 1 else ended.code
     except Exception as error:  # Python would end with 1, which means nonconform here
@@ -117,7 +119,8 @@ def _prepare_streams() -> None:
 def _silence_stdout() -> None:
     """Point a broken stdout at the null device, so that the final flush does not fail again."""
     with suppress(OSError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        broken = sys.stdout.fileno()
+        os.dup2(os.open(os.devnull, os.O_WRONLY), broken)
 
 
 def _say_that_it_compiles() -> None:

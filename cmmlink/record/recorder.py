@@ -176,9 +176,18 @@ class Recorder:
             "nominal": inputs.nominal_name,
             "nominal_sha256": hashlib.sha256(inputs.nominal).hexdigest(),
         }
-        self._store.append([self._draft("run", pack_document(header)), self._draft("plan", plan), self._draft("nominal", inputs.nominal)])
-        self._writer = threading.Thread(target=self._write, name="record", daemon=True)
-        self._writer.start()
+        writer = threading.Thread(target=self._write, name="record", daemon=True)
+        try:
+            writer.start()  # before anything is recorded: where the system has no thread to give, there is no run
+        except RuntimeError as error:
+            raise StoreError(f"{self._store.path}: no record can be kept: {error}; close other programs") from error
+        self._writer = writer
+        try:
+            head = [self._draft("run", pack_document(header)), self._draft("plan", plan), self._draft("nominal", inputs.nominal)]
+            self._store.append(head)
+        except BaseException:
+            self._stop_writing()
+            raise
 
     def _hand(self, item: "Arrived | _Pose", size: int) -> None:
         if not self._queue.give(item, size):

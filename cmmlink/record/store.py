@@ -249,6 +249,8 @@ def _translate_errors(path: Path) -> Iterator[None]:
         yield
     except sqlite3.Error as error:
         raise StoreError(f"{path}: {_reason(error, path)}") from error
+    except MemoryError as error:
+        raise StoreError(f"{path}: this computer has too little memory left; close other programs") from error
 
 
 def _reason(error: sqlite3.Error, path: Path) -> str:
