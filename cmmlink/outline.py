@@ -17,10 +17,14 @@ _DIRECTIONS = 180
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outline:
-    """The contours to be judged, what is to be said about the choice, and why they are not judged, if they cannot be the part."""
+    """The contours to be judged, what is to be said about the choice, and why they are not judged, if they cannot be the part.
+
+    rivals : other contours that can be the part as well, each for itself
+    """
 
     contours: tuple[Contour, ...]
     notes: tuple[str, ...] = ()
+    rivals: tuple[Contour, ...] = ()
     refusal: RegistrationError | None = None
 
 
@@ -41,6 +45,7 @@ class _Shape:
 def outline_of(cut: SurfaceSection, profile: NominalProfile) -> Outline:
     """Choose the outer contour that is most like the nominal; where the outline is torn open, all open pieces together.
 
+    Where no outer contour is like it, but one inside another is, that one is the part: in a shell scanned without its inner wall.
     A nominal that does not go round has no size to compare with: the longest outer contour is taken.
     """
     outer = cut.outer()
@@ -48,15 +53,30 @@ def outline_of(cut: SurfaceSection, profile: NominalProfile) -> Outline:
     if not goes_round(profile.curve):
         return _unless_endless(cut, open_pieces if outer and not outer[0].closed else outer[:1], profile)
     nominal = _shape(_points_on(profile), profile.length_mm)
-    closed = [(_shape(contour.section_mm, contour.length_mm).apart(nominal), contour) for contour in outer if contour.closed]
-    closed.sort(key=lambda candidate: candidate[0])
-    alike = [contour for apart, contour in closed if apart < _LENGTHS_APART]
-    if alike:
-        return Outline((alike[0],), _several(cut, alike))
+    for inside in (False, True):
+        alike = _alike([contour for contour in cut.contours if contour.closed and contour.hole == inside], nominal)
+        if alike:
+            return Outline((alike[0],), (*_inside(cut, inside), *_several(cut, alike)), tuple(alike[1:]))
     longest_is_open = bool(outer) and not outer[0].closed
     if longest_is_open or _LEAST_OPEN < sum(piece.length_mm for piece in open_pieces) / profile.length_mm < _LENGTHS_APART:
         return _unless_endless(cut, open_pieces, profile)
     return Outline(outer[:1], refusal=_other_part(cut, outer[0], profile) if outer else None)
+
+
+def _alike(contours: list[Contour], nominal: _Shape) -> list[Contour]:
+    """The closed contours that can be a section of the nominal, the most alike first."""
+    closed = [(_shape(contour.section_mm, contour.length_mm).apart(nominal), contour) for contour in contours]
+    closed.sort(key=lambda candidate: candidate[0])
+    return [contour for apart, contour in closed if apart < _LENGTHS_APART]
+
+
+def _inside(cut: SurfaceSection, inside: bool) -> tuple[str, ...]:
+    if not inside:
+        return ()
+    return (
+        f"at height {cut.asked_mm:g} mm the contour like the nominal lies inside another: it was taken for a part in a shell without an "
+        "inner wall. If it is a hole in that part, the material is on its other side: say so (--material)",
+    )
 
 
 def _unless_endless(cut: SurfaceSection, contours: tuple[Contour, ...], profile: NominalProfile) -> Outline:
@@ -69,11 +89,16 @@ def _unless_endless(cut: SurfaceSection, contours: tuple[Contour, ...], profile:
 def _several(cut: SurfaceSection, alike: list[Contour]) -> tuple[str, ...]:
     if len(alike) == 1:
         return ()
-    x, y, z = alike[0].points_mm.mean(axis=0)
     return (
-        f"{len(alike)} contours at height {cut.asked_mm:g} mm can be the section of the part: the one around ({x:.1f}, {y:.1f}, {z:.1f}), "
-        "most like the nominal in length and size, was judged. Cut other parts off the surface if that is not the one",
+        f"{len(alike)} contours at height {cut.asked_mm:g} mm can be the section of the part: the one around {place_of(alike[0])}, "
+        "most like the nominal in length and size, is judged first; where their verdicts differ, none is proven. Cut other parts off",
     )
+
+
+def place_of(contour: Contour) -> str:
+    """The middle of a contour, for people."""
+    x, y, z = contour.points_mm.mean(axis=0)
+    return f"({x:.1f}, {y:.1f}, {z:.1f})"
 
 
 def _other_part(cut: SurfaceSection, longest: Contour, profile: NominalProfile) -> RegistrationError:

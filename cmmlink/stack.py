@@ -8,7 +8,7 @@ import logging
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -19,12 +19,12 @@ from cmmlink.buffer import CAPACITY_POINTS
 from cmmlink.errors import PlanError
 from cmmlink.events import Counts
 from cmmlink.from_plan import discretize_file, load_from, run_started, section_inspection_of
-from cmmlink.outline import Outline, outline_of
+from cmmlink.outline import Outline, outline_of, place_of
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan import CtPlan, Discretisation
 from cmmlink.result_folder import folder_of
 from cmmlink.result_json import result_json
-from cmmlink.words import utc_words
+from cmmlink.words import VERDICT_WORDS, utc_words
 from drivers.surface import (
     Contour,
     ContourSource,
@@ -40,7 +40,7 @@ from drivers.surface import (
     read_obj,
     read_stl,
 )
-from inspection import NominalProfile, RegistrationError, SectionPlane, Verdict
+from inspection import NominalProfile, Reason, RegistrationError, SectionPlane, Verdict
 
 _log = logging.getLogger(__name__)
 
@@ -157,7 +157,7 @@ def inspect_stack(
         read_in = [f"{plan.mesh.file.name}: read in {plan.mesh.unit}, as asked"] if plan.mesh.unit else []
         notes = [*read_in, *mesh.warnings, *profiles.notes]
         sections = []
-        for cut in _slices(plan, mesh, heights, open3d, notes):
+        for cut in _slices(plan, mesh, heights, open3d, notes, profiles.shortest_mm):
             sections.append(_inspect(plan, cut, profiles, clock, stop))
             on_section(sections[-1])
             if stop.is_set():
@@ -234,6 +234,11 @@ class _Profiles:
         for path in (plan.nominal.file, *self._own.values()):
             self._load(path)
 
+    @property
+    def shortest_mm(self) -> float:
+        """The length of the shortest nominal."""
+        return min(profile.length_mm for profile in self._profiles.values())
+
     def at(self, height_mm: float) -> tuple[Path, NominalProfile]:
         near = [path for height, path in self._own.items() if abs(height - height_mm) <= _SAME_HEIGHT_MM]
         path = near[0] if near else self._plan.nominal.file
@@ -247,22 +252,28 @@ class _Profiles:
 
 
 def _slices(
-    plan: CtPlan, mesh: SurfaceMesh, heights: list[float], open3d: Callable[[], Open3DProcess], notes: list[str]
+    plan: CtPlan,
+    mesh: SurfaceMesh,
+    heights: list[float],
+    open3d: Callable[[], Open3DProcess],
+    notes: list[str],
+    part_mm: float,
 ) -> Iterator[SurfaceSection]:
     """Slices by the cutter of the plan; where Open3D is missing or breaks down, the rest by numpy, and a note says so."""
     cutter = _cutter(plan, len(heights), open3d, notes)
     done = 0
     try:
-        for cut in _cut(plan, mesh, heights, cutter):
+        for cut in _cut(plan, mesh, heights, cutter, part_mm):
             yield cut
             done += 1
     except Open3DMissing as error:
         notes.append(f"sections from {heights[done]:g} mm on were cut by numpy: {error}")
-        yield from _cut(plan, mesh, heights[done:], NumpyCutter())
+        yield from _cut(plan, mesh, heights[done:], NumpyCutter(), part_mm)
 
 
-def _cut(plan: CtPlan, mesh: SurfaceMesh, heights: list[float], cutter: Cutter) -> Iterator[SurfaceSection]:
-    return cut_surface(mesh, plan.sections.normal, heights, cutter=cutter, weld_mm=plan.cut.weld_mm, shortest_mm=plan.cut.shortest_mm)
+def _cut(plan: CtPlan, mesh: SurfaceMesh, heights: list[float], cutter: Cutter, part_mm: float) -> Iterator[SurfaceSection]:
+    weld_mm, shortest_mm = plan.cut.weld_mm, plan.cut.shortest_mm
+    return cut_surface(mesh, plan.sections.normal, heights, cutter=cutter, weld_mm=weld_mm, shortest_mm=shortest_mm, part_mm=part_mm)
 
 
 def _cutter(plan: CtPlan, sections: int, open3d: Callable[[], Open3DProcess], notes: list[str]) -> Cutter:
@@ -284,12 +295,18 @@ def _inspect(plan: CtPlan, cut: SurfaceSection, profiles: _Profiles, clock: Call
     path, profile = profiles.at(cut.asked_mm)
     outline = outline_of(cut, profile)
     spacing_mm = profile.length_mm / _LEAST_POINTS
-    judged = outline.contours
-    if outline.refusal is None:  # what cannot be the part may be long beyond all bounds
-        judged = tuple(add_points_between(contour, spacing_mm) for contour in judged)
-    run = _refuse_outline(judged, outline.refusal) if outline.refusal else _run(plan, cut, judged, profile, clock, stop)
-    warnings = list(_warnings(cut, outline, run))
-    if _points_in(judged) > _points_in(outline.contours):
+    if outline.refusal is not None:  # what cannot be the part may be long beyond all bounds: no points are set between its corners
+        refused = _refuse_outline(outline.contours, outline.refusal)
+        return SectionOutcome(cut, outline.contours, path, profile, refused, tuple(_warnings(cut, outline.contours, outline, refused)))
+    runs = []
+    for contours in (outline.contours, *((rival,) for rival in outline.rivals)):
+        judged = tuple(add_points_between(contour, spacing_mm) for contour in contours)
+        runs.append((contours, judged, _run(plan, cut, judged, profile, clock, stop)))
+    runs.sort(key=lambda each: each[2].result is None)  # those that fit first; the most alike stays before the others
+    contours, judged, run = runs[0]
+    run = _doubt_outline(run, contours, [(other, its_run) for other, _, its_run in runs[1:]])
+    warnings = list(_warnings(cut, contours, outline, run))
+    if _points_in(judged) > _points_in(contours):
         warnings.append(f"a coarse surface: points were set between its corners, no farther apart than {spacing_mm:.3f} mm")
     return SectionOutcome(cut, judged, path, profile, run, tuple(warnings))
 
@@ -309,6 +326,20 @@ def _run(
     return run_inspection(source, live, [], started, buffer_points=CAPACITY_POINTS, clock=clock, stop=stop)
 
 
+def _doubt_outline(run: RunOutcome, judged: tuple[Contour, ...], others: list[tuple[tuple[Contour, ...], RunOutcome]]) -> RunOutcome:
+    """Doubt the verdict on a section where another contour that can be the part, and fits the nominal, has another verdict."""
+    for contours, other in others:
+        if run.result is None or other.result is None or other.result.verdict is run.result.verdict:
+            continue
+        words = (
+            f"Which contour is the part is not known: the one around {place_of(judged[0])} is {VERDICT_WORDS[run.result.verdict]}, "
+            f"the one around {place_of(contours[0])} {VERDICT_WORDS[other.result.verdict]}."
+        )
+        reasons = (Reason("outline", words), *run.result.reasons)
+        return replace(run, result=replace(run.result, verdict=Verdict.UNCERTAIN, reasons=reasons))
+    return run
+
+
 def _refuse_outline(judged: tuple[Contour, ...], refusal: RegistrationError) -> RunOutcome:
     count = _points_in(judged)
     counts = Counts(received=count, rejected=count, rejected_by_reason={"not registered": count})
@@ -319,10 +350,10 @@ def _points_in(contours: tuple[Contour, ...]) -> int:
     return sum(len(contour.points_mm) for contour in contours)
 
 
-def _warnings(cut: SurfaceSection, outline: Outline, run: RunOutcome) -> Iterator[str]:
+def _warnings(cut: SurfaceSection, judged: tuple[Contour, ...], outline: Outline, run: RunOutcome) -> Iterator[str]:
     yield from cut.warnings
     yield from outline.notes
-    beside = [contour for contour in cut.contours if not any(contour is part for part in outline.contours)]
+    beside = [contour for contour in cut.contours if not any(contour is part for part in judged)]
     if beside:
         holes = sum(contour.hole for contour in beside)
         longest = beside[0].length_mm

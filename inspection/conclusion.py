@@ -25,6 +25,7 @@ ReasonKind = Literal[
     "coverage",
     "gap",
     "fit",
+    "outline",
 ]
 
 

@@ -74,7 +74,8 @@ class Cut(Settings):
     )
     weld_mm: Positive = Field(default=1e-6, description="loose ends no farther apart than this are one point")
     shortest_mm: Annotated[float, Field(ge=0)] | None = Field(
-        default=None, description="pieces shorter than this are dust; null: 5 % of the section's longest"
+        default=None,
+        description="pieces shorter than this are dust; null: 5 % of the section's longest, but of no more than 1.5 times the nominal",
     )
 
 

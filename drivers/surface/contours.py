@@ -17,6 +17,7 @@ from drivers.surface.branches import ends_that_go_on
 from drivers.surface.nesting import nest
 
 _ROUNDED = 4.0  # steps of float32, in which surfaces are stored: shells that touch may reach so far into each other by rounding
+_OUTLINE = 1.5  # of the part's length: a noisy outline is no longer
 _DUST_SHARE = 0.05  # of the longest piece; specks of a few voxels and the shells that noise makes stay well below
 
 
@@ -67,11 +68,17 @@ class _Graph:
 
 
 def chain_sections(
-    segments_mm: NDArray[np.float64], plane: NDArray[np.intp], planes: int, weld_mm: float, shortest_mm: float | None
+    segments_mm: NDArray[np.float64],
+    plane: NDArray[np.intp],
+    planes: int,
+    weld_mm: float,
+    shortest_mm: float | None,
+    part_mm: float = np.inf,
 ) -> list[ChainedSection]:
     """Chain segments (s, 2, 2) into one result for each section; `plane` (s,) tells to which section a segment belongs.
 
-    `shortest_mm` is the length below which a piece is set aside; None takes 5 % of the section's longest piece.
+    `shortest_mm` is the length below which a piece is set aside; None takes 5 % of the section's longest piece, but no more than of
+    an outline half as long again as that of the part, `part_mm`: what is scanned with a part may be as long as it likes.
     """
     nodes_mm, plane_of, ends = _weld(segments_mm, plane, weld_mm)
     moved = ends[:, 0] != ends[:, 1]
@@ -84,7 +91,7 @@ def chain_sections(
         edges = _drop_repeats(_join_ends(nodes_mm, plane_of, edges, weld_mm), len(nodes_mm))
         degree = np.bincount(edges.ravel(), minlength=len(nodes_mm))
     branches = np.flatnonzero(degree > 2)
-    pieces = _order(_split_branches(_Graph(nodes_mm, plane_of, edges), degree), planes, shortest_mm)
+    pieces = _order(_split_branches(_Graph(nodes_mm, plane_of, edges), degree), planes, shortest_mm, _OUTLINE * part_mm)
     zero = np.bincount(plane[~moved], minlength=planes)
     kept = np.bincount(plane_of[edges[:, 0]], minlength=planes)
     repeated = np.bincount(plane[moved], minlength=planes) - kept + np.bincount(pieces.doubled_plane, minlength=planes)
@@ -176,7 +183,7 @@ class _Pieces:
     doubled_plane: NDArray[np.intp]
 
 
-def _order(graph: _Graph, planes: int, shortest_mm: float | None) -> _Pieces:
+def _order(graph: _Graph, planes: int, shortest_mm: float | None, most_mm: float) -> _Pieces:
     """Sort the lines and rings by length against the limit and walk those that are kept."""
     v, edges = len(graph.nodes_mm), graph.edges
     count, label = connected_components(_adjacency(edges, v), directed=False)
@@ -190,7 +197,7 @@ def _order(graph: _Graph, planes: int, shortest_mm: float | None) -> _Pieces:
     section[label] = graph.plane
     limit = np.zeros(planes)
     np.maximum.at(limit, section, length)
-    limit = limit * _DUST_SHARE if shortest_mm is None else np.full(planes, shortest_mm)
+    limit = np.minimum(limit, most_mm) * _DUST_SHARE if shortest_mm is None else np.full(planes, shortest_mm)
     there = edges_in > 0  # false for what zero-length segments leave behind
     keep = there & (length >= limit[section])
     aside = there & ~keep

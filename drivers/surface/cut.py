@@ -48,12 +48,14 @@ def cut_surface(
     cutter: Cutter,
     weld_mm: float = WELD_MM,
     shortest_mm: float | None = None,
+    part_mm: float = np.inf,
     workers: int = 2,
 ) -> Iterator[SurfaceSection]:
     """Cut by the planes of these heights along the unit normal; sections come in the order of the heights.
 
     `cutter` is a `NumpyCutter` or an `Open3DProcess`. Loose ends within `weld_mm` are one point;
-    pieces shorter than `shortest_mm` (None: 5 % of the section's longest) are set aside and counted.
+    pieces shorter than `shortest_mm` (None: 5 % of the section's longest, but see `chain_sections` for `part_mm`, the length of the
+    part's outline) are set aside and counted.
     Raises `MeshError` for a plane that misses the surface.
     """
     axes = axes_of(normal)
@@ -68,7 +70,7 @@ def cut_surface(
         where = slice(starts[first], starts[last])
         triangles = _to_plane(corners[where], axes, moved[plane[where]])
         segments, of_plane = _cut_each(cutter, triangles, plane[where] - first, last - first)
-        chained = chain_sections(segments, of_plane, last - first, weld_mm, shortest_mm)
+        chained = chain_sections(segments, of_plane, last - first, weld_mm, shortest_mm, part_mm)
         counts = np.diff(starts[first : last + 1]).tolist()
         levels = zip(heights[first:last].tolist(), moved[first:last].tolist(), counts, strict=True)
         return [_section(each, axes, *level, cutter.name) for each, level in zip(chained, levels, strict=True)]

@@ -258,6 +258,41 @@ def test_two_parts_on_one_surface_are_told(tmp_path: Path, spline: BSpline) -> N
     section = blade_with(tmp_path, spline, second)
     assert len(section.judged) == 1
     assert any("2 contours at height 5 mm can be the section of the part" in text for text in section.warnings)
+    assert section.verdict is Verdict.CONFORM  # both do
+
+
+def test_two_parts_of_which_one_is_bad_are_no_proof(tmp_path: Path, spline: BSpline) -> None:
+    bad = outline_points(spline) + np.array([0.0, 100.0])
+    middle = bad.mean(axis=0)
+    out = (bad - middle) / np.linalg.norm(bad - middle, axis=1)[:, None]
+    bad[100:140] += 0.5 * np.sin(np.linspace(0, np.pi, 40))[:, None] * out[100:140]
+    section = blade_with(tmp_path, spline, tube(bad, np.array([0.0, 20.0])))
+    assert section.verdict is Verdict.UNCERTAIN
+    reason = section.result_json()["reasons"][0]
+    assert reason["kind"] == "outline"
+    assert "is CONFORM" in reason["words"]
+    assert "NOT CONFORM" in reason["words"]
+
+
+def test_a_contour_as_long_that_does_not_fit_is_no_rival(tmp_path: Path, spline: BSpline) -> None:
+    mirrored = outline_points(spline)[::-1] * np.array([1.0, -1.0]) + np.array([0.0, 100.0])
+    section = blade_with(tmp_path, spline, tube(mirrored, np.array([0.0, 20.0])))
+    assert section.verdict is Verdict.CONFORM
+    assert section.judged[0].points_mm[:, 1].mean() < 50.0
+
+
+@pytest.mark.parametrize("radius", [50.0, 450.0])
+def test_a_part_in_a_shell_without_an_inner_wall_is_judged_and_said(tmp_path: Path, spline: BSpline, radius: float) -> None:
+    shell = tube(circle(radius, outline_points(spline).mean(axis=0)), np.array([0.0, 20.0]))
+    section = blade_with(tmp_path, spline, shell)
+    assert section.verdict is Verdict.CONFORM
+    assert section.judged[0].length_mm == pytest.approx(length_mm(outline_points(spline)), abs=1e-3)
+    assert any("a part in a shell without an inner wall" in text for text in section.warnings)
+
+
+def test_a_part_on_a_large_table_is_no_dust(tmp_path: Path, spline: BSpline) -> None:
+    section = blade_with(tmp_path, spline, box((-900.0, -40.0, -1.0), (900.0, -30.0, 21.0)))
+    assert section.verdict is Verdict.CONFORM
 
 
 def test_one_section_that_fits_nothing_does_not_spoil_the_others(tmp_path: Path, spline: BSpline) -> None:
