@@ -7,7 +7,7 @@ INSTALL := $(PIP) --no-build-isolation --editable
 # The tests start a hundred processes; where Python may keep no compiled files, each of them compiles every file anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo install test lowest platforms upgrade bench paper faults powercuts kills proofs
+.PHONY: demo install test lowest platforms upgrade bench paper faults powercuts kills proofs laws audit
 demo: .venv/installed
 	$(BIN)/cmmlink demo --out demo-result
 
@@ -53,6 +53,14 @@ kills: .venv/test-installed
 # The proof in mid-scan over 1,200 simulated scans of six kinds, 200 each: no part that passes may be proven out.
 proofs: .venv/test-installed
 	$(BIN)/python -m tests.benchmarks.live_proof 200
+
+# The two laws over every source, format and surface, with thirty times as many random cases as `make test` tries.
+laws: .venv/test-installed
+	$(BIN)/pytest --hypothesis-profile=laws tests/integration/test_laws.py tests/integration/test_laws_of_files.py
+
+# The audit of verdicts: live scans, minimum zones, partial scans and mirrored parts whose truth is known.
+audit: .venv/test-installed
+	$(BIN)/python -m tests.benchmarks.verdict_audit
 
 # Ours against the rivals of the package index, in one run; takes some minutes and wants a quiet machine.
 bench: .venv/bench-installed

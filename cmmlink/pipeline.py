@@ -15,7 +15,7 @@ from cmmlink.buffer import Buffer
 from cmmlink.events import Arrived, Counts, Ending, Event, Judged, ProvenOut, RunFinished, RunStarted, Sink
 from cmmlink.live_proof import LiveProof
 from drivers import HARMLESS_REASONS, Arrival, Damaged, DeviceError, Lost, PointBatch, Rejected, ScanClosed, ScanOpened, ScanSource
-from inspection import InspectionError, InspectionResult, LiveInspection, Missing, Rejection, Verdict
+from inspection import InspectionError, InspectionResult, LiveInspection, Missing, Rejection, Verdict, reasons_of_abort
 
 _LOOK_S = 0.05  # how often the run looks whether it was asked to stop
 _MOST_AT_ONCE = 4096  # points judged at once when many wait; more would keep the sinks waiting for news
@@ -46,6 +46,7 @@ class _Tally:
     lost: int = 0
     damaged_bytes: int = 0
     announced: int | None = None
+    begun: int = 1
 
     def add(self, arrival: Arrival) -> None:
         if isinstance(arrival, PointBatch):
@@ -57,16 +58,21 @@ class _Tally:
             self.lost += arrival.count
         elif isinstance(arrival, Damaged):
             self.damaged_bytes += arrival.byte_count
-        elif isinstance(arrival, ScanOpened) and arrival.expected is not None:
-            self.announced = max(self.announced or 0, arrival.expected)
+        elif isinstance(arrival, ScanOpened):
+            self.begun += self._arrived > 0
+            self.announced = max(self.announced or 0, arrival.expected or 0) or None
         elif isinstance(arrival, ScanClosed) and arrival.sent is not None:
             self.announced = max(self.announced or 0, arrival.sent)
 
+    @property
+    def _arrived(self) -> int:
+        """Points of the scan that came, used or not."""
+        return self.received - sum(count for reason, count in self.rejected_by_driver.items() if reason in HARMLESS_REASONS)
+
     def missing(self) -> Missing:
         """What is known to be missing of the scan. A point that came twice, or is not of the scan, is not."""
-        harmless = sum(count for reason, count in self.rejected_by_driver.items() if reason in HARMLESS_REASONS)
-        rejected = {reason: count for reason, count in self.rejected_by_driver.items() if reason not in HARMLESS_REASONS}
-        return Missing(self.lost, self.damaged_bytes, rejected, self.announced, self.received - harmless)
+        rejected = {reason: count for reason, count in self.rejected_by_driver.items() if count and reason not in HARMLESS_REASONS}
+        return Missing(self.lost, self.damaged_bytes, rejected, self.announced, self._arrived, self.begun)
 
     def counts(self, judged: int, rejected_by_reason: dict[str, int], buffer: "Buffer[tuple[float, Arrival]]") -> Counts:
         reasons = Counter(self.rejected_by_driver)
@@ -111,6 +117,7 @@ def run_inspection(
         _start(reader, failures, acquired)
         with LiveProof(live) as proof:
             _judge_all(source, live, proof, sinks, buffer, tally, acquired, clock, stop, watch)
+            proven_out = proof.refuted is not None
     finally:
         source.stop()
         buffer.close()
@@ -118,7 +125,7 @@ def run_inspection(
             reader.join()
     failure = failures[0] if failures else None
     ending: Ending = "interrupted" if failure else "aborted" if stop.is_set() else "complete"
-    result, refusal = _finish(live, ending, tally.missing())
+    result, refusal = _finish(live, ending, tally.missing(), proven_out)
     judged, reasons = (result.judged, result.rejected_by_reason) if result else (0, _reasons_without_pose(live))
     counts = tally.counts(judged, reasons, buffer)
     _publish(sinks, RunFinished(ending, result, counts, str(failure or refusal or "")))
@@ -213,13 +220,18 @@ def _reasons_without_pose(live: LiveInspection) -> dict[str, int]:
     return reasons | ({"not registered": left} if left else {})
 
 
-def _finish(live: LiveInspection, ending: Ending, missing: Missing) -> tuple[InspectionResult | None, InspectionError | None]:
-    """The result of a run. What the operator aborted proves nothing, whatever was out by then: the part may have slipped."""
+def _finish(
+    live: LiveInspection, ending: Ending, missing: Missing, proven_out: bool
+) -> tuple[InspectionResult | None, InspectionError | None]:
+    """The result of a run. What the operator aborted has no verdict, whatever was out by then: the part may have slipped."""
     try:
         result = live.finish(complete=ending == "complete", missing=missing)
     except InspectionError as error:
         return None, error
-    return (replace(result, verdict=Verdict.UNCERTAIN) if ending == "aborted" else result), None
+    if ending != "aborted":
+        return result, None
+    reasons = reasons_of_abort(result.reasons, proven_out or result.verdict == Verdict.NONCONFORM)
+    return replace(result, verdict=Verdict.UNCERTAIN, reasons=reasons), None
 
 
 def _publish(sinks: Sequence[Sink], event: Event) -> None:

@@ -16,11 +16,9 @@ from numpy.typing import NDArray
 FRAME_REPEATED = "frame repeated"
 POINT_REPEATED = "point repeated"
 VALUE_REPEATED = "value repeated"
-AFTER_THE_END = "sent after the end of the scan"
 OLDER_THAN_THE_SCAN = "older than the scan"
-BEFORE_THE_OUTPUTS = "came before the sensor told its outputs"
-HARMLESS_REASONS = frozenset({FRAME_REPEATED, POINT_REPEATED, VALUE_REPEATED, AFTER_THE_END, OLDER_THAN_THE_SCAN, BEFORE_THE_OUTPUTS})
-"""Reasons of `Rejected` by which no point of this scan is missing: exact repetitions, and what belongs to no point of it."""
+HARMLESS_REASONS = frozenset({FRAME_REPEATED, POINT_REPEATED, VALUE_REPEATED, OLDER_THAN_THE_SCAN})
+"""Reasons of `Rejected` by which no point of this scan is missing: repetitions, and what was provably taken before it."""
 
 
 @dataclass(frozen=True, slots=True)

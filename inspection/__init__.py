@@ -5,7 +5,7 @@ This is the front door: an application imports what `__all__` lists and none of 
 
 from inspection import synthetic
 from inspection.coarse import register_coarse
-from inspection.conclusion import Missing, Reason
+from inspection.conclusion import Missing, Reason, reasons_of_abort
 from inspection.curve import NurbsCurve
 from inspection.curve_check import CurveCheck, Hollow, check_curve
 from inspection.deviations import Deviations, deviations, profile_error_mm
@@ -73,6 +73,7 @@ __all__ = [
     "find_crossings",
     "fit_minimum_zone",
     "profile_error_mm",
+    "reasons_of_abort",
     "register",
     "register_coarse",
     "register_fine",

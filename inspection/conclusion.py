@@ -17,7 +17,10 @@ ReasonKind = Literal[
     "within-uncertainty",
     "placement",
     "nothing-judged",
+    "aborted",
+    "proven-out",
     "incomplete",
+    "begun-anew",
     "missing",
     "announced",
     "rejected",
@@ -54,6 +57,7 @@ class Missing:
     rejected      : points that arrived whole and could not be used, by reason
     announced     : points that the device announced, or said to have sent; None where it said nothing
     arrived       : points that arrived, used or not
+    begun         : scans that the device began within the run; the points of a second one may be of another part
     """
 
     lost: int = 0
@@ -61,6 +65,7 @@ class Missing:
     rejected: Mapping[str, int] = field(default_factory=dict)
     announced: int | None = None
     arrived: int = 0
+    begun: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,13 +96,11 @@ class Findings:
 class Limits:
     """What may be missing before conformity is not proven any more.
 
-    measured_gap_mm : the longest gap that counts as measured
-    gap_max_mm      : the longest gap that conformity allows; infinite where nobody asked for coverage
+    gap_max_mm      : the longest gap that counts as measured, and that conformity allows
     allow_unseen_mm : the longest stretch that may be unseen where points are known to be missing; None allows none
     """
 
     coverage_min: float
-    measured_gap_mm: float
     gap_max_mm: float
     end_allowance_mm: float
     allow_unseen_mm: float | None
@@ -113,6 +116,8 @@ def conclude(found: Findings, missing: Missing, limits: Limits, complete: bool) 
         reasons.append(Reason("nothing-judged", "No point was judged."))
     if not complete:
         reasons.append(Reason("incomplete", "The scan did not come to its end."))
+    if missing.begun > 1:
+        reasons.append(Reason("begun-anew", f"The device began anew: points of {missing.begun} scans were judged together."))
     if limits.allow_unseen_mm is None or found.gap.length_mm > limits.allow_unseen_mm:
         reasons += _missing_points(found, missing, limits.allow_unseen_mm)
     reasons += _unmeasured(found, limits)
@@ -120,6 +125,16 @@ def conclude(found: Findings, missing: Missing, limits: Limits, complete: bool) 
         reasons.append(Reason("fit", "The fit did not settle: the pose is not the best one."))
     doubtful = Verdict.UNCERTAIN if reasons else Verdict.CONFORM
     return Conclusion(max(found.points, doubtful), tuple(reasons))
+
+
+def reasons_of_abort(reasons: tuple[Reason, ...], proven_out: bool) -> tuple[Reason, ...]:
+    """The reasons of a run that the operator aborted, which has no verdict, whatever was found until then.
+
+    proven_out : it was proven before the abort that the part fails
+    """
+    before = "Before that it was proven that the part fails: no placement of the points received until then passes."
+    told = [Reason("aborted", "The operator aborted the run, so there is no verdict.")]
+    return (*told, *([Reason("proven-out", before)] if proven_out else []), *reasons)
 
 
 def word_points(zone: ToleranceZone, beyond: int, within_uncertainty: int) -> Reason | None:

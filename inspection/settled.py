@@ -20,6 +20,7 @@ from inspection.tolerance import Verdict
 
 Array = NDArray[np.float64]
 
+_PLACED = 0.95  # share of the length whose points place the part, where the plan asks for no coverage
 _MOST_BOXES = 200_000  # of placements, before the search for one that passes is given up
 
 
@@ -55,7 +56,7 @@ def settle(rows: ScanRows, terms: Terms, complete: bool, missing: Missing) -> In
         check_fit(rows.points[usable], registration, terms)
         settled = _judge_at(rows, registration, usable, "none", terms)
     else:
-        settled = _decide(rows, _register_points(rows.points[usable], terms), usable, terms)
+        settled = _decide(rows, _register_points(rows.points[usable], terms), usable, terms, complete)
     return _result(settled, terms, complete, missing)
 
 
@@ -70,7 +71,7 @@ def _judge_at(rows: ScanRows, registration: Registration, usable: NDArray[np.int
     return _Settled(judged, registration, fit, points, word_points(terms.zone, beyond, within))
 
 
-def _decide(rows: ScanRows, registration: Registration, usable: NDArray[np.int64], terms: Terms) -> _Settled:
+def _decide(rows: ScanRows, registration: Registration, usable: NDArray[np.int64], terms: Terms, complete: bool) -> _Settled:
     """Judge at the fit that was asked for; where points are out there, let the rule decide.
 
     By the rule "minimum-zone" a part is out only when no placement at all passes. By the rule "best-fit" it is out when it is out at
@@ -82,7 +83,7 @@ def _decide(rows: ScanRows, registration: Registration, usable: NDArray[np.int64
     if settled.points != Verdict.NONCONFORM:
         return settled
     if terms.rule == "best-fit" and terms.fit == "best-fit":
-        return _doubt_free_pose(rows, settled, usable, terms)
+        return _doubt_free_pose(rows, settled, usable, terms, complete)
     return _prove_no_placement(rows, settled, usable, terms)
 
 
@@ -109,15 +110,19 @@ def _prove_no_placement(rows: ScanRows, settled: _Settled, usable: NDArray[np.in
     return replace(settled, points=Verdict.UNCERTAIN, why=Reason("placement", words))
 
 
-def _doubt_free_pose(rows: ScanRows, settled: _Settled, usable: NDArray[np.int64], terms: Terms) -> _Settled:
-    """Doubt a part that is out at the best fit, where another pose fits as well or too little was measured to fix the pose."""
+def _doubt_free_pose(rows: ScanRows, settled: _Settled, usable: NDArray[np.int64], terms: Terms, complete: bool) -> _Settled:
+    """Doubt a part that is out at the best fit, where another pose fits as well or too little was measured to fix the pose.
+
+    The points that a scan cut short lacks would move the best fit, and a plan that asks for no coverage does not say that little is
+    enough to place the part.
+    """
     for rival in settled.registration.rivals:
         if _judge_at(rows, _with_pose(settled.registration, rival), usable, terms.fit, terms).points != Verdict.NONCONFORM:
             words = "The part fits the nominal in another pose as well, and there no point is out: only a datum can tell."
             return replace(settled, points=Verdict.UNCERTAIN, why=Reason("placement", words))
     judged = settled.rows.verdicts != NOT_JUDGED
-    covered = coverage(settled.rows.station[judged], terms.nominal, terms.limits.measured_gap_mm)
-    if covered >= terms.coverage_min:
+    covered = coverage(settled.rows.station[judged], terms.nominal, terms.limits.gap_max_mm)
+    if complete and covered >= (terms.coverage_min or _PLACED):
         return settled
     proven = _prove_no_placement(rows, settled, usable, terms)
     if proven.points == Verdict.NONCONFORM:
@@ -173,7 +178,7 @@ def _result(settled: _Settled, terms: Terms, complete: bool, missing: Missing) -
         rejected={reason: count for reason, count in rejections_by_reason(rows.rejection).items() if reason != Rejection.BEYOND_END.words},
         beyond_end_mm=float(beyond.max(initial=0.0)),
         beyond_end_count=int(np.count_nonzero(beyond > limits.end_allowance_mm)),
-        coverage=coverage(station, nominal, limits.measured_gap_mm),
+        coverage=coverage(station, nominal, limits.gap_max_mm),
         gap=gap,
         converged=settled.registration.converged,
     )
@@ -190,7 +195,7 @@ def _result(settled: _Settled, terms: Terms, complete: bool, missing: Missing) -
         reasons=conclusion.reasons,
         coverage=findings.coverage,
         gap=gap,
-        gap_max_mm=limits.measured_gap_mm,
+        gap_max_mm=limits.gap_max_mm,
         complete=complete,
         zone=terms.zone,
         registration=settled.registration,
@@ -200,7 +205,7 @@ def _result(settled: _Settled, terms: Terms, complete: bool, missing: Missing) -
         best_fit_error_mm=settled.best_fit_error_mm,
         minimum_zone_mm=settled.minimum_zone_mm,
         method=terms.method,
-        stretches=stretches(station, deviation, verdicts, terms.zone, nominal, limits.measured_gap_mm),
+        stretches=stretches(station, deviation, verdicts, terms.zone, nominal, limits.gap_max_mm),
     )
 
 

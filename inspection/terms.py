@@ -31,8 +31,8 @@ class Terms:
     rule               : what decides where there is no datum: "minimum-zone" (a part conforms when any placement passes, ISO 1101),
                          or "best-fit" (when it passes at the best fit)
     weights            : how points count in the best fit
-    gap_max_mm         : the longest gap that counts as measured; None for `default_gap_max_mm`, or for no limit where no coverage is
-                         asked for either
+    gap_max_mm         : the longest gap that counts as measured, and that conformity allows, whatever coverage is asked for; None for
+                         `default_gap_max_mm`, infinite for no limit
     end_allowance_mm   : how far a point may lie beyond an open end; None for half the zone's width, the circle about the end in which
                          the zone ends
     allow_unseen_mm    : the longest stretch that may be unseen although points are known to be missing; None allows none
@@ -85,8 +85,6 @@ class Terms:
     @property
     def limits(self) -> Limits:
         """What may be missing before conformity is not proven any more."""
-        stated = self.gap_max_mm is not None
-        measured = self.gap_max_mm if self.gap_max_mm is not None else max(default_gap_max_mm(self.nominal), self.allow_unseen_mm or 0.0)
-        gap = measured if stated or self.coverage_min > 0 else float("inf")
+        gap = self.gap_max_mm if self.gap_max_mm is not None else max(default_gap_max_mm(self.nominal), self.allow_unseen_mm or 0.0)
         end = (self.zone.upper_mm - self.zone.lower_mm) / 2 if self.end_allowance_mm is None else self.end_allowance_mm
-        return Limits(self.coverage_min, measured, gap, end, self.allow_unseen_mm)
+        return Limits(self.coverage_min, gap, end, self.allow_unseen_mm)

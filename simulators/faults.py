@@ -1,7 +1,7 @@
 """What can go wrong with a device and its line: a catalogue of faults with names, and their injection.
 
-A fault is written `NAME[:VALUE][@POINT]`: from point number POINT on (default: from the start), with VALUE as the
-catalogue says. The same seed gives the same faults.
+A fault is written `NAME[:VALUE][@POINT[-STOP]]`: from point number POINT on (default: from the start) up to before STOP (default:
+the end), with VALUE as the catalogue says. The same seed gives the same faults.
 """
 
 import math
@@ -54,19 +54,25 @@ class Fault:
     name: str
     value: float
     at: int
+    stop: float = math.inf
 
     @classmethod
     def parse(cls, text: str) -> "Fault":
-        """Read `NAME[:VALUE][@POINT]`."""
-        head, _, at = text.partition("@")
+        """Read `NAME[:VALUE][@POINT[-STOP]]`."""
+        head, _, place = text.partition("@")
+        at, _, stop = place.partition("-")
         name, _, value = head.partition(":")
         kind = CATALOGUE.get(name)
         if kind is None:
             raise ValueError(f"fault {name!r} is none of {', '.join(CATALOGUE)}")
         try:
-            return cls(name, float(value) if value else kind.default, int(at) if at else 0)
+            return cls(name, float(value) if value else kind.default, int(at) if at else 0, int(stop) if stop else math.inf)
         except ValueError:
-            raise ValueError(f"fault {text!r}: expected NAME[:VALUE][@POINT] with a number each") from None
+            raise ValueError(f"fault {text!r}: expected NAME[:VALUE][@POINT[-STOP]] with a number each") from None
+
+    def lasts(self, index: int) -> bool:
+        """Tell whether the fault strikes at this point, as far as its place goes."""
+        return self.at <= index < self.stop
 
 
 class Injector:
@@ -133,9 +139,10 @@ class Injector:
         self._index = index
 
     def next_stop(self, index: int, due: int) -> int:
-        """Return `due`, or the point before it at which something is to happen once."""
-        points = [fault.at for fault in self._faults if CATALOGUE[fault.name].once and index < fault.at < due]
-        return min(points, default=due)
+        """Return `due`, or the point before it at which something is to happen once, or a fault that has an end begins or ends."""
+        once = [fault.at for fault in self._faults if CATALOGUE[fault.name].once]
+        borders = [border for fault in self._faults if fault.stop < math.inf for border in (fault.at, int(fault.stop))]
+        return min((point for point in once + borders if index < point < due), default=due)
 
     def damage(self, data: bytes) -> bytes:
         """Return the bytes as the line delivers them."""
@@ -164,7 +171,7 @@ class Injector:
         return flipped.tobytes()
 
     def _share(self, name: str, index: int) -> float:
-        return max((fault.value for fault in self._faults if fault.name == name and fault.at <= index), default=0.0)
+        return max((fault.value for fault in self._faults if fault.name == name and fault.lasts(index)), default=0.0)
 
     def _strikes(self, name: str, index: int) -> bool:
         share = self._share(name, index)

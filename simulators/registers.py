@@ -84,11 +84,11 @@ Maker = Callable[[Walk, Injector, bool], RegisterDevice]
 def serve_registers(settings: SimulatorSettings, announce: Announce, make: Maker, move: Callable[..., Walk] = walk) -> None:
     """Serve one scan of a device made by `make(walk, injector, swapped)`."""
     logging.getLogger("pymodbus").addHandler(logging.NullHandler())
-    asyncio.run(_Service(settings, announce, make, move(settings.path_mm, settings.motion)).run())
+    asyncio.run(RegisterService(settings, announce, make, move(settings.path_mm, settings.motion)).run())
 
 
-class _Service:
-    """One device being served."""
+class RegisterService:
+    """One device being served: what its registers hold at every access, whatever link brings it there."""
 
     def __init__(self, settings: SimulatorSettings, announce: Announce, make: Maker, scan: Walk) -> None:
         self._settings = settings
@@ -97,7 +97,7 @@ class _Service:
         self._scan = scan
         self._injector = Injector(settings.faults, settings.motion.seed)
         self._swapped = self._injector.expects("word-swap")
-        self._device = make(scan, self._injector, self._swapped)
+        self.device = make(scan, self._injector, self._swapped)
         self._began_s: float | None = None
         self._stalled_until_s = 0.0
         self._silent_until_s = 0.0
@@ -106,6 +106,7 @@ class _Service:
         self._address = settings.address
 
     async def run(self) -> None:
+        """Serve the scan over the link of the settings, and some seconds longer."""
         server = await self._listen()
         self._announce(self._address)
         finished_s: float | None = None
@@ -113,9 +114,9 @@ class _Service:
             await asyncio.sleep(LOOK_S)
             if self._away_s is not None:
                 server = await self._go_away(server, self._away_s)
-            if self._device.done and finished_s is None:
+            if self.device.done and finished_s is None:
                 finished_s = time.monotonic()
-                self._announce(json.dumps({"points": self._device.count, **self._injector.tally}))
+                self._announce(json.dumps({"points": self.device.count, **self._injector.tally}))
         await _shut_down(server)
         if self._relay is not None:
             self._relay.close()
@@ -132,8 +133,8 @@ class _Service:
         return await self._listen()
 
     async def _listen(self) -> ModbusBaseServer:
-        context = SimDevice(id=0, simdata=[SimData(0, count=self._device.size, values=0, datatype=DataType.REGISTERS)], action=self._access)
-        request = _fifo_request(self._fifo)
+        context = SimDevice(id=0, simdata=[SimData(0, count=self.device.size, values=0, datatype=DataType.REGISTERS)], action=self._access)
+        request = _fifo_request(self.take_fifo)
         if self._settings.address == "pty":
             self._relay = self._relay or _Relay(self._injector)
             self._address = self._relay.line.address
@@ -159,15 +160,24 @@ class _Service:
         self, function: int, start: int, address: int, count: int, registers: list[int], values: list[int] | list[bool] | None
     ) -> ExcCodes | None:
         """Let time pass, then compute the registers asked for."""
-        if values is not None:
-            return None
-        await self._let_time_pass(function, address, count)
-        registers[address - start : address - start + count] = self._device.read(function, address, count).tolist()
+        if values is None:
+            registers[address - start : address - start + count] = await self.read(function, address, count)
         return None
 
-    async def _fifo(self, address: int) -> list[int]:
+    async def read(self, function: int, address: int, count: int) -> list[int]:
+        """Return registers as they are when time has passed."""
+        await self._let_time_pass(function, address, count)
+        return [int(register) for register in self.device.read(function, address, count)]
+
+    async def take_fifo(self, address: int) -> list[int]:
+        """Return, and take out, what waits in a queue when time has passed."""
         await self._let_time_pass(READ_FIFO, address, 0)
-        return [int(register) for register in self._device.take_fifo(address)]
+        return [int(register) for register in self.device.take_fifo(address)]
+
+    def is_going_away(self) -> bool:
+        """Tell whether a fault takes the device off the line now; it is back when this is asked."""
+        away, self._away_s = self._away_s is not None, None
+        return away
 
     async def _let_time_pass(self, function: int, address: int, count: int) -> None:
         if self._away_s is not None:
@@ -176,16 +186,16 @@ class _Service:
         self._began_s = now_s if self._began_s is None else self._began_s
         if now_s < self._silent_until_s:
             await asyncio.sleep(self._silent_until_s - now_s)
-        slow_s = self._injector.lasting_value("slow", self._device.taken)
+        slow_s = self._injector.lasting_value("slow", self.device.taken)
         if slow_s:
             await asyncio.sleep(slow_s)
-        self._device.heartbeat = (self._device.heartbeat + 1) % 65536
+        self.device.heartbeat = (self.device.heartbeat + 1) % 65536
         if time.monotonic() >= self._stalled_until_s:
-            self._advance(self._device.points_appearing(function, address, count))
+            self._advance(self.device.points_appearing(function, address, count))
 
     def _advance(self, appearing: int) -> None:
         assert self._began_s is not None
-        device, elapsed_s = self._device, time.monotonic() - self._began_s
+        device, elapsed_s = self.device, time.monotonic() - self._began_s
         due = int(np.searchsorted(self._scan.time_s, elapsed_s, side="right")) if self._settings.paced else device.taken + appearing
         due = self._injector.next_stop(device.taken, min(due, device.count))
         device.take(max(due, device.taken))
@@ -210,7 +220,7 @@ class _Service:
         restart_s = self._injector.strike("restart", index)
         if restart_s is not None:
             self._away_s = restart_s
-            self._device = self._make(self._scan, self._injector, self._swapped)
+            self.device = self._make(self._scan, self._injector, self._swapped)
             self._began_s = None
 
 

@@ -64,12 +64,12 @@ def _parser(program: str | None) -> argparse.ArgumentParser:
         prog=program,
         usage="%(prog)s --address A --path POINTS [OPTIONS]",
         description="A simulated device that streams one scan; its first line of output is the address it serves.",
-        epilog=f"faults, from point number POINT on, with the value and its default:\n{faults}",
+        epilog=f"faults, from point number POINT on (up to before STOP), with the value and its default:\n{faults}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--address", required=True, metavar="A", help="pty, or host:port (port 0: any free one)")
     parser.add_argument("--path", required=True, type=Path, metavar="POINTS", help="points of the path on the part, mm")
-    parser.add_argument("--fault", action="append", default=[], metavar="NAME[:VALUE][@POINT]", help="may be given several times")
+    parser.add_argument("--fault", action="append", default=[], metavar="NAME[:VALUE][@POINT[-STOP]]", help="may be given several times")
     parser.add_argument("--unpaced", action="store_true", help="as fast as the client takes the points")
     parser.add_argument("--rate", dest="rate_hz", type=float, default=1000.0, metavar="HZ", help="points per second [%(default)g]")
     parser.add_argument("--speed", dest="speed_mm_s", type=float, default=50.0, metavar="MM_S", help="mm per second [%(default)g]")

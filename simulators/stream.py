@@ -80,7 +80,7 @@ def stream(settings: SimulatorSettings, device: Device, announce: Announce, move
     line = open_line(settings.address)
     try:
         announce(line.address)
-        streamed = _Scan(line, device, scan, injector, settings.paced)
+        streamed = StreamedScan(line, device, scan, injector, settings.paced)
         streamed.run()
         announce(json.dumps({"points": len(scan.time_s), **injector.tally}))
         streamed.take_leave()
@@ -88,7 +88,7 @@ def stream(settings: SimulatorSettings, device: Device, announce: Announce, move
         line.close()
 
 
-class _Scan:
+class StreamedScan:
     """One scan being streamed."""
 
     def __init__(self, line: Line, device: Device, scan: Walk, injector: Injector, paced: bool) -> None:
@@ -97,6 +97,7 @@ class _Scan:
         self._fresh = copy.deepcopy(device)
 
     def run(self) -> None:
+        """Stream the scan from its opening to its closing."""
         count = len(self._scan.time_s)
         start_s, index = self._begin(), 0
         while index < count:

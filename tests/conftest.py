@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from inspection import NominalProfile, NurbsCurve
 
 settings.register_profile("no deadline", deadline=None)  # machines are noisy: no test asserts a time
+settings.register_profile("laws", deadline=None, max_examples=3000)  # of `make laws`
 settings.load_profile("no deadline")
 
 

@@ -160,6 +160,9 @@ class AsciiDecoder:
             known = ", ".join(MM_PER_UNIT)
             raise ProtocolError(f"{device} {serial_number} sends points in {unit!r}; set the device to one of {known}")
         opening = body, ScanOpened(device, serial_number, int(count) if count else None)
+        if self._counter.expected and not self._opening[0]:
+            self._out.flush()  # points came before it: an earlier copy was damaged, or they are of another scan
+            self._name(*opening)
         if body == self._opening[0]:
             self._said_again = self._counter.expected > 0  # what it means, the next counter says
         else:
@@ -168,6 +171,9 @@ class AsciiDecoder:
     def _begin_with(self, body: bytes, opened: ScanOpened) -> None:
         self._out.flush()
         self._begin()
+        self._name(body, opened)
+
+    def _name(self, body: bytes, opened: ScanOpened) -> None:
         self._opening = body, opened
         self._mm_per_unit = MM_PER_UNIT[body.split(b",")[3].decode("ascii")]
         self._out.append(opened)

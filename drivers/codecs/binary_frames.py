@@ -201,6 +201,8 @@ class BinaryDecoder:
 
     def _open(self, frame: bytes) -> None:
         body = frame[10:CHECKED]
+        if self._counter.expected and not self._opening:
+            self._name(body)  # points came before it: an earlier copy was damaged, or they are of another scan
         if body == self._opening:
             self._said_again = self._counter.expected > 0  # what it means, the next counter says
         else:
@@ -208,6 +210,9 @@ class BinaryDecoder:
 
     def _begin_with(self, body: bytes) -> None:
         self._begin()
+        self._name(body)
+
+    def _name(self, body: bytes) -> None:
         self._opening = body
         count = int.from_bytes(body[4:], "little")
         self._out.append(ScanOpened("counted binary frames", str(int.from_bytes(body[:4], "little")), count or None))

@@ -7,8 +7,10 @@ unmastered output: 643 to 64877 is the measuring range, d = range / 100 * (102 /
 on are errors. The sensor answers commands in ASCII, ending with the prompt `->`, on the same wire while it streams.
 
 Which further values come, and in which order, is asked of the sensor (GETOUTINFO_RS422), never assumed; the counter
-(18 bits) must be among them, as nothing else shows a loss. There is no checksum: a flipped data bit is a wrong
-distance unless `largest_step_mm` gives it away. Counter and clock are believed when two values in a row agree.
+(18 bits) must be among them, as nothing else shows a loss. The sensor is told to be silent first: values before its
+first answer are older than the scan, those between that answer and the order of the values are lost to it. There is no
+checksum: a flipped data bit is a wrong distance unless `largest_step_mm` gives it away. Counter and clock are believed
+when two values in a row agree.
 
 Points are (0, 0, distance); an axis puts them where they belong.
 """
@@ -24,7 +26,7 @@ from numpy.typing import NDArray
 from drivers.codecs.distances import Distances
 from drivers.codecs.sequence import SequenceCounter, WrappingClock
 from drivers.errors import DeviceRefused, ProtocolError
-from drivers.source import BEFORE_THE_OUTPUTS, VALUE_REPEATED, Arrival, Damaged, Rejected, ScanOpened
+from drivers.source import OLDER_THAN_THE_SCAN, VALUE_REPEATED, Arrival, Damaged, Rejected, ScanOpened
 
 ERRORS = {
     262075: "too much data for the baud rate",
@@ -37,6 +39,7 @@ ERRORS = {
 }
 FIRST_IN_RANGE, LAST_IN_RANGE = 643, 64877
 SCALE = 102.0 / 65520.0
+BEFORE_THE_OUTPUTS = "came before the sensor told its outputs"
 COUNTER_RANGE, CLOCK_RANGE, TICKS_PER_SECOND = 1 << 18, 1 << 32, 1e5
 TAGS = np.array([192, 192, 192], dtype=np.uint8)
 RUN = 1024  # blocks looked at together at most
@@ -94,6 +97,8 @@ class OptoncdtDecoder:
         self._most = RUN  # blocks to look at together: twice as many as were good the last time
         self._text = b""
         self._outputs: list[str] | None = None
+        self._before_answer = 0  # values before the sensor's first answer
+        self._has_answered = False
         self._places: list[int] = []  # where counter and clock stand among them
         self._words: list[int] = []
         self._last: _Block | None = None  # the last one that was accepted
@@ -125,6 +130,9 @@ class OptoncdtDecoder:
 
     def break_off(self) -> list[Arrival]:
         """Count what was begun as damaged; ask again when the link is back."""
+        if self._before_answer:  # no answer ever said that they are older
+            self._out.append(Rejected(self._before_answer, BEFORE_THE_OUTPUTS))
+            self._before_answer = 0
         pending = len(self._text) + 3 * len(self._words)
         if pending:
             self._out.append(Damaged(pending, "cut off where the link ended"))
@@ -205,6 +213,10 @@ class OptoncdtDecoder:
         return text
 
     def _take_reply(self, text: str) -> None:
+        self._has_answered = True
+        if self._before_answer:
+            self._out.append(Rejected(self._before_answer, OLDER_THAN_THE_SCAN))
+            self._before_answer = 0
         error = re.search(r"\bE\d{2}\b.*", text)
         if error:
             raise DeviceRefused(f"the sensor answered {error[0].strip()!r}; check its firmware and settings")
@@ -223,7 +235,7 @@ class OptoncdtDecoder:
     def _take_word(self, low: int, middle: int, high: int) -> None:
         value = (low & 63) | (middle & 63) << 6 | (high & 63) << 12
         if self._outputs is None:
-            self._out.append(Rejected(0 if high & 0x40 else 1, BEFORE_THE_OUTPUTS))
+            self._take_value_of_unknown_order(is_first=not high & 0x40)
             return
         if not high & 0x40 and self._words:
             self._out.append(Damaged(3 * len(self._words), "block with values missing"))
@@ -235,6 +247,13 @@ class OptoncdtDecoder:
         if len(self._words) == len(self._outputs):
             words, self._words = self._words, []
             self._take_block(self._block_of(words))
+
+    def _take_value_of_unknown_order(self, *, is_first: bool) -> None:
+        """Count a block that comes before the order of its values is known."""
+        if not self._has_answered:
+            self._before_answer += is_first
+        elif is_first:
+            self._out.append(Rejected(1, BEFORE_THE_OUTPUTS))
 
     def _take_block(self, block: _Block) -> None:
         """Accept a block that follows on; hold any other until the next one confirms or contradicts its counter and clock."""

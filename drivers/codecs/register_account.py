@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from drivers.codecs.outbox import LARGEST_MM, NO_PART, Outbox
 from drivers.codecs.register_map import Entries, RegisterField, RegisterMap, equals_pattern
 from drivers.codecs.sequence import MOST_POINTS, SequenceCounter, WrappingClock
-from drivers.source import POINT_REPEATED, Heartbeat, PointBatch, Rejected, ScanClosed
+from drivers.source import OLDER_THAN_THE_SCAN, POINT_REPEATED, Heartbeat, PointBatch, Rejected, ScanClosed
 
+AS_IT_BEGAN = "came as the scan began: whether they are of it or older is not known"
 PATIENCE = 3  # answers in a row that contradict what was read before, until the device is believed to have begun anew
 TINIEST = 1e-30  # of a stored number that a device means: what lies nearer to zero is read from the wrong registers
 WIDEST = 62  # bits of a counter that are unwrapped
@@ -37,6 +38,8 @@ class RegisterAccount:
         self._begin_anew = begin_anew
         self._heartbeat: int | None = None
         self.seen = self.senseless = self.sensible_swapped = 0
+        self._ran = self._is_over = False  # whether the device was seen scanning, and whether it last said that its scan is over
+        self._held = 0  # points that came while it said so and had not run: the next status tells whether they are older
         self._overflow: dict[str, bool] = {}  # of each block: what one says is not taken back by another
         self.begin(first)
 
@@ -47,7 +50,7 @@ class RegisterAccount:
         self._clock = WrappingClock(1 << _bits(time), 1.0 / time.scale) if time else None
         self._first = first
         self._sent: int | None = None
-        self._ran = self._finished = self._closed = False
+        self._finished = self._closed = False
         self._backward = 0
 
     @property
@@ -64,7 +67,20 @@ class RegisterAccount:
         self._sent = values.get("sent")
         over = self._state is not None and self._state.finished is not None and values["state"] == self._state.finished
         self._ran |= not over
-        self._finished = over and (self._ran or self._first is not None)  # a device that has not begun yet is not finished
+        self._is_over = over
+        self._finished = over and not self.is_before_the_scan
+        held, self._held = self._held, 0
+        if held:
+            self._out.append(Rejected(held, OLDER_THAN_THE_SCAN if self.is_before_the_scan else AS_IT_BEGAN))
+
+    @property
+    def is_before_the_scan(self) -> bool:
+        """Whether the device said that its scan is over and was not seen scanning in this run: what it holds is of an older scan."""
+        return self._is_over and not self._ran and self._first is None
+
+    def hold(self, count: int) -> None:
+        """Take note of points that came before the scan, as far as is known yet."""
+        self._held += count
 
     def hear_overflow(self, where: str, read: Entries) -> None:
         """Take note of the device's own losses, which it tells in a block once or with every point of it."""

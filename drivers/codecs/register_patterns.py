@@ -82,8 +82,11 @@ class Pattern:
         return read_request(self._function, block.at, block.size)
 
     def _hand_over(self, values: Columns, sound: NDArray[np.bool_]) -> None:
-        """Hand over the sound ones of the points read, unless all of them go back behind earlier ones."""
+        """Hand over the sound ones of the points read, unless all of them go back behind earlier ones, or are older than the scan."""
         self._count_damage(sound)
+        if self._account.is_before_the_scan:
+            self._account.hold(int(sound.sum()))
+            return
         values, count = {name: column[sound] for name, column in values.items()}, int(sound.sum())
         numbers = self._account.number(values, count)
         if not self._account.contradicts(backward=count > 0 and not (numbers >= 0).any()):
@@ -138,6 +141,8 @@ class Latest(Pattern):
 class Ring(Pattern):
     """Point number n lies in place n modulo entries, and `written` runs ahead; points that were overrun are lost, and counted.
 
+    What a device wrote whose scan is over when the run begins is older than the scan, and is not read.
+
     The first read tries to get a damaged point sound, since a ring can be read again; after a few tries it is lost.
     """
 
@@ -145,6 +150,8 @@ class Ring(Pattern):
         """Forget what was read."""
         self.begin_turn()
         self._read_so_far = self._written = first
+        self._older: int | None = None  # what was written when the run began and the device's scan was over
+        self._base = first  # the place of the scan's first point
         self._rereads = 0
         self._first_place: int | None = None  # the first place whose point was received, and the one after the last
         self._next_place = 0
@@ -152,6 +159,13 @@ class Ring(Pattern):
     def hear_status(self, values: Mapping[str, int]) -> None:
         """Read on up to what is written, if it has moved."""
         assert self._map.status is not None
+        if self._account.is_before_the_scan:  # whatever is written is of an older scan; the next one goes on there, or begins with 0
+            self._read_so_far = self._written = self._base = self._older = values["written"]
+            self.idle = True
+            return
+        if self._older is not None and values["written"] < self._older:
+            self._read_so_far = self._written = self._base = 0
+        self._older = None
         modulus = 1 << 16 * self._map.status.fields["written"].registers
         ahead = (values["written"] - self._written + modulus // 2) % modulus - modulus // 2
         if self._account.contradicts(backward=ahead < 0):
@@ -208,7 +222,7 @@ class Ring(Pattern):
         """
         if self._account.ends_without_count:
             before, last = (self._written, self._written) if self._first_place is None else (self._first_place, self._next_place)
-            self._out.append_loss(before + self._written - last, "written by the device, never received soundly")
+            self._out.append_loss(before - self._base + self._written - last, "written by the device, never received soundly")
         self._account.end_if_finished()
 
 
@@ -219,6 +233,7 @@ class Queue(Pattern):
         """Forget what was read."""
         self.begin_turn()
         self._message: Columns = {}
+        self._older: int | None = None  # the counter of the last message before the scan, which is shown until the next one comes
 
     def take_pop(self, registers: bytes) -> None:
         """Read the rest of the message, if it is a new one."""
@@ -228,28 +243,33 @@ class Queue(Pattern):
         self._account.hear_overflow("pop", popped)
         sequence = self._map.pop.fields.get("sequence")
         counter = int(self._message["sequence"][0]) if sequence else None
-        if sequence is not None and counter is not None and (counter == sequence.invalid or self._account.is_repeated(counter)):
+        if (
+            sequence is not None
+            and counter is not None
+            and (counter in (sequence.invalid, self._older) or self._account.is_repeated(counter))
+        ):
             self.end_turn()
-        else:
-            self.step, self.idle = "points", False
+            return
+        self._older = counter if self._account.is_before_the_scan else None
+        self.step, self.idle = "points", False
 
     def take_points(self, read: Entries) -> None:
-        """Take the message; the status is read again only when the queue is empty."""
+        """Take the message; the status is read again when the queue is empty, or while the scan has not begun."""
         self._account.hear_overflow("points", read)
         self._hand_over({**self._message, **read.values}, read.sound)
         self.idle = False
-        self.step = "pop"
+        self.step = "status" if self._account.is_before_the_scan else "pop"
 
 
 class Fifo(Pattern):
     """Function 24 at the address of the points block hands over up to 31 registers, and the device forgets them."""
 
     def take_points(self, read: Entries) -> None:
-        """Take the points; the status is read again only when the queue is empty."""
+        """Take the points; the status is read again when the queue is empty, or while the scan has not begun."""
         self._account.hear_overflow("points", read)
         self._hand_over(read.values, read.sound)
         self.idle = False
-        self.step = "points"
+        self.step = "status" if self._account.is_before_the_scan else "points"
 
     def _points_request(self) -> bytes:
         return fifo_request(self._map.points.at)

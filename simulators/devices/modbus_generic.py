@@ -46,8 +46,8 @@ class RingDevice(RegisterDevice):
         self.taken = taken
 
     def points_appearing(self, function: int, address: int, count: int) -> int:
-        """Let points appear when the status is read, not while the ring is."""
-        return 40 if address == 0 else 0
+        """Let points appear when the status is read, but for the first time, and not while the ring is."""
+        return 40 if address == 0 and self.heartbeat > 1 else 0
 
     def read(self, table: int, address: int, count: int) -> Words:
         """Return status and ring."""

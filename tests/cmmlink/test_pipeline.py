@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from cmmlink.events import Arrived, Counts, Event, Judged, RunFinished, RunStarted, Sink
 from cmmlink.pipeline import RunOutcome, run_inspection
 from drivers.errors import DeviceError, LinkError
-from drivers.source import Arrival, Damaged, Heartbeat, Lost, PointBatch, Rejected, ScanClosed, ScanOpened, WireBytes
+from drivers.source import OLDER_THAN_THE_SCAN, Arrival, Damaged, Heartbeat, Lost, PointBatch, Rejected, ScanClosed, ScanOpened, WireBytes
 from inspection import LiveInspection, NominalProfile, RigidTransform, ToleranceZone, Verdict
 from tests.cmmlink.oval_part import oval_points, oval_profile, station_mm
 
@@ -224,6 +224,29 @@ def test_an_aborted_scan_has_no_verdict_whatever_was_out(live: LiveInspection) -
     assert outcome.result is not None
     assert outcome.result.out_of_tolerance > 0
     assert outcome.result.verdict == Verdict.UNCERTAIN
+    assert [reason.kind for reason in outcome.result.reasons][:3] == ["aborted", "proven-out", "out-of-tolerance"]
+
+
+def test_an_aborted_scan_that_was_not_proven_out_does_not_say_so(live: LiveInspection) -> None:
+    stop = threading.Event()
+    source = Listed(itertools.cycle(batches(oval_points(0.0), 20)))
+    outcome = carried_out(source, live, stopping_after(200, stop), buffer_points=40, stop=stop)
+    assert outcome.result is not None
+    assert [reason.kind for reason in outcome.result.reasons][:2] == ["aborted", "incomplete"]
+
+
+def test_a_device_that_begins_anew_within_a_run_gives_no_proof(live: LiveInspection) -> None:
+    """The second scan may be of the next part."""
+    first, second = batches(oval_points(0.01), 90)[:2], batches(oval_points(0.01), 90)
+    outcome = carried_out(Listed([ScanOpened("list", "1", 360), *first, ScanOpened("list", "1", 360), *second, ScanClosed(360)]), live)
+    assert outcome.result is not None
+    assert (outcome.result.verdict, [reason.kind for reason in outcome.result.reasons]) == (Verdict.UNCERTAIN, ["begun-anew"])
+    older = Rejected(4, OLDER_THAN_THE_SCAN)
+    said_again: list[Arrival] = [ScanOpened("list", "1", None), older, ScanOpened("list", "1", 360), *second, ScanClosed(360)]
+    live = LiveInspection(oval_profile(), ToleranceZone(-0.05, 0.05), datum=RigidTransform.identity())
+    again = carried_out(Listed(said_again), live).result
+    assert again is not None
+    assert again.verdict == Verdict.CONFORM
 
 
 def test_a_slow_consumer_holds_the_source_up_and_loses_nothing(live: LiveInspection) -> None:

@@ -23,6 +23,7 @@ def frames(injector: Injector, count: int) -> list[int]:
         ("die@20", Fault("die", 9, 20)),
         ("unplug:2.5@7", Fault("unplug", 2.5, 7)),
         ("silence", Fault("silence", float("inf"), 0)),
+        ("invalid:1@20-30", Fault("invalid", 1.0, 20, 30)),
     ],
 )
 def test_written_faults(text: str, fault: Fault) -> None:
@@ -78,6 +79,15 @@ def test_a_gap_and_events_strike_once_at_their_point() -> None:
     assert injector.next_stop(0, 30) == 10
     assert injector.next_stop(10, 30) == 12
     assert injector.next_stop(12, 30) == 30
+
+
+def test_a_fault_ends_where_it_is_told() -> None:
+    injector = Injector([Fault("lost-frames", 1, 10, 15), Fault("flip", 1, 20, 25)], seed=1)
+    assert [injector.next_stop(index, 30) for index in (0, 10, 15, 20, 25)] == [10, 15, 20, 25, 30]
+    assert frames(injector, 30) == [*range(10), *range(15, 30)]
+    assert injector.damage(DATA) == DATA
+    injector.note_progress(20)
+    assert injector.damage(DATA) != DATA
 
 
 def test_the_same_seed_gives_the_same_damage() -> None:

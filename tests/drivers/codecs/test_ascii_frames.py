@@ -224,3 +224,18 @@ def test_thousands_of_flipped_bits_give_no_wrong_point_and_the_true_loss() -> No
     only_sent_points(book, sent_mm, within_mm=0.0)
     assert len(set(book.sequence)) == len(book.sequence)
     assert 4000 < book.lost == count - len(book.sequence)
+
+
+def test_an_opening_behind_points_whose_first_copy_was_damaged_loses_none_of_them() -> None:
+    lines = stream(8)[0].splitlines(keepends=True)
+    damaged = lines[0].replace(b"dev", b"dxv")
+    book = any_cut_is_the_same(lambda: AsciiDecoder("mm"), b"".join([damaged, *lines[1:4], lines[0], *lines[4:]]))
+    assert (book.sequence, book.lost) == (list(range(8)), 0)
+    assert book.counts == {("Damaged", "checksum wrong"): len(damaged)}
+
+
+def test_an_opening_behind_points_of_an_older_scan_begins_anew() -> None:
+    older, data = stream(20)[0].splitlines(keepends=True)[5:9], stream(8)[0]
+    book = any_cut_is_the_same(lambda: AsciiDecoder("mm"), b"".join([*older, data]))
+    assert book.sequence == [*range(4, 8), *range(8)]
+    assert book.others[-2:] == [ScanOpened("dev", "1", 8), ScanClosed(8)]

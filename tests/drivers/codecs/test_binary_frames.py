@@ -207,3 +207,10 @@ def test_an_opening_said_again_within_the_scan_loses_nothing() -> None:
 def test_nothing_behind_the_end_is_of_the_scan() -> None:
     data, _ = single(30)
     assert any_cut_is_the_same(BinaryDecoder, data + single(20)[0] + b"junk") == decoded(BinaryDecoder(), data)
+
+
+def test_an_opening_behind_points_whose_first_copy_was_damaged_loses_none_of_them() -> None:
+    data, size = single(8)[0], FRAME.itemsize
+    opening, body = data[:size], data[3 * size :]
+    book = any_cut_is_the_same(BinaryDecoder, body[: 3 * size] + opening + body[3 * size :])
+    assert (book.sequence, book.lost, book.counts) == (list(range(8)), 0, {})

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.codecs.optoncdt_frames import ERRORS, OptoncdtDecoder
+from drivers.codecs.optoncdt_frames import BEFORE_THE_OUTPUTS, ERRORS, OptoncdtDecoder
 from drivers.errors import DeviceRefused, ProtocolError
-from drivers.source import ScanClosed, ScanOpened
+from drivers.source import HARMLESS_REASONS, OLDER_THAN_THE_SCAN, ScanClosed, ScanOpened
 from simulators.devices.optoncdt_scanner import FIRST_COUNT, OptoncdtDevice
 from simulators.stream import Sample
 from tests.drivers.codecs.streams import Account, account, any_cut_is_the_same, decoded, flipped
@@ -96,8 +96,14 @@ def test_the_counter_wraps_and_shows_a_loss() -> None:
 
 def test_values_before_the_order_is_known_are_counted() -> None:
     book = any_cut_is_the_same(make, block(0, 30_000) + b"\r\n->" + block(1, 30_000) + INFO + block(2, 30_000))
-    assert book.counts == {("Rejected", "came before the sensor told its outputs"): 2}
+    assert book.counts == {("Rejected", OLDER_THAN_THE_SCAN): 1, ("Rejected", BEFORE_THE_OUTPUTS): 1}
     assert len(book.sequence) == 1
+    assert BEFORE_THE_OUTPUTS not in HARMLESS_REASONS
+
+
+def test_values_without_any_answer_are_not_taken_for_older_ones() -> None:
+    book = any_cut_is_the_same(make, block(0, 30_000) + block(1, 30_000))
+    assert book.counts == {("Rejected", BEFORE_THE_OUTPUTS): 2}
 
 
 def test_other_outputs_are_followed_in_the_order_told() -> None:

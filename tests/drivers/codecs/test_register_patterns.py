@@ -7,9 +7,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from drivers.codecs.register_account import AS_IT_BEGAN
 from drivers.codecs.register_decoder import RegisterDecoder
 from drivers.maps import shipped_map
-from drivers.source import OLDER_THAN_THE_SCAN, Arrival, ScanClosed, ScanOpened
+from drivers.source import HARMLESS_REASONS, OLDER_THAN_THE_SCAN, Arrival, ScanClosed, ScanOpened
 from tests.drivers.codecs.register_tables import LATEST, RING, Gocator, Ring, Table, turns, without_sent
 from tests.drivers.codecs.streams import account, crc_bitwise
 
@@ -42,10 +43,11 @@ def test_a_ring_is_followed_over_its_edge() -> None:
 
 def test_the_end_of_the_scan_and_a_lost_tail() -> None:
     ring, decoder = Ring(), RegisterDecoder(RING)
+    arrivals = turns(decoder, ring)
     ring.write(20)
     ring.registers[100 + 19 * 11 + 5] ^= 1
     ring.status(state=2)
-    book = account(turns(decoder, ring) + turns(decoder, ring))
+    book = account(arrivals + turns(decoder, ring) + turns(decoder, ring))
     assert book.others == [ScanOpened("generic ring", "", 1000), ScanClosed(20)]
     assert (len(book.sequence), book.lost) == (19, 1)
     assert book.counts["Damaged", "point with a wrong checksum"] == 3 * 22  # read again twice
@@ -144,6 +146,41 @@ def test_the_latest_point_is_taken_once_and_gaps_are_counted() -> None:
     assert book.points_mm == [(6.0, 0.0, 0.0), (7.0, 0.0, 0.0), (10.0, 0.0, 0.0)]
     assert book.lost == 2
     assert book.counts["Rejected", OLDER_THAN_THE_SCAN] == 1
+
+
+@pytest.mark.parametrize("goes_on", [False, True])
+def test_a_ring_that_was_finished_when_the_run_began_is_no_scan_of_it(goes_on: bool) -> None:
+    ring, decoder = Ring(), RegisterDecoder(without_sent())
+    ring.write(30)
+    ring.status(state=2)
+    arrivals = turns(decoder, ring) + turns(decoder, ring)
+    if not goes_on:
+        ring = Ring()
+    first = ring.written
+    ring.write(20)
+    arrivals += turns(decoder, ring)
+    ring.status(state=2)
+    book = account(arrivals + turns(decoder, ring))
+    assert (book.sequence, book.lost, book.counts) == (list(range(first, first + 20)), 0, {})
+    assert [type(other) for other in book.others] == [ScanOpened, ScanClosed]
+
+
+@pytest.mark.parametrize("began_meanwhile", [False, True])
+def test_what_waited_in_a_queue_when_the_run_began_is_no_point_of_it(began_meanwhile: bool) -> None:
+    table, decoder = Gocator(), RegisterDecoder(shipped_map("gocator"))
+    table.registers[300] = 0
+    table.queue = [(5, 1000, 1), (6, 2000, 2)]
+    arrivals = [arrival for _ in range(3) for arrival in decoder.feed(table.answer(decoder.request()))]  # status, and one message
+    table.registers[300] = int(began_meanwhile)
+    arrivals += turns(decoder, table) + turns(decoder, table)
+    table.registers[300] = 1
+    arrivals += turns(decoder, table)
+    table.queue = [(7, 3000, 3)]
+    arrivals += turns(decoder, table)
+    book = account(arrivals)
+    unknown, older = book.counts["Rejected", AS_IT_BEGAN], book.counts["Rejected", OLDER_THAN_THE_SCAN]
+    assert (book.sequence, unknown, older) == (([6, 7], 1, 0) if began_meanwhile else ([7], 0, 2))
+    assert AS_IT_BEGAN not in HARMLESS_REASONS
 
 
 @pytest.mark.parametrize("first", [0, 1])
