@@ -33,7 +33,8 @@ def reasons_of(ended: Ended, verdict: Verdict | None) -> list[str]:
     verdict : None where nothing could be measured
     """
     result = ended.result
-    reasons = [reason["words"] for reason in result.get("reasons", ()) if reason["kind"] not in ("incomplete", "aborted")]  # older records hold none
+    told = result.get("reasons", ())  # older records hold none
+    reasons = [reason["words"] for reason in told if reason["kind"] not in ("incomplete", "aborted")]
     if not result["received"]:
         return [ended.message if ended.ending == "interrupted" and ended.message else "no point was received"]
     if ended.ending != "complete":
