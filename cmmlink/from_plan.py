@@ -67,8 +67,8 @@ def pose_of(datum: Datum | None) -> RigidTransform | None:
     return None if datum is None else RigidTransform(math.radians(datum.rotation_deg), np.array(datum.translation_mm))
 
 
-def inspection_of(plan: Plan, profile: NominalProfile) -> LiveInspection:
-    """A fresh inspection as a plan describes it."""
+def inspection_of(plan: Plan, profile: NominalProfile, *, provisional: bool = True) -> LiveInspection:
+    """A fresh inspection as a plan describes it. Points that are all there from the start need no provisional verdicts."""
     section = plan.section
     return LiveInspection(
         profile,
@@ -77,12 +77,8 @@ def inspection_of(plan: Plan, profile: NominalProfile) -> LiveInspection:
         tip_radius_mm=plan.probe.tip_radius_mm,
         section=SectionPlane(np.array(section.origin_mm), np.array(section.x_axis), np.array(section.normal)),
         off_section_max_mm=section.off_plane_max_mm,
+        provisional=provisional,
     )
-
-
-def section_inspection_of(plan: CtPlan, profile: NominalProfile, plane: SectionPlane) -> LiveInspection:
-    """A fresh inspection of one section of a surface, whose points are all there from the start."""
-    return LiveInspection(profile, plan.tolerance.zone, **_fitting(plan), section=plane, provisional=False)
 
 
 class _Fitting(TypedDict):
@@ -100,7 +96,7 @@ class _Fitting(TypedDict):
     allow_unseen_mm: float | None
 
 
-def _fitting(plan: Plan | CtPlan) -> _Fitting:
+def _fitting(plan: Plan) -> _Fitting:
     registration = plan.registration
     return {
         "datum": pose_of(registration.datum),

@@ -15,7 +15,7 @@ from cmmlink.buffer import Buffer
 from cmmlink.events import Arrived, Counts, Ending, Event, Judged, ProvenOut, RunFinished, RunStarted, Sink
 from cmmlink.live_proof import LiveProof
 from drivers import HARMLESS_REASONS, Arrival, Damaged, DeviceError, Lost, PointBatch, Rejected, ScanClosed, ScanOpened, ScanSource
-from inspection import InspectionError, InspectionResult, LiveInspection, Missing, Rejection, Verdict, reasons_of_abort
+from inspection import InspectionError, InspectionResult, LiveInspection, Missing, Reason, Rejection, Verdict, reasons_of_abort
 
 _LOOK_S = 0.05  # how often the run looks whether it was asked to stop
 _MOST_AT_ONCE = 4096  # points judged at once when many wait; more would keep the sinks waiting for news
@@ -102,10 +102,12 @@ def run_inspection(
     clock: Callable[[], float],
     stop: threading.Event,
     watch: Callable[[], None] = lambda: None,
+    doubt: Reason | None = None,
 ) -> RunOutcome:
     """Carry out one run to its end and publish every event to every sink. Setting `stop` aborts the run.
 
     watch : called every twentieth of a second, also while no points arrive; what it raises ends the run as an error of a sink does
+    doubt : a reason known beforehand why no verdict can be proven
     """
     buffer: Buffer[tuple[float, Arrival]] = Buffer(buffer_points)
     failures: list[DeviceError] = []
@@ -125,7 +127,7 @@ def run_inspection(
             reader.join()
     failure = failures[0] if failures else None
     ending: Ending = "interrupted" if failure else "aborted" if stop.is_set() else "complete"
-    result, refusal = _finish(live, ending, tally.missing(), proven_out)
+    result, refusal = _finish(live, ending, tally.missing(), proven_out, doubt)
     judged, reasons = (result.judged, result.rejected_by_reason) if result else (0, _reasons_without_pose(live))
     counts = tally.counts(judged, reasons, buffer)
     _publish(sinks, RunFinished(ending, result, counts, str(failure or refusal or "")))
@@ -221,13 +223,15 @@ def _reasons_without_pose(live: LiveInspection) -> dict[str, int]:
 
 
 def _finish(
-    live: LiveInspection, ending: Ending, missing: Missing, proven_out: bool
+    live: LiveInspection, ending: Ending, missing: Missing, proven_out: bool, doubt: Reason | None
 ) -> tuple[InspectionResult | None, InspectionError | None]:
     """The result of a run. What the operator aborted has no verdict, whatever was out by then: the part may have slipped."""
     try:
         result = live.finish(complete=ending == "complete", missing=missing)
     except InspectionError as error:
         return None, error
+    if doubt is not None:
+        result = replace(result, verdict=Verdict.UNCERTAIN, reasons=(doubt, *result.reasons))
     if ending != "aborted":
         return result, None
     reasons = reasons_of_abort(result.reasons, proven_out or result.verdict == Verdict.NONCONFORM)

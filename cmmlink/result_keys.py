@@ -165,14 +165,18 @@ class SectionInspected(Inspected):
     set_aside_longest_mm: float | None = Field(description="the length of the longest of them")
     cutter: str = Field(description="what cut the surface: open3d or numpy")
     nominal: str = Field(description="the file of the nominal of this section")
+    ending: Ending = Field(description="how the inspection of this section ended")
     warnings: list[str] = Field(description="what was not as it should be in this section")
+    run: str | None = Field(description="the id of the recorded run that this section is; null where nothing was recorded")
+    chain_sha256: str | None = Field(description="the hash of that run's last record")
 
 
 class StackInspected(_Json):
     """The result of `ct`: the surface, and its sections."""
 
     verdict: VerdictName = Field(description="the verdict of the worst section; at best uncertain where sections are missing")
-    complete: bool = Field(description="whether every section that was asked for was inspected")
+    complete: bool = Field(description="whether every section that was asked for was inspected to its end")
+    ending: Ending = Field(description="how the inspection ended: aborted where sections are missing")
     measured_at: str = Field(description="when the inspection began, in UTC")
     mesh: str = Field(description="the file of the surface")
     mesh_kind: str = Field(description="the format of that file, like binary STL")
@@ -201,6 +205,27 @@ class Understood(_Json):
     notes: list[str] = Field(description="what was assumed or mended in reading the file")
 
 
+class StackPlace(_Json):
+    """Of a run that is a section of a surface: its place in its stack, and what the stack rests on."""
+
+    stack: str = Field(description="the name of the stack, the same for all its sections")
+    section: int = Field(description="the number of the section, from 1, in the order of the plan")
+    sections: int = Field(description="how many sections the plan asked for")
+    height_mm: float = Field(description="the height at which it was cut")
+    asked_height_mm: float = Field(description="the height that was asked for")
+    surface: str = Field(description="the name of the surface file")
+    surface_sha256: str = Field(description="the hash of the surface file")
+    triangles: int = Field(description="the number of triangles of the surface")
+    cutter: str = Field(description="what cut it: open3d or numpy")
+    doubt: str | None = Field(description="why it is not known which contour of the section is the part; null where it is")
+
+
+class StackRecorded(StackPlace):
+    """The same with the plan of the stack."""
+
+    plan: str = Field(description="the plan of the whole stack as YAML, every default filled in")
+
+
 class RunLine(_Json):
     """One run in the list of runs."""
 
@@ -211,6 +236,7 @@ class RunLine(_Json):
     state: State = Field(description="how the run ended; running: it is being recorded just now; damaged: its records were altered")
     received: int | None = Field(description="the points received; null while the run goes on")
     verdict: VerdictName | None = Field(description="the verdict; null where there is none")
+    stack: StackPlace | None = Field(default=None, description="only of sections of a surface: the place in the stack")
 
 
 class Runs(_Json):
@@ -284,6 +310,7 @@ class Shown(_Json):
     recorded: Kept = Field(description="how much was recorded")
     events: list[RecordedEvent] = Field(description="what happened on the link; damaged frames and heartbeats are counted only")
     registrations: list[RecordedPose] = Field(description="the history of the registration")
+    stack: StackRecorded | None = Field(default=None, description="only of sections of a surface: the place in the stack")
     plan: str = Field(description="the effective plan as YAML, every default filled in")
 
 

@@ -8,23 +8,32 @@ import logging
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cmmlink.buffer import CAPACITY_POINTS
 from cmmlink.errors import PlanError
-from cmmlink.events import Counts
-from cmmlink.from_plan import discretize_file, load_from, run_started, section_inspection_of
-from cmmlink.outline import Outline, outline_of, place_of
-from cmmlink.pipeline import RunOutcome, run_inspection
+from cmmlink.events import Ending, RunStarted
+from cmmlink.from_plan import discretize_file, load_from, run_started
+from cmmlink.outline import outline_of
+from cmmlink.pipeline import RunOutcome
 from cmmlink.plan import CtPlan, Discretisation
+from cmmlink.record import PATIENCE_S, RecordReference, open_to_record
 from cmmlink.result_folder import folder_of
 from cmmlink.result_json import result_json
-from cmmlink.words import VERDICT_WORDS, utc_words
+from cmmlink.section_run import (
+    StackRecord,
+    choose_outline,
+    count_points,
+    measure_section,
+    plan_of_section,
+    recorder_of,
+    refuse_section,
+)
+from cmmlink.words import utc_words
 from drivers.surface import (
     Contour,
     ContourSource,
@@ -34,13 +43,12 @@ from drivers.surface import (
     Open3DProcess,
     SurfaceMesh,
     SurfaceSection,
-    add_points_between,
     cut_surface,
     height_range_mm,
     read_obj,
     read_stl,
 )
-from inspection import NominalProfile, Reason, RegistrationError, SectionPlane, Verdict
+from inspection import NominalProfile, Verdict
 
 _log = logging.getLogger(__name__)
 
@@ -52,14 +60,16 @@ _LEAST_POINTS = 400  # over the length of a profile; on a coarser surface, point
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SectionOutcome:
-    """One section: where it was cut, its nominal, the outcome of its run, and the warnings."""
+    """One section: where it was cut, its nominal, its run, the warnings, and what ties it to its record, None without one."""
 
     slice: SurfaceSection
     judged: tuple[Contour, ...]
     nominal_file: Path
     profile: NominalProfile
+    started: RunStarted
     run: RunOutcome
     warnings: tuple[str, ...]
+    evidence: RecordReference | None = None
 
     @property
     def verdict(self) -> Verdict:
@@ -80,7 +90,10 @@ class SectionOutcome:
             "cutter": cut.cutter,
             "nominal": str(self.nominal_file),
             **result_json(self.run.result, self.run.counts),
+            "ending": self.run.ending,
             "warnings": list(self.warnings),
+            "run": self.evidence.run if self.evidence else None,
+            "chain_sha256": self.evidence.chain_sha256 if self.evidence else None,
         }
 
 
@@ -96,8 +109,13 @@ class StackOutcome:
 
     @property
     def complete(self) -> bool:
-        """Whether no section that was asked for is missing."""
-        return len(self.sections) == self.asked
+        """Whether no section that was asked for is missing, and none was aborted."""
+        return len(self.sections) == self.asked and all(section.run.ending == "complete" for section in self.sections)
+
+    @property
+    def ending(self) -> Ending:
+        """How the inspection of the whole stack ended."""
+        return "complete" if self.complete else "aborted"
 
     @property
     def verdict(self) -> Verdict:
@@ -116,6 +134,7 @@ class StackOutcome:
         return {
             "verdict": self.verdict.word,
             "complete": self.complete,
+            "ending": self.ending,
             "measured_at": utc_words(self.began),
             "mesh": self.mesh.source,
             "mesh_kind": self.mesh.kind,
@@ -137,28 +156,38 @@ def inspect_stack(
     clock: Callable[[], float],
     stop: threading.Event,
     now: Callable[[], datetime] = lambda: datetime.now().astimezone(),
+    records: Path | None = None,
+    patience_s: float = PATIENCE_S,
     on_start: Callable[[int], None] = lambda sections: None,
     on_section: Callable[[SectionOutcome], None] = lambda section: None,
 ) -> StackOutcome:
-    """Cut and inspect every section of the plan. Setting `stop` ends the inspection after the section at hand.
+    """Cut, inspect and record every section of the plan. Setting `stop` ends the inspection after the section at hand.
 
+    records    : folder of the run records, where each section becomes a run; None records nothing
+    patience_s : how long another process may go on recording before the stack is refused
     on_start   : called with the number of sections, before the first one
     on_section : called with each section that is done
 
-    Raises PlanError, NominalError and MeshError for what cannot be used, RegistrationError when no section fits its nominal.
+    Raises PlanError, NominalError and MeshError for what cannot be used, RegistrationError when no section fits its nominal,
+    StoreError when the record cannot be kept.
     """
     began, profiles = now(), _Profiles(plan)
-    with ExitStack() as stack:
-        open3d = _Open3D(stack)
+    with ExitStack() as opened:
+        open3d = _Open3D(opened)
         mesh = _read(plan, open3d)
         heights = _heights(plan, mesh)
         _check_own_nominals(plan, heights)
+        record = None
+        if records is not None:
+            store = opened.enter_context(open_to_record(records, now, patience_s))
+            record = StackRecord.of(store, plan, mesh.triangles, len(heights), clock=clock, now=now)
         on_start(len(heights))
         read_in = [f"{plan.mesh.file.name}: read in {plan.mesh.unit}, as asked"] if plan.mesh.unit else []
         notes = [*read_in, *mesh.warnings, *profiles.notes]
-        sections = []
+        sections: list[SectionOutcome] = []
         for cut in _slices(plan, mesh, heights, open3d, notes, profiles.shortest_mm):
-            sections.append(_inspect(plan, cut, profiles, clock, stop))
+            stack = _Stack(plan, profiles, tuple(notes))
+            sections.append(_inspect(stack, len(sections) + 1, cut, record, clock, stop))
             on_section(sections[-1])
             if stop.is_set():
                 notes.append(f"aborted by the operator after {len(sections)} of {len(heights)} sections")
@@ -251,6 +280,15 @@ class _Profiles:
         self._profiles[path] = discretize_file(file, path, nominal, Discretisation())
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Stack:
+    """What the sections of a stack share. `notes` are what was assumed about the surface and the nominals."""
+
+    plan: CtPlan
+    profiles: _Profiles
+    notes: tuple[str, ...]
+
+
 def _slices(
     plan: CtPlan,
     mesh: SurfaceMesh,
@@ -290,73 +328,34 @@ def _cutter(plan: CtPlan, sections: int, open3d: Callable[[], Open3DProcess], no
     return NumpyCutter()
 
 
-def _inspect(plan: CtPlan, cut: SurfaceSection, profiles: _Profiles, clock: Callable[[], float], stop: threading.Event) -> SectionOutcome:
+def _inspect(
+    stack: "_Stack", number: int, cut: SurfaceSection, record: StackRecord | None, clock: Callable[[], float], stop: threading.Event
+) -> SectionOutcome:
     """Send one section through the pipeline. An outline that cannot be this profile is refused before anything is fitted."""
-    path, profile = profiles.at(cut.asked_mm)
+    plan, (path, profile) = stack.plan, stack.profiles.at(cut.asked_mm)
     outline = outline_of(cut, profile)
-    spacing_mm = profile.length_mm / _LEAST_POINTS
-    if outline.refusal is not None:  # what cannot be the part may be long beyond all bounds: no points are set between its corners
-        refused = _refuse_outline(outline.contours, outline.refusal)
-        return SectionOutcome(cut, outline.contours, path, profile, refused, tuple(_warnings(cut, outline.contours, outline, refused)))
-    runs = []
-    for contours in (outline.contours, *((rival,) for rival in outline.rivals)):
-        judged = tuple(add_points_between(contour, spacing_mm) for contour in contours)
-        runs.append((contours, judged, _run(plan, cut, judged, profile, clock, stop)))
-    runs.sort(key=lambda each: each[2].result is None)  # those that fit first; the most alike stays before the others
-    contours, judged, run = runs[0]
-    run = _doubt_outline(run, contours, [(other, its_run) for other, _, its_run in runs[1:]])
-    warnings = list(_warnings(cut, contours, outline, run))
-    if _points_in(judged) > _points_in(contours):
+    section, surface = plan_of_section(plan, cut, path), plan.mesh.file.name
+    chosen = choose_outline(outline, section, profile, profile.length_mm / _LEAST_POINTS, surface, clock=clock, stop=stop)
+    warnings = [*cut.warnings, *outline.notes, *_beside(cut, chosen.contours)]
+    if count_points(chosen.judged) > count_points(chosen.contours):
+        spacing_mm = profile.length_mm / _LEAST_POINTS
         warnings.append(f"a coarse surface: points were set between its corners, no farther apart than {spacing_mm:.3f} mm")
-    return SectionOutcome(cut, judged, path, profile, run, tuple(warnings))
+    started = run_started(plan, surface_words(plan), simulated=False, notes=(*stack.notes, *warnings))
+    with recorder_of(record, number, cut, section, chosen.doubt) as recorder:
+        if outline.refusal is not None:
+            run = refuse_section(count_points(chosen.judged), outline.refusal, started, recorder, clock())
+        else:
+            source = ContourSource(chosen.judged, surface)
+            run = measure_section(source, section, profile, started, recorder, doubt=chosen.doubt, clock=clock, stop=stop)
+    if run.refusal is not None:
+        warnings.append(str(run.refusal))
+    return SectionOutcome(cut, chosen.judged, path, profile, started, run, tuple(warnings), recorder.evidence if recorder else None)
 
 
-def _run(
-    plan: CtPlan,
-    cut: SurfaceSection,
-    judged: tuple[Contour, ...],
-    profile: NominalProfile,
-    clock: Callable[[], float],
-    stop: threading.Event,
-) -> RunOutcome:
-    plane = SectionPlane(cut.height_mm * cut.axes.normal, cut.axes.x, cut.axes.normal)
-    live = section_inspection_of(plan, profile, plane)
-    source = ContourSource(judged, plan.mesh.file.name)
-    started = run_started(plan, surface_words(plan), simulated=False)
-    return run_inspection(source, live, [], started, buffer_points=CAPACITY_POINTS, clock=clock, stop=stop)
-
-
-def _doubt_outline(run: RunOutcome, judged: tuple[Contour, ...], others: list[tuple[tuple[Contour, ...], RunOutcome]]) -> RunOutcome:
-    """Doubt the verdict on a section where another contour that can be the part, and fits the nominal, has another verdict."""
-    for contours, other in others:
-        if run.result is None or other.result is None or other.result.verdict is run.result.verdict:
-            continue
-        words = (
-            f"Which contour is the part is not known: the one around {place_of(judged[0])} is {VERDICT_WORDS[run.result.verdict]}, "
-            f"the one around {place_of(contours[0])} {VERDICT_WORDS[other.result.verdict]}."
-        )
-        reasons = (Reason("outline", words), *run.result.reasons)
-        return replace(run, result=replace(run.result, verdict=Verdict.UNCERTAIN, reasons=reasons))
-    return run
-
-
-def _refuse_outline(judged: tuple[Contour, ...], refusal: RegistrationError) -> RunOutcome:
-    count = _points_in(judged)
-    counts = Counts(received=count, rejected=count, rejected_by_reason={"not registered": count})
-    return RunOutcome("complete", None, counts, None, refusal)
-
-
-def _points_in(contours: tuple[Contour, ...]) -> int:
-    return sum(len(contour.points_mm) for contour in contours)
-
-
-def _warnings(cut: SurfaceSection, judged: tuple[Contour, ...], outline: Outline, run: RunOutcome) -> Iterator[str]:
-    yield from cut.warnings
-    yield from outline.notes
+def _beside(cut: SurfaceSection, judged: tuple[Contour, ...]) -> Iterator[str]:
+    """What is not judged beside the outline."""
     beside = [contour for contour in cut.contours if not any(contour is part for part in judged)]
     if beside:
         holes = sum(contour.hole for contour in beside)
         longest = beside[0].length_mm
         yield f"{len(beside)} further contour(s) beside the outline, {holes} of them holes, are not judged; the longest is {longest:.2f} mm"
-    if run.refusal is not None:
-        yield str(run.refusal)

@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Literal
+from typing import Any, Literal
 
 from inspection import Verdict
 
@@ -50,6 +50,11 @@ def local_words(moment: datetime) -> str:
     """A moment as people of this place read it: date, time of day and the offset from UTC."""
     local = moment.astimezone()
     return f"{local:%Y-%m-%d %H:%M:%S} {local:%z}"
+
+
+def section_words(place: Mapping[str, Any] | None) -> str:
+    """Which section of a surface a recorded run is, from its place in the stack; empty where it is none."""
+    return "" if place is None else f"section {place['section']} of {place['sections']} at {place['height_mm']:.3f} mm"
 
 
 NOT_MEASURED = Headline("NOT MEASURED", "none")

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -26,14 +27,13 @@ from cmmlink.console.station_setup import StationSetup
 from cmmlink.devices import Connect, connect, decoder_of, serial_ports
 from cmmlink.endings import Ended
 from cmmlink.errors import PlanError
-from cmmlink.from_plan import run_started
 from cmmlink.plan import CtPlan, Plan, load_ct_plan
 from cmmlink.report import prepare, write_run, write_stack
 from cmmlink.run import FinishedRun
 from cmmlink.run_view import RunContext
-from cmmlink.stack import SectionOutcome, inspect_stack, surface_words
+from cmmlink.stack import SectionOutcome, inspect_stack
 from cmmlink.version import __version__
-from cmmlink.words import VERDICT_WORDS
+from cmmlink.words import headline_of
 
 if TYPE_CHECKING:
     from cmmlink.console.server import ConsoleServer
@@ -65,7 +65,8 @@ def serve_console(
         raise PlanError(f"{folder}: there is no such folder; give the folder that holds the plans")
     past = _past_runs(records)
     scans, surfaces = (lambda: _plans_in(folder, surfaces=False)), (lambda: _plans_in(folder, surfaces=True))
-    setup = StationSetup(scans, connect, serial_ports, past, time.monotonic, now, surfaces, inspect_surface, _write_for())
+    inspect = partial(inspect_surface, past.folder)
+    setup = StationSetup(scans, connect, serial_ports, past, time.monotonic, now, surfaces, inspect, _write_for())
     if key is not None and certificate is None:
         raise PlanError("--key belongs to a certificate; give that with --certificate")
     access = Access(host, port, certificate, key, unencrypted)
@@ -112,17 +113,25 @@ def run_on_page(plan_file: Path, connect: Connect, output: Output) -> int:
     return code
 
 
-def inspect_surface(file: Path, stop: threading.Event, on_start: Callable[[int], None], on_section: Callable[[Section], None]) -> str:
-    """Inspect the surface of a CT plan for the console. Returns the outcome as a sentence."""
+def inspect_surface(
+    records: Path, file: Path, stop: threading.Event, on_start: Callable[[int], None], on_section: Callable[[Section], None]
+) -> str:
+    """Inspect the surface of a CT plan for the console and record its sections. Returns the outcome as a sentence."""
     plan = load_ct_plan(file)
     prepare(plan.out)
     stack = inspect_stack(
-        plan, clock=time.monotonic, stop=stop, on_start=on_start, on_section=lambda section: on_section(_section(plan, section, file.name))
+        plan,
+        clock=time.monotonic,
+        stop=stop,
+        records=records,
+        on_start=on_start,
+        on_section=lambda section: on_section(_section(plan, section, file.name)),
     )
     folder = None if plan.out is None else stack.folder_of(plan.out, plan)
     if folder is not None:
         write_stack(folder, stack, plan.tolerance.zone, plan.part.name, pictures=False)
-    sentences = [f"{VERDICT_WORDS[stack.verdict]}: {len(stack.sections)} sections of {plan.mesh.file.name}", *stack.notes]
+    headline = headline_of(stack.verdict, stack.ending, len(stack.sections) / stack.asked)
+    sentences = [f"{headline.words}: {len(stack.sections)} sections of {plan.mesh.file.name}", *stack.notes]
     return ". ".join([*sentences, *([f"Results in {folder}"] if folder is not None else [])])
 
 
@@ -132,9 +141,8 @@ def _section(plan: CtPlan, outcome: SectionOutcome, plan_name: str) -> Section:
     context = RunContext(
         title, plan_name, outcome.profile, plan.tolerance.zone, plan.registration.coverage_min, CAPACITY_POINTS, now(), "section"
     )
-    started = run_started(plan, surface_words(plan), simulated=False)
     ended = Ended(run.ending, str(run.refusal or ""), outcome.result_json(), run.result)
-    return Section(height_mm, context, started, ended, outcome.warnings)
+    return Section(height_mm, context, outcome.started, ended, outcome.warnings)
 
 
 def _past_runs(folder: Path | None) -> PastRuns:

@@ -15,7 +15,7 @@ from cmmlink.devices import decoder_of
 from cmmlink.record import Replay, check_chain, describe, export_run, find_run, list_runs, open_to_read, recorded_run, replay_run
 from cmmlink.report import print_summary, write_results
 from cmmlink.result_keys import RunLine
-from cmmlink.words import headline_of, local_words, utc_words
+from cmmlink.words import headline_of, local_words, section_words, utc_words
 from inspection import Method, Verdict
 
 _DETAILS = ("run", "started", "ended", "state", "message", "verdict", "part", "serial_number", "operator", "device", "chain_sha256")
@@ -26,7 +26,7 @@ def runs(records: Records = None, as_json: Json = False) -> int:
     """List the recorded runs."""
     found = list_runs(records_folder(records), now)
     if as_json:
-        print_json({"runs": [{key: entry[key] for key in RunLine.model_fields} for entry in found]})
+        print_json({"runs": [{key: entry[key] for key in RunLine.model_fields if key != "stack" or entry[key]} for entry in found]})
         return 0
     for entry in found:
         received = "-" if entry["received"] is None else entry["received"]
@@ -44,7 +44,7 @@ def _headline(entry: Mapping[str, Any]) -> str:
 
 
 def _part_in(entry: Mapping[str, Any]) -> str:
-    return " ".join(filter(None, [entry["part"], entry["serial_number"]]))
+    return " ".join(filter(None, [entry["part"], entry["serial_number"], section_words(entry.get("stack"))]))
 
 
 def _local(recorded: str | None) -> str:

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from typer.core import TyperCommand
 
@@ -22,24 +23,29 @@ from cmmlink.commands.options import (
     Json,
     NominalScale,
     NominalUnit,
+    NoRecord,
     Out,
+    Records,
     RejectOutliers,
     Rule,
     Uncertainty,
     Weights,
     plan_from_options,
+    records_folder,
 )
 from cmmlink.commands.output import Output, print_json, stop_on_ctrl_c, terminal
 from cmmlink.errors import PlanError
 from cmmlink.plan import CtPlan, CutterName, NominalAt, load_ct_plan
-from cmmlink.report import STYLES, prepare, write_stack
+from cmmlink.report import STYLE_OF, STYLES, prepare, write_stack
 from cmmlink.stack import SectionOutcome, StackOutcome, inspect_stack
-from cmmlink.words import VERDICT_WORDS
+from cmmlink.words import VERDICT_WORDS, headline_of
 from drivers import UnitName
 from inspection import FitName, Material, Method
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _MOST_WARNINGS = 20
+_PATIENCE_S = 60.0  # surfaces are inspected side by side, and each waits for its turn to be recorded
+_BESIDE_A_PLAN = ("mesh", "out", "records", "no_record", "as_json", "pictures")
 _OPTION_OF = {
     "mesh.scale": "--mesh-scale",
     "mesh.unit": "--mesh-unit",
@@ -118,14 +124,16 @@ def ct(
     shortest: Annotated[float | None, typer.Option(metavar="MM", help="Shorter pieces are dust; 5 % of the longest if not given.")] = None,
     pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="Draw them into the folder of --out.")] = True,
     out: Out = None,
+    records: Records = None,
+    no_record: NoRecord = False,
     as_json: Json = False,
 ) -> int:
-    """Inspect sections of a CT surface."""
+    """Inspect sections of a CT surface, and record each as a run."""
     if mesh.suffix.lower() in (".yaml", ".yml"):
-        beside = [name for name in _options_given(context) if name not in ("mesh", "out", "as_json", "pictures")]
+        beside = [name for name in _options_given(context) if name not in _BESIDE_A_PLAN]
         if beside:
             raise PlanError(f"{mesh}: --{beside[0].replace('_', '-')} stands beside a plan, which says it all itself: set it in the plan")
-        return _inspect_stack(load_ct_plan(mesh), Output(False, as_json, out), pictures)
+        return _inspect_stack(load_ct_plan(mesh), Output(False, as_json, out, records), pictures, no_record)
     if nominal is None or tolerance is None:
         raise PlanError(f"{mesh}: a surface needs --nominal FILE and --tolerance LO HI")
     settings: dict[str, object] = {
@@ -149,10 +157,10 @@ def ct(
         "end_allowance_mm": end_allowance,
         "allow": {"unseen_mm": allow_unseen},
     }
-    return _inspect_stack(plan_from_options(CtPlan, settings, _OPTION_OF), Output(False, as_json, out), pictures)
+    return _inspect_stack(plan_from_options(CtPlan, settings, _OPTION_OF), Output(False, as_json, out, records), pictures, no_record)
 
 
-def _inspect_stack(plan: CtPlan, output: Output, pictures: bool) -> int:
+def _inspect_stack(plan: CtPlan, output: Output, pictures: bool, no_record: bool) -> int:
     """Inspect a stack with a progress bar; write its files and print what came of it, each even if the other fails."""
     pattern = output.out or plan.out
     prepare(pattern)
@@ -163,6 +171,8 @@ def _inspect_stack(plan: CtPlan, output: Output, pictures: bool) -> int:
             plan,
             clock=time.monotonic,
             stop=stop,
+            records=None if no_record else records_folder(output.records or plan.records),
+            patience_s=_PATIENCE_S,
             on_start=lambda sections: steps.append(bar.begin_round("inspected", sections)),
             on_section=lambda _: steps[0](),
         )
@@ -226,8 +236,9 @@ def _print_stack(console: Console, stack: StackOutcome) -> None:
     counts = stack.result_json()
     cutters = ", ".join(sorted({section.slice.cutter for section in stack.sections}))
     missing = "" if stack.complete else f" of {stack.asked}"
+    headline = headline_of(stack.verdict, stack.ending, len(stack.sections) / stack.asked)
     console.print(
-        f"[{STYLES[stack.verdict]}]{VERDICT_WORDS[stack.verdict]}[/]  {len(stack.sections)}{missing} sections of {stack.mesh.source}"
+        f"[{STYLE_OF[headline.shape]}]{headline.words}[/]  {len(stack.sections)}{missing} sections of {escape(stack.mesh.source)}"
     )
     console.print(f"{stack.mesh.triangles} triangles ({stack.mesh.kind}), cut by {cutters}")
     console.print(f"received {counts['received']} = judged {counts['judged']} + rejected {counts['rejected']}; lost {counts['lost']}")

@@ -9,7 +9,7 @@ from cmmlink.console.protocol import SectionRow, SurfaceState
 from cmmlink.endings import Ended
 from cmmlink.events import RunStarted
 from cmmlink.run_view import RunContext
-from cmmlink.words import NOT_MEASURED, headline_of
+from cmmlink.words import NOT_MEASURED, Headline, headline_of
 from inspection import Verdict
 
 _MOST_SHOWN = 1000
@@ -74,7 +74,7 @@ class CtImport:
     def end(self, message: str, failed: bool = False) -> None:
         """Note that it is over."""
         with self._lock:
-            headline = NOT_MEASURED if failed or not self._sections else headline_of(_worst_of(self._sections), _ending_of(self._sections))
+            headline = NOT_MEASURED if failed or not self._sections else _headline_of(self._sections, self._state.total)
             ended = replace(self._state, word=headline.words, shape=headline.shape, message=message, remaining_s=None)
             self._state = replace(ended, state="failed" if failed else "done")
 
@@ -84,14 +84,11 @@ class CtImport:
             return self._sections[index] if 0 <= index < len(self._sections) else None
 
 
-def _worst_of(sections: Sequence[Section]) -> Verdict:
-    """The verdict of the worst section."""
-    return max(Verdict[section.ended.result["verdict"].upper()] for section in sections)
-
-
-def _ending_of(sections: Sequence[Section]) -> str:
-    """Aborted where any section was; what was not cut any more is missing in the list."""
-    return "aborted" if any(section.ended.ending == "aborted" for section in sections) else "complete"
+def _headline_of(sections: Sequence[Section], total: int) -> Headline:
+    """The verdict of the worst section; aborted, and how far it came, where sections are missing or one did not come to its end."""
+    whole = len(sections) >= total and all(section.ended.ending == "complete" for section in sections)
+    worst = max(Verdict[section.ended.result["verdict"].upper()] for section in sections)
+    return headline_of(worst, "complete" if whole else "aborted", len(sections) / max(total, 1))
 
 
 def _row_of(section: Section) -> SectionRow:

@@ -32,7 +32,7 @@ from cmmlink.record import export_run as export_files
 from cmmlink.result_json import result_json
 from cmmlink.run_state import RunKind
 from cmmlink.run_view import RunContext
-from cmmlink.words import headline_of, local_words
+from cmmlink.words import headline_of, local_words, section_words
 from drivers import Decoder
 from inspection import NominalProfile, Verdict
 
@@ -137,6 +137,7 @@ def _row_of(entry: dict[str, Any], result: dict[str, Any]) -> RunRow:
         local_words(datetime.fromisoformat(entry["started"])) if entry["started"] else "",
         entry["part"] or "",
         entry["serial_number"] or "",
+        section_words(entry["stack"]),
         entry["state"],
         entry["received"] or 0,
         entry["verdict"] if verdict is not None else None,

@@ -161,6 +161,7 @@ class ShownRun:
 class RunRow:
     """One line of the station's history. `worst_mm` is the deviation farthest from the middle of the zone.
 
+    section     : which section of a surface it is, in words; empty for a run of a device
     word, shape : the verdict, or how early the run ended, and its sign; `counted`: the scan came to its end with a verdict
     """
 
@@ -168,6 +169,7 @@ class RunRow:
     began: str
     part: str
     serial_number: str
+    section: str
     state: str
     received: int
     verdict: VerdictName | None

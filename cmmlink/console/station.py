@@ -278,9 +278,13 @@ class Station:
             self.ct.end(inspect(file, job.stop, self.ct.expect, self.ct.add))
         except (DeviceError, ValueError, OSError) as error:  # plan, surface or nominal cannot be used
             self.ct.end(str(error).replace(str(file), file.name), failed=True)
+        except StoreError as error:
+            self.ct.end(f"Record not kept: {error}", failed=True)
+            self.alarms.raise_alarm("fault", "Record not kept", str(error))
         except Exception as error:
             self.ct.end(f"defect in the program ({type(error).__name__}): {error}", failed=True)
             self.alarms.raise_alarm("fault", "Defect in the program", repr(error))
+        self._read_history()
 
     # What is chosen, entered and shown.
 

@@ -44,6 +44,7 @@ Address = Annotated[Text, AfterValidator(_address)]
 _SILENCE = "how long a device may send nothing before it counts as failed"
 _RECONNECT = "how long a lost link is tried again while the run goes on"
 _PARITY = "the parity of a serial port: none, even or odd"
+RECORDS = "the folder of the run records; null: the user's own. A console keeps all its runs in one folder"
 OUT = (
     "the folder for the results, like results/{part}/{serial}_{run}; null: no results are written. What an earlier run left in the "
     "same folder is moved aside, never overwritten"
@@ -289,7 +290,7 @@ class Allow(Settings):
 
 
 class Deciding(Settings):
-    """How the verdict on the part is reached: what every plan may say."""
+    """How the verdict on the part is reached: what every plan may say, and how every plan is spelled in full."""
 
     rule: RuleName = Field(
         default="minimum-zone",
@@ -305,6 +306,10 @@ class Deciding(Settings):
         default=None, description="how far points may lie beyond an end of an open profile; null: half the width of the zone"
     )
     allow: Allow = Field(default=Allow(), description="what may be missing although conformity is to be proven")
+
+    def effective_yaml(self) -> str:
+        """Spell the plan with every default filled in and every path absolute; as a plan it means the same."""
+        return yaml.safe_dump(self.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
 
 
 class Discretisation(Settings):
@@ -329,13 +334,7 @@ class Plan(Deciding):
     discretisation: Discretisation = Field(default=Discretisation(), description="how finely the nominal is sampled")
     buffer_points: int = Field(default=CAPACITY_POINTS, ge=1, description="how many points may wait between the device and the inspection")
     out: ResultFolder | None = Field(default=None, description=OUT)
-    records: Path | None = Field(
-        default=None, description="the folder of the run records; null: the user's own. A console keeps all its runs in one folder"
-    )
-
-    def effective_yaml(self) -> str:
-        """Spell the plan with every default filled in and every path absolute; as a plan it means the same."""
-        return yaml.safe_dump(self.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
+    records: Path | None = Field(default=None, description=RECORDS)
 
     def with_address(self, address: str) -> "Plan":
         """Give the same plan with its device at another address. Raises PlanError for an address that is none."""

@@ -10,7 +10,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from cmmlink.errors import PlanError, YamlError
-from cmmlink.plan.scan import OUT, Deciding, Nominal, Part, Registration, ResultFolder, Tolerance, Unit
+from cmmlink.plan.scan import OUT, RECORDS, Deciding, Nominal, Part, Registration, ResultFolder, Tolerance, Unit
 from cmmlink.plan.yaml_model import Positive, Settings, read_model
 from drivers import PointFileError, mm_per, read_text
 
@@ -90,6 +90,7 @@ class CtPlan(Deciding):
     cut: Cut = Field(default=Cut(), description="how the surface is cut")
     registration: Registration = Field(default=Registration(), description="how the points of a section come onto its nominal")
     out: ResultFolder | None = Field(default=None, description=OUT)
+    records: Path | None = Field(default=None, description=RECORDS)
 
 
 def load_ct_plan(path: Path) -> CtPlan:
@@ -108,5 +109,6 @@ def load_ct_plan(path: Path) -> CtPlan:
             "nominal": plan.nominal.model_copy(update={"file": folder / plan.nominal.file}),
             "sections": plan.sections.model_copy(update={"nominal_at": own}),
             "out": folder / plan.out if plan.out else None,
+            "records": folder / plan.records if plan.records else None,
         }
     )

@@ -80,7 +80,7 @@ def open_to_read(folder: Path, now: Callable[[], datetime], *, close_interrupted
 
 
 def list_runs(folder: Path, now: Callable[[], datetime]) -> list[dict[str, Any]]:
-    """Every run, oldest first: run, started, part, serial_number, state, received, verdict, coverage; none where nothing was recorded yet.
+    """Every run, oldest first: run, started, part, serial_number, state, received, verdict, coverage, stack; none where there is none.
 
     The state of a run that another process records just now is "running"; a run that gave no result has no verdict.
     """
@@ -183,10 +183,12 @@ def _is_telling(arrival: Arrival) -> bool:
 
 def _entry(store: Store, begin: Record, end: Record | None) -> dict[str, Any]:
     if is_damaged(begin) or (end is not None and is_damaged(end)):
-        return {"run": begin.run, "state": "damaged"} | dict.fromkeys((*_FROM_HEADER[1:], *_FROM_END[1:]))
+        return {"run": begin.run, "state": "damaged"} | dict.fromkeys((*_FROM_HEADER[1:], "stack", *_FROM_END[1:]))
     header = unpack_document(begin.body)
     closing = unpack_document(end.body) if end else end_missing(store, begin.run)
-    return {key: header.get(key) for key in _FROM_HEADER} | {key: closing.get(key) for key in _FROM_END}
+    stack = header.get("stack")
+    place = {key: value for key, value in stack.items() if key != "plan"} if stack else None
+    return {key: header.get(key) for key in _FROM_HEADER} | {"stack": place} | {key: closing.get(key) for key in _FROM_END}
 
 
 def end_missing(store: Store, run: str) -> dict[str, Any]:

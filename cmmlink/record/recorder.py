@@ -37,15 +37,19 @@ _POSE_S = 0.1  # the shortest time between two notes of a pose that still moves
 
 @dataclass(frozen=True, slots=True)
 class RunInputs:
-    """Everything that a run depends on and that its record keeps: the effective plan as YAML, the nominal's file, the software versions."""
+    """Everything that a run depends on and that its record keeps: the effective plan as YAML, the nominal's file, the software versions.
+
+    stack : of a section of a surface its place in its stack and what the stack rests on; None of every other run
+    """
 
     plan: str
     nominal_name: str
     nominal: bytes
     software: Mapping[str, str]
+    stack: Mapping[str, Any] | None = None
 
     @classmethod
-    def of(cls, plan: Plan) -> "RunInputs":
+    def of(cls, plan: Plan, stack: Mapping[str, Any] | None = None) -> "RunInputs":
         """The inputs of a plan as they are at this moment. The user's own register maps become part of the plan. Raises PlanError.
 
         A map is kept as it was understood, with every default filled in, because a later version may read the same file differently.
@@ -55,7 +59,7 @@ class RunInputs:
         except ValueError as error:
             raise PlanError(f"device: {error}") from None
         plan = plan.model_copy(update={"device": device})
-        return cls(plan.effective_yaml(), plan.nominal.file.name, plan.nominal.file.read_bytes(), software())
+        return cls(plan.effective_yaml(), plan.nominal.file.name, plan.nominal.file.read_bytes(), software(), stack)
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,6 +179,7 @@ class Recorder:
             "plan_sha256": hashlib.sha256(plan).hexdigest(),
             "nominal": inputs.nominal_name,
             "nominal_sha256": hashlib.sha256(inputs.nominal).hexdigest(),
+            **({"stack": dict(inputs.stack)} if inputs.stack else {}),
         }
         writer = threading.Thread(target=self._write, name="record", daemon=True)
         try:

@@ -25,7 +25,7 @@ from cmmlink.record.recorder import result_sha256, software
 from cmmlink.record.store import Store
 from cmmlink.result_json import density_notes, result_json
 from drivers import Arrival, Capture, Decoder, LinkDown, LinkUp, PointBatch
-from inspection import NominalProfile
+from inspection import NominalProfile, Reason
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +84,8 @@ def replay_run(
     source = Capture(_arrivals(store, recorded, decoder, stop), decoder, _failure(recorded))
     started = RunStarted.from_header(recorded.header)
     live = inspection_of(changed, profile)
-    outcome = run_inspection(source, live, sinks, started, buffer_points=plan.buffer_points, clock=clock, stop=stop)
+    doubt = _doubt_of(recorded)
+    outcome = run_inspection(source, live, sinks, started, buffer_points=plan.buffer_points, clock=clock, stop=stop, doubt=doubt)
     replayed = result_json(outcome.result, outcome.counts)
     identical = None
     if recorded.end is not None and recorded.end["result_sha256"]:
@@ -130,6 +131,12 @@ def recorded_profile(plan: Plan, recorded: RecordedRun) -> NominalProfile:
         file = Path(folder) / Path(str(recorded.header["nominal"])).name
         file.write_bytes(recorded.nominal)
         return profile_of(plan.model_copy(update={"nominal": plan.nominal.model_copy(update={"file": file})}))
+
+
+def _doubt_of(recorded: RecordedRun) -> Reason | None:
+    """The doubt about the outline of a section of a surface, whose other contours are not on record."""
+    words = (recorded.header.get("stack") or {}).get("doubt")
+    return Reason("outline", words) if words else None
 
 
 def _failure(recorded: RecordedRun) -> str:

@@ -5,10 +5,11 @@ Pictures are drawn by matplotlib, which is loaded when the first one is.
 
 from cmmlink.report.folder import prepare, write_results, write_run
 from cmmlink.report.stack_folder import write_stack
-from cmmlink.report.terminal import STYLES, LiveTable, print_summary
+from cmmlink.report.terminal import STYLE_OF, STYLES, LiveTable, print_summary
 
 __all__ = [
     "STYLES",
+    "STYLE_OF",
     "LiveTable",
     "prepare",
     "print_summary",

@@ -14,6 +14,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from cmmlink.report.heading import draw_heading, heading_of, save_picture
 from cmmlink.words import headline_of
 from inspection import InspectionResult, NominalProfile, ToleranceZone, Verdict
 
@@ -55,14 +56,14 @@ def write_picture(
     profile, strip = figure.subplots(2, 1, height_ratios=[3, 2])
     _draw_profile(profile, result, nominal)
     _draw_strip(strip, result, nominal)
-    figure.suptitle(headline_on_picture(result, title, ending), fontsize=15, fontweight="bold")
-    figure.supxlabel(said, x=0.99, ha="right", fontsize=9)
-    figure.savefig(path)
+    draw_heading(figure, headline_on_picture(result, title, ending))
+    figure.supxlabel(said, x=0.99, ha="right", fontsize=9, parse_math=False)
+    save_picture(figure, path)
 
 
 def headline_on_picture(result: InspectionResult, title: str, ending: str) -> str:
     """What stands above the picture: the part, and the verdict or how early the run ended."""
-    return f"{title}    {headline_of(result.verdict, ending, result.coverage).words}"
+    return heading_of(title, headline_of(result.verdict, ending, result.coverage).words)
 
 
 def magnification(result: InspectionResult, nominal: NominalProfile) -> float:

@@ -24,8 +24,8 @@ CONTOUR_COLUMNS = {
     "section_y_mm": "y in the plane of the section",
 }
 _SECTION_KEYS = (
-    "height_mm", "asked_height_mm", "verdict", "received", "judged", "rejected", "out_of_tolerance", "max_deviation_mm", "min_deviation_mm",
-    "rms_mm", "profile_error_mm", "coverage", "contours", "holes", "open_contours", "set_aside", "cutter",
+    "height_mm", "asked_height_mm", "verdict", "ending", "received", "judged", "rejected", "out_of_tolerance", "max_deviation_mm",
+    "min_deviation_mm", "rms_mm", "profile_error_mm", "coverage", "contours", "holes", "open_contours", "set_aside", "cutter",
 )  # fmt: skip
 SECTION_COLUMNS = {
     **{key: SectionInspected.model_fields[key].description or "" for key in _SECTION_KEYS},

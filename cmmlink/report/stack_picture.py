@@ -12,8 +12,9 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from cmmlink.report.heading import draw_heading, heading_of, save_picture
 from cmmlink.stack import SectionOutcome, StackOutcome
-from cmmlink.words import VERDICT_WORDS
+from cmmlink.words import headline_of
 from inspection import ToleranceZone
 
 Array = NDArray[np.float64]
@@ -43,8 +44,9 @@ def write_stack_picture(stack: StackOutcome, zone: ToleranceZone, title: str, pa
     _mark(axes, sections, scale)
     where = "station (mm)" if common else "station (% of the section's length)"
     axes.set(xlabel=where, ylabel="height along the normal (mm)", title=f"{len(sections)} sections; grey: nothing judged")
-    figure.suptitle(f"{title}    {VERDICT_WORDS[stack.verdict]}", fontsize=15, fontweight="bold")
-    figure.savefig(path)
+    headline = headline_of(stack.verdict, stack.ending, len(stack.sections) / stack.asked)
+    draw_heading(figure, heading_of(title, headline.words))
+    save_picture(figure, path)
 
 
 def _row(section: SectionOutcome) -> Array:

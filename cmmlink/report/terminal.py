@@ -16,7 +16,7 @@ from cmmlink.words import POSE_MOVES, Shape, headline_of
 from inspection import InspectionResult, Rejection, Verdict
 
 STYLES = {Verdict.CONFORM: "bold green", Verdict.UNCERTAIN: "bold yellow", Verdict.NONCONFORM: "bold red"}
-_STYLE_OF: Mapping[Shape, str] = {
+STYLE_OF: Mapping[Shape, str] = {
     "conform": STYLES[Verdict.CONFORM],
     "not-proven": STYLES[Verdict.UNCERTAIN],
     "not-conform": STYLES[Verdict.NONCONFORM],
@@ -56,7 +56,7 @@ class LiveTable:
 
 def _table_rows(state: RunState) -> dict[str, str]:
     worst, registration = state.worst, state.registration
-    style = _STYLE_OF[state.verdict.shape]
+    style = STYLE_OF[state.verdict.shape]
     return {
         "part": escape(" ".join(filter(None, [state.part, state.serial_number]))),
         "device": escape(f"{'SIMULATED, ' if state.simulated else ''}{state.device}"),
@@ -80,7 +80,7 @@ def print_summary(
     """Print the verdict, or how early the run ended; the four numbers, and what the verdict on the profile rests on."""
     verdict, share = (None, None) if result is None or not counts.received else (result.verdict, result.coverage)
     headline = headline_of(verdict, ending if counts.received else "complete", share)
-    console.print(f"[{_STYLE_OF[headline.shape]}]{headline.words}[/]   {escape(heading)}".rstrip())
+    console.print(f"[{STYLE_OF[headline.shape]}]{headline.words}[/]   {escape(heading)}".rstrip())
     for reason in _reservations(result):
         console.print(f"  {reason}", style="yellow")
     for note in notes:

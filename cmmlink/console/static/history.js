@@ -36,9 +36,10 @@ export class History {
     byId("runs").hidden = !runs.length;
     for (const act of ACTS) buttonOf(`${act}-run`).disabled = !runs.length;
     this.table.show(runs);
-    const last = runs.slice(0, SHOWN), entries = last.map((run) => ({ ...run, label: run.serial_number || run.run })).reverse();
+    const last = runs.filter((run) => !run.section).slice(0, SHOWN); // sections of a surface are no parts
+    const entries = last.map((run) => ({ ...run, label: run.serial_number || run.run })).reverse();
     for (const chart of this.charts) chart.show(entries);
-    put("chart-words", runs.length ? chartWords(last) : "");
+    put("chart-words", last.length ? chartWords(last) : "");
   }
 }
 
@@ -54,6 +55,7 @@ export function chartWords(runs) {
 
 /** @param {RunRow} run */
 function rowOf(run) {
-  const words = [run.part, run.serial_number, run.began, run.state];
+  const part = run.section ? `${run.part}, ${run.section}` : run.part;
+  const words = [part, run.serial_number, run.began, run.state];
   return [verdictCell(run.word, run.shape), ...words.map((word) => cell(word)), cell(count(run.received), "number"), ...worstCells(run)];
 }

@@ -112,8 +112,8 @@ function cardOfNextPart(run, station) {
  * @param {RunRow} row
  * @returns {Card}
  */
-function cardOfRow({ part, serial_number: serial, word, shape, counted, began, run }) {
-  return { ...NO_CARD, part, serial, names: [run], word, shape,
+function cardOfRow({ part, serial_number: serial, section, word, shape, counted, began, run }) {
+  return { ...NO_CARD, part, serial, names: [section, run], word, shape,
     final: counted, why: "as recorded; O opens the run", badge: `RECORDED ${began}` };
 }
 

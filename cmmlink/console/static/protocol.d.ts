@@ -195,12 +195,13 @@ export interface ShownRun {
   readonly type: "run";
 }
 
-/** One line of the station's history. `worst_mm` is the deviation farthest from the middle of the zone. word, shape : the verdict, or how early the run ended, and its sign; `counted`: the scan came to its end with a verdict */
+/** One line of the station's history. `worst_mm` is the deviation farthest from the middle of the zone. section : which section of a surface it is, in words; empty for a run of a device word, shape : the verdict, or how early the run ended, and its sign; `counted`: the scan came to its end with a verdict */
 export interface RunRow {
   readonly run: string;
   readonly began: string;
   readonly part: string;
   readonly serial_number: string;
+  readonly section: string;
   readonly state: string;
   readonly received: number;
   readonly verdict: "conform" | "uncertain" | "nonconform" | null;

@@ -576,9 +576,10 @@ def test_surface_is_imported_with_progress_and_its_sections_opened(make_bench: M
             if section.height_mm == 8:
                 assert released.wait(60)
 
-        return inspect_surface(file, stop, on_start, one_by_one)
+        return inspect_surface(tmp_path / "records", file, stop, on_start, one_by_one)
 
-    bench = make_bench(surfaces={"ct.yaml": plan}, inspect=inspect)
+    records = PastRuns(tmp_path / "records", lambda _: None, monotonic, lambda: datetime.now().astimezone())
+    bench = make_bench(records, surfaces={"ct.yaml": plan}, inspect=inspect)
     page = bench.page()
     expect(page.locator("#tab-ct")).to_be_visible()
     page.keyboard.press("4")
@@ -612,6 +613,14 @@ def test_surface_is_imported_with_progress_and_its_sections_opened(make_bench: M
     page.keyboard.press("Escape")
     expect(page.locator("#banners")).to_be_hidden()
     page.wait_for_function(f"!({INKED})('#profile') && !({INKED})('#strip')")  # nothing is left of what is no longer shown
+    page.keyboard.press("3")
+    heights = ("16.000", "12.000", "8.000", "4.000")
+    told = [re.compile(f"blade 7, section {4 - k} of 4 at {height} mm") for k, height in enumerate(heights)]
+    expect(page.locator("#runs tbody tr")).to_have_text(told)
+    expect(page.locator("#chart-words")).to_be_empty()  # the sections of a surface are no parts
+    page.keyboard.press("r")
+    expect(page.locator("#banners")).to_contain_text("identical to the recorded result, to the last bit")
+    expect(page.locator("#verdict-word")).to_have_text("NOT CONFORM")
 
 
 # Whether anything is drawn.
