@@ -40,7 +40,7 @@ def reasons_of(ended: Ended, verdict: Verdict | None) -> list[str]:
     if ended.ending != "complete":
         out = result["out_of_tolerance"]
         until = f"; {count_words(out) if out else 'none'} out until then" if verdict is not None else ""
-        return [_EARLY[ended.ending] + until, *([ended.message] if ended.message else []), *reasons]
+        return [*([ended.message] if ended.message else []), _EARLY[ended.ending] + until, *reasons]
     if verdict is None:
         return [ended.message or "no part found"]
     if verdict is Verdict.CONFORM:

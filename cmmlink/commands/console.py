@@ -6,7 +6,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -33,7 +33,7 @@ from cmmlink.run import FinishedRun
 from cmmlink.run_view import RunContext
 from cmmlink.stack import SectionOutcome, inspect_stack
 from cmmlink.version import __version__
-from cmmlink.words import headline_of
+from cmmlink.words import VERDICT_WORDS
 
 if TYPE_CHECKING:
     from cmmlink.console.server import ConsoleServer
@@ -115,8 +115,8 @@ def run_on_page(plan_file: Path, connect: Connect, output: Output) -> int:
 
 def inspect_surface(
     records: Path, file: Path, stop: threading.Event, on_start: Callable[[int], None], on_section: Callable[[Section], None]
-) -> str:
-    """Inspect the surface of a CT plan for the console and record its sections. Returns the outcome as a sentence."""
+) -> tuple[str, Sequence[str]]:
+    """Inspect the surface of a CT plan for the console and record its sections. Returns the outcome as a sentence, and the notes."""
     plan = load_ct_plan(file)
     prepare(plan.out)
     stack = inspect_stack(
@@ -130,9 +130,10 @@ def inspect_surface(
     folder = None if plan.out is None else stack.folder_of(plan.out, plan)
     if folder is not None:
         write_stack(folder, stack, plan.tolerance.zone, plan.part.name, pictures=False)
-    headline = headline_of(stack.verdict, stack.ending, len(stack.sections) / stack.asked)
-    sentences = [f"{headline.words}: {len(stack.sections)} sections of {plan.mesh.file.name}", *stack.notes]
-    return ". ".join([*sentences, *([f"Results in {folder}"] if folder is not None else [])])
+    worst = max(section.verdict for section in stack.sections)
+    count = sum(section.verdict is worst for section in stack.sections)
+    words = f"{count} of {stack.asked} sections of {plan.mesh.file.name} {VERDICT_WORDS[worst]}"
+    return f"{words}. Results in {folder}" if folder is not None else words, stack.notes
 
 
 def _section(plan: CtPlan, outcome: SectionOutcome, plan_name: str) -> Section:

@@ -26,9 +26,9 @@ class Section:
     warnings: tuple[str, ...]
 
 
-InspectSurface = Callable[[Path, threading.Event, Callable[[int], None], Callable[[Section], None]], str]
+InspectSurface = Callable[[Path, threading.Event, Callable[[int], None], Callable[[Section], None]], tuple[str, Sequence[str]]]
 """Inspect the surface of a CT plan. Arguments: its file, the event that aborts it, what is called with the number of sections,
-and what is called with each section. Returns a sentence on the whole."""
+and what is called with each section. Returns a sentence on the whole, and the notes on the surface and its nominals."""
 
 
 class CtImport:
@@ -42,7 +42,7 @@ class CtImport:
         self._lock = threading.Lock()
         self._began_s = 0.0
         self._sections: list[Section] = []
-        self._state = SurfaceState("", "", "none", "none", "", 0, 0, None, ())
+        self._state = SurfaceState("", "", "none", "none", "", (), 0, 0, None, ())
 
     @property
     def state(self) -> SurfaceState:
@@ -53,7 +53,7 @@ class CtImport:
         """Begin with another surface, which is read first."""
         with self._lock:
             self._sections = []
-            self._state = SurfaceState(plan, "READING", "none", "reading", "", 0, 0, None, ())
+            self._state = SurfaceState(plan, "READING", "none", "reading", "", (), 0, 0, None, ())
 
     def expect(self, sections: int) -> None:
         """Note how many sections will come."""
@@ -71,11 +71,11 @@ class CtImport:
             remaining_s = round((self._clock() - self._began_s) / done * (state.total - done))
             self._state = replace(state, done=done, remaining_s=remaining_s, sections=rows)
 
-    def end(self, message: str, failed: bool = False) -> None:
-        """Note that it is over."""
+    def end(self, message: str, notes: Sequence[str] = (), failed: bool = False) -> None:
+        """Note that it is over, what came of it, and what was assumed."""
         with self._lock:
             headline = NOT_MEASURED if failed or not self._sections else _headline_of(self._sections, self._state.total)
-            ended = replace(self._state, word=headline.words, shape=headline.shape, message=message, remaining_s=None)
+            ended = replace(self._state, word=headline.words, shape=headline.shape, message=message, notes=tuple(notes), remaining_s=None)
             self._state = replace(ended, state="failed" if failed else "done")
 
     def section(self, index: int) -> Section | None:

@@ -138,6 +138,7 @@ def _row_of(entry: dict[str, Any], result: dict[str, Any]) -> RunRow:
         entry["part"] or "",
         entry["serial_number"] or "",
         section_words(entry["stack"]),
+        bool(entry["simulated"]),
         entry["state"],
         entry["received"] or 0,
         entry["verdict"] if verdict is not None else None,

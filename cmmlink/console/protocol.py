@@ -170,6 +170,7 @@ class RunRow:
     part: str
     serial_number: str
     section: str
+    simulated: bool
     state: str
     received: int
     verdict: VerdictName | None
@@ -207,13 +208,18 @@ class SectionRow:
 
 @dataclass(frozen=True, slots=True)
 class SurfaceState:
-    """The CT surface that is inspected, or was inspected last; `word` and `shape` are those of its worst section so far."""
+    """The CT surface that is inspected, or was inspected last.
+
+    `word` and `shape` are those of its worst section, or say how early it ended;
+    `message` says what came of it, `notes` what was assumed about the surface and its nominals.
+    """
 
     plan: str
     word: str
     shape: Shape
     state: Literal["none", "reading", "inspecting", "done", "failed"]
     message: str
+    notes: tuple[str, ...]
     done: int
     total: int
     remaining_s: float | None

@@ -275,7 +275,7 @@ class Station:
 
     def _inspect(self, job: Job, inspect: InspectSurface, file: Path) -> None:
         try:
-            self.ct.end(inspect(file, job.stop, self.ct.expect, self.ct.add))
+            self.ct.end(*inspect(file, job.stop, self.ct.expect, self.ct.add))
         except (DeviceError, ValueError, OSError) as error:  # plan, surface or nominal cannot be used
             self.ct.end(str(error).replace(str(file), file.name), failed=True)
         except StoreError as error:

@@ -23,7 +23,7 @@ from cmmlink.record.station_lock import PATIENCE_S
 from cmmlink.record.store import FILE_NAME, Store
 from drivers import Arrival, PointBatch, Rejected, WireBytes
 
-_FROM_HEADER = ("run", "started", "part", "serial_number")
+_FROM_HEADER = ("run", "started", "part", "serial_number", "simulated")
 _FROM_END = ("state", "received", "verdict", "coverage")
 _CUT_OFF = "the program ended before the run did: power failure, crash or kill"
 
@@ -80,7 +80,7 @@ def open_to_read(folder: Path, now: Callable[[], datetime], *, close_interrupted
 
 
 def list_runs(folder: Path, now: Callable[[], datetime]) -> list[dict[str, Any]]:
-    """Every run, oldest first: run, started, part, serial_number, state, received, verdict, coverage, stack; none where there is none.
+    """Every run, oldest first: what its header says of it, its place in a stack, and how it ended; none where there is none.
 
     The state of a run that another process records just now is "running"; a run that gave no result has no verdict.
     """

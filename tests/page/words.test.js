@@ -5,7 +5,9 @@ import { test } from "node:test";
 
 import { alarmWords } from "../../cmmlink/console/static/alarms.js";
 import { CODE_OF, SHAPE_OF, wordOf } from "../../cmmlink/console/static/verdicts.js";
-import { ageWords, bannersOf, cardOf, moveWords, readiness } from "../../cmmlink/console/static/panels.js";
+import { cardOf, readiness } from "../../cmmlink/console/static/card.js";
+import { flooredShare } from "../../cmmlink/console/static/numbers.js";
+import { ageWords, bannersOf, moveWords } from "../../cmmlink/console/static/panels.js";
 
 const HEARD = { view: "live", chosen: null, surface: null, run: null, isRecorded: false,
   station: null, control: null, hasFault: false, isRemote: false, link: "live" };
@@ -37,14 +39,16 @@ test("banners stack: one thing never hides another", () => {
 
 test("the card belongs to what the view shows", () => {
   const verdict = { word: "CONFORM", shape: "conform", final: true, why: "all within", reasons: ["also this"] };
-  const run = { ...RUN, kind: "run", phase: "finished", part: "blade", serial_number: "B-1", began: "then", verdict };
+  const run = { ...RUN, kind: "run", phase: "finished", part: "blade", serial_number: "B-1", began: "then", verdict,
+    notes: [], worst: null };
   const station = { can_start: true, choice: { name: "a.yaml", part: "vane" }, serial_number: "B-2" };
   const heard = { ...HEARD, run, station };
   assert.deepEqual([cardOf(heard).word, cardOf(heard).reasons], ["CONFORM", ["also this"]]);
   const next = cardOf({ ...heard, view: "part" });
   assert.deepEqual([next.part, next.serial, next.word, next.run], ["vane", "B-2", "READY", null]);
   assert.match(next.before, /B-1.*CONFORM.*then/);
-  const surface = { plan: "ct.yaml", word: "NOT CONFORM", shape: "not-conform", state: "done", message: "", done: 3, total: 3 };
+  const surface = { plan: "ct.yaml", word: "NOT CONFORM", shape: "not-conform", state: "done", message: "",
+    notes: [], sections: [], done: 3, total: 3 };
   const ct = cardOf({ ...heard, view: "ct", surface });
   assert.deepEqual([ct.part, ct.serial, ct.word], ["ct.yaml", "", "NOT CONFORM"]);
   const chosen = { part: "blade", serial_number: "B-0", word: "ABORTED AT 32 %",
@@ -57,12 +61,37 @@ test("the card belongs to what the view shows", () => {
 });
 
 test("values are final only where the registration is, and no number is claimed before", () => {
-  assert.equal(moveWords(undefined), "\u2013");
-  assert.equal(moveWords({ state: "seeking", can_move_mm: null, other_poses: 0 }), "\u2013");
-  assert.equal(moveWords({ state: "provisional", can_move_mm: null, other_poses: 0 }), "the pose still moves");
-  assert.equal(moveWords({ state: "settled", can_move_mm: 0, other_poses: 0 }), "final");
-  assert.equal(moveWords({ state: "settled", can_move_mm: 0, other_poses: 1 }), "final, but 1 other pose fits as well");
-  assert.equal(moveWords({ state: "settled", can_move_mm: 0, other_poses: 2 }), "final, but 2 other poses fit as well");
+  const words = (state, other_poses = 0, phase = "finished") =>
+    moveWords({ phase, registration: { state, can_move_mm: null, other_poses } });
+  assert.equal(moveWords(null), "\u2013");
+  assert.equal(words("seeking", 0, "measuring"), "\u2013");
+  assert.equal(words("provisional", 0, "measuring"), "the pose still moves");
+  assert.equal(words("provisional"), "not settled");
+  assert.equal(words("settled"), "final");
+  assert.equal(words("settled", 1), "final, but 1 other pose fits as well");
+  assert.equal(words("settled", 2), "final, but 2 other poses fit as well");
+});
+
+test("a share is never rounded up", () => {
+  assert.deepEqual([1, 0.99999, 0.7498, 0.95, 0].map(flooredShare), ["100 %", "99.9 %", "74.9 %", "95.0 %", "0.0 %"]);
+});
+
+test("a card without a run shows the worst point of its row, and never zeros for numbers", () => {
+  const zone = { lower_mm: -0.05, upper_mm: 0.05 };
+  const row = { ...zone, worst_mm: -0.3919, worst_station_mm: 19.9, verdict: "nonconform" };
+  const card = (chosen) => cardOf({ ...HEARD, view: "history", chosen });
+  assert.deepEqual(card(row).worst, { deviation: -0.3919, station: 19.9, zone, kind: "under" });
+  assert.equal(card({ ...row, verdict: "uncertain" }).worst.kind, "not-proven");
+  assert.equal(card({ ...row, worst_mm: 0.01, verdict: "uncertain" }).worst.kind, "in");
+  assert.equal(card({ ...row, worst_mm: null }).worst, null);
+  assert.equal(card(row).run, null);
+  const sections = [
+    { ...row, worst_mm: 0.02, verdict: "conform" }, row,
+    { ...row, worst_mm: null, worst_station_mm: null, verdict: "uncertain" }];
+  const surface = { plan: "ct.yaml", word: "NOT CONFORM", shape: "not-conform", state: "done", message: "two of three", notes: ["n"],
+    sections };
+  const ct = cardOf({ ...HEARD, view: "ct", surface });
+  assert.deepEqual([ct.worst.deviation, ct.notes, ct.why], [-0.3919, ["n"], "two of three"]);
 });
 
 test("before a run the page says whether one can be started", () => {

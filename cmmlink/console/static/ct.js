@@ -3,7 +3,7 @@
 import { Chart } from "./chart.js";
 import { buttonOf, byId, fillBar, put } from "./dom.js";
 import { List } from "./list.js";
-import { count } from "./numbers.js";
+import { count, flooredShare } from "./numbers.js";
 import { WORDS_OF_VERDICTS } from "./protocol.js";
 import { Table, cell, verdictCell, worstCells } from "./table.js";
 import { SHAPE_OF } from "./verdicts.js";
@@ -73,7 +73,7 @@ function progressWords({ state, done, total, remaining_s }) {
 /** @param {SectionRow} section */
 function rowOf(section) {
   const numbers = [section.height_mm.toFixed(3), count(section.received)].map((words) => cell(words, "number"));
-  const coverage = cell(`${(100 * section.coverage).toFixed(1)} %`, "number"), notes = cell(section.warnings.join("; "));
+  const coverage = cell(flooredShare(section.coverage), "number"), notes = cell(section.warnings.join("; "));
   notes.title = section.warnings.join("\n");
   return [verdictCell(WORDS_OF_VERDICTS[section.verdict], SHAPE_OF[section.verdict]), ...numbers, ...worstCells(section), coverage, notes];
 }

@@ -1,12 +1,13 @@
 // The page: what the station says, put on the screen; what the operator does, sent to the station.
 
 import { showAlarms, toggleAlarmList } from "./alarms.js";
+import { cardOf } from "./card.js";
 import { CtView } from "./ct.js";
 import { buttonOf, byId, inputOf, put } from "./dom.js";
 import { listen } from "./gestures.js";
 import { History } from "./history.js";
 import { Link, OUT_OF_REACH } from "./link.js";
-import { ageWords, cardOf, showBanners, showButtons, showLamps, showRun } from "./panels.js";
+import { ageWords, showBanners, showButtons, showLamps, showRun } from "./panels.js";
 import { PartView } from "./part_view.js";
 import { Scan } from "./points.js";
 import { Profile } from "./profile.js";
@@ -16,11 +17,12 @@ import { Timing } from "./timing.js";
 /** @import { AlarmRow, Command, Hello, Message, ShownRun } from "./protocol.js" */
 /** @import { Cursor } from "./drawing.js" */
 /** @import { LinkState, Outcome } from "./link.js" */
-/** @import { Heard } from "./panels.js" */
+/** @import { Heard } from "./card.js" */
 
 const VIEWS = ["live", "part", "history", "ct"];
 const MOST_MAGNIFICATION = 5000;
 const SLIDER_STEPS = 1000;
+const LONG_AGE = 14; // signs of an age that has a date
 const SAID_MS = 8000; // so long the answer to a command stays
 const SILENT = ["enter", "devices"]; // commands whose success is not worth a word
 
@@ -161,7 +163,9 @@ function paintWords() {
 }
 
 function showAge() {
-  put("age", ageWords(cardOf(heard).run, clock.nowMs + performance.now() - clock.at));
+  const words = ageWords(cardOf(heard).run, clock.nowMs + performance.now() - clock.at);
+  put("age", words);
+  byId("age").dataset.long = String(words.length > LONG_AGE);
 }
 
 /** @param {number} magnification */

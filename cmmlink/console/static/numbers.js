@@ -18,6 +18,14 @@ export function signed(value, digits = 4) {
 }
 
 /**
+ * A share in percent, never rounded up: what is not the whole is not called so, and what is too little does not look enough.
+ * @param {number} share from 0 to 1
+ */
+export function flooredShare(share) {
+  return share > 1 - 1e-9 ? "100 %" : `${(Math.floor(1000 * share + 1e-9) / 10).toFixed(1)} %`;
+}
+
+/**
  * Enough digits to tell limits and deviations of this size apart.
  * @param {Pick<ZoneLimits, "lower_mm" | "upper_mm">} zone
  */

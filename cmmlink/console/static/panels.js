@@ -1,45 +1,19 @@
-// The right-hand side, the lamps, the banner and the buttons: words and numbers of the run.
+// The right-hand side, the lamps, the banners and the buttons: words and numbers of the run.
 
+import { cardOf } from "./card.js";
 import { buttonOf, byId, fillBar, make, put, putInto, showSymbol, styleOf, within } from "./dom.js";
-import { count, digitsFor, signed } from "./numbers.js";
-import { classOf, toleranceUse } from "./points.js";
+import { count, digitsFor, flooredShare, signed } from "./numbers.js";
+import { toleranceUse } from "./points.js";
 import { POSE_MOVES } from "./protocol.js";
-import { CODE_OF } from "./verdicts.js";
 
-/** @import { Control, RegistrationState, RunRow, RunState, StationState, SurfaceState } from "./protocol.js" */
-/** @import { LinkState } from "./link.js" */
+/** @import { RunState } from "./protocol.js" */
+/** @import { Card, Heard } from "./card.js" */
 /** @typedef {[symbol: string, word: string]} Lamp */
 /** @typedef {{ words: string, kind: "none" | "note" | "warning" | "fault", button: string, act: "live" | "take control" }} Banner */
-/**
- * What stands at the right of the page: whose verdict, and the verdict.
- * @typedef {{ part: string, serial: string, names: (string | undefined)[], word: string,
- * shape: RunState["verdict"]["shape"], final: boolean,
- *   why: string, reasons: readonly string[], phase: string, badge: string, before: string, run: RunState | null }} Card
- */
-/**
- * What the station says, as far as it was heard.
- * @typedef {object} Heard
- * @property {RunState | null} run the run that is shown
- * @property {boolean} isRecorded whether that run comes from the records
- * @property {StationState | null} station
- * @property {Control | null} control
- * @property {string} view what the page shows: live, part, history or ct
- * @property {RunRow | null} chosen the run chosen in the history
- * @property {SurfaceState | null} surface
- * @property {boolean} hasFault
- * @property {boolean} isRemote whether the station is open to the network, unencrypted
- * @property {LinkState} link
- */
 
 const NONE = "\u2013";
 const LONG_WORD = 9; // letters; a longer word is set smaller, so that it stays in its card
-const NEEDS_ADDRESS = "This page has no access. An address opens one page, once, within a minute: "
-  + "press Enter where the console runs, or Another page on a page that is open, and open the new address here.";
-/** @type {Card} */
-const NO_CARD = { part: "", serial: "", names: [], word: "",
-  shape: "none", final: false, why: "", reasons: [], phase: "", badge: "", before: "", run: null };
 const SIGNS = { over: "\u25b2", under: "\u25bc", "not-proven": "\u25c6", in: "\u25cf", near: "\u25cf" };
-const PHASES = { preparing: "preparing", starting: "connecting", measuring: "so far", ending: "ending", finished: "" };
 
 /** @type {Readonly<Record<RunState["link"], Lamp>>} */
 const LINK_LAMPS = {
@@ -61,70 +35,13 @@ export function showRun(heard) {
   put("kind", card.badge);
   showVerdict(card);
   showRemarks(card);
-  put("rule", run ? ruleWords(run) : "");
-  showWorst(run);
-  showRegistration(run?.registration);
+  put("rule", run?.zone.decision_rule ?? "");
+  byId("rule").title = run?.zone.decision_rule ?? ""; // a long one is cut
+  document.body.dataset.card = run ? "run" : "summary";
+  showWorst(card);
+  showRegistration(run);
   showCoverage(run?.coverage ?? 0, run?.coverage_min ?? 0);
   showNumbers(run);
-}
-
-/**
- * What stands at the right: it always belongs to what the view shows, and a run that is on stands there whatever is looked at.
- * @param {Heard} heard
- * @returns {Card}
- */
-export function cardOf({ run, isRecorded, station, view, chosen, surface }) {
-  const isOn = run !== null && run.phase !== "finished" && !isRecorded;
-  if (!isOn && view === "part") return cardOfNextPart(run, station);
-  if (!isOn && view === "history" && chosen) return cardOfRow(chosen);
-  if (!isOn && view === "ct" && surface) return cardOfSurface(surface);
-  return run ? cardOfRun(run) : cardOfNextPart(null, station);
-}
-
-/**
- * @param {RunState} run
- * @returns {Card}
- */
-function cardOfRun(run) {
-  const { word, shape, final, why, reasons } = run.verdict,
-    badge = { run: "", section: "SECTION", replay: "REPLAY of", recorded: "RECORDED" }[run.kind];
-  const dated = run.kind === "section" || !badge ? badge : `${badge} ${run.began}`;
-  const phase = final ? "" : PHASES[run.phase];
-  return { part: run.part, serial: run.serial_number, names: [run.plan, run.operator], word, shape, final,
-    why, reasons, phase, badge: dated, before: "", run };
-}
-
-/**
- * While the next part is prepared, the verdict on the last one is a line with its own serial number and time.
- * @param {RunState | null} run
- * @param {StationState | null} station
- * @returns {Card}
- */
-function cardOfNextPart(run, station) {
-  const choice = station?.choice, last = run && [run.serial_number || run.part, run.verdict.word, run.began];
-  return {
-    ...NO_CARD, ...readiness(station), part: choice?.part ?? "", serial: station?.serial_number ?? "",
-    names: [choice?.name, station?.operator], before: last ? `Before: ${last.filter(Boolean).join("  \u00b7  ")}` : "",
-  };
-}
-
-/**
- * @param {RunRow} row
- * @returns {Card}
- */
-function cardOfRow({ part, serial_number: serial, section, word, shape, counted, began, run }) {
-  return { ...NO_CARD, part, serial, names: [section, run], word, shape,
-    final: counted, why: "as recorded; O opens the run", badge: `RECORDED ${began}` };
-}
-
-/**
- * @param {SurfaceState} surface
- * @returns {Card}
- */
-function cardOfSurface({ plan, word, shape, state, message, done, total }) {
-  const progress = total ? `${done} of ${total} sections` : "choose a CT plan";
-  const why = state === "done" || state === "failed" ? message : progress;
-  return { ...NO_CARD, part: plan || "No surface", names: ["CT surface"], word: word || "NO SURFACE", shape, final: state === "done", why };
 }
 
 /** @param {Card} shown */
@@ -145,8 +62,7 @@ function showVerdict({ word, shape, final, why, phase }) {
  * Every further reason of the verdict, and all that was assumed about nominal and points.
  * @param {Card} card
  */
-function showRemarks({ reasons, run }) {
-  const notes = run?.notes ?? [];
+function showRemarks({ reasons, notes }) {
   byId("remarks").hidden = !reasons.length && !notes.length;
   showList("reasons", reasons);
   showList("notes", notes);
@@ -164,53 +80,33 @@ function showList(id, sentences) {
   list.replaceChildren(...sentences.map((sentence) => make("li", sentence)));
 }
 
-/**
- * The zone that a run is judged by, and how the uncertainty counts.
- * @param {RunState} run
- */
-export function ruleWords({ zone }) {
-  const digits = digitsFor(zone);
-  return `zone ${signed(zone.lower_mm, digits)} .. ${signed(zone.upper_mm, digits)} mm; ${zone.decision_rule}`;
-}
-
-/**
- * What stands in the verdict's place before a run.
- * @param {StationState | null} station
- */
-export function readiness(station) {
-  if (station?.can_start) return { word: "READY", why: "start when the part is in place" };
-  return { word: "NO PLAN", why: station?.choice ? `${station.choice.name} cannot be run` : "choose a plan" };
+/** @param {Card} card */
+function showWorst({ worst, run }) {
+  byId("worst").dataset.kind = worst?.kind ?? "none";
+  put("worst-shape", worst ? SIGNS[worst.kind] : "");
+  put("worst-value", worst ? signed(worst.deviation, digitsFor(worst.zone)) : NONE);
+  const nowhere = run ? "no point judged" : "";
+  put("worst-where", worst ? `at station ${worst.station.toFixed(2)} mm` : nowhere);
+  put("worst-use", worst ? `${Math.round(100 * toleranceUse(worst.deviation, worst.zone))} % of the tolerance` : "");
 }
 
 /** @param {RunState | null} run */
-function showWorst(run) {
-  const worst = run?.worst;
-  const kind = worst ? classOf(worst.deviation_mm, CODE_OF[worst.verdict], run.zone) : null;
-  byId("worst").dataset.kind = kind ?? "none";
-  put("worst-shape", kind ? SIGNS[kind] : "");
-  put("worst-value", worst ? signed(worst.deviation_mm, digitsFor(run.zone)) : NONE);
-  const nowhere = run ? "no point judged" : "";
-  put("worst-where", worst ? `at station ${worst.station_mm.toFixed(2)} mm` : nowhere);
-  put("worst-use", worst ? `${Math.round(100 * toleranceUse(worst.deviation_mm, run.zone))} % of the tolerance` : "");
-}
-
-/** @param {RegistrationState | undefined} registration */
-function showRegistration(registration) {
-  for (const step of byId("registration").querySelectorAll("li")) {
-    step.toggleAttribute("aria-current", step.dataset.step === registration?.state);
-  }
-  put("can-move", moveWords(registration));
+function showRegistration(run) {
+  const isOver = run?.phase === "finished", state = isOver && run.registration.state === "seeking" ? "" : run?.registration.state;
+  for (const step of byId("registration").querySelectorAll("li")) step.toggleAttribute("aria-current", step.dataset.step === state);
+  put("can-move", moveWords(run));
 }
 
 /**
  * Whether values can still move. By how much is not said, since no bound is known while the pose moves.
- * @param {RegistrationState | undefined} registration
+ * @param {Pick<RunState, "registration" | "phase"> | null} run
  */
-export function moveWords(registration) {
-  const others = registration?.other_poses ?? 0;
+export function moveWords(run) {
+  if (!run) return NONE;
+  const { state, other_poses: others } = run.registration;
   if (others) return `final, but ${others} other pose${others > 1 ? "s fit" : " fits"} as well`;
-  if (registration?.state === "provisional") return POSE_MOVES;
-  return registration?.state === "settled" ? "final" : NONE;
+  if (state === "provisional") return run.phase === "finished" ? "not settled" : POSE_MOVES;
+  return state === "settled" ? "final" : NONE;
 }
 
 /**
@@ -218,7 +114,7 @@ export function moveWords(registration) {
  * @param {number} needed
  */
 function showCoverage(share, needed) {
-  put("coverage", `${(100 * share).toFixed(share < 0.9995 ? 1 : 0)} %`);
+  put("coverage", flooredShare(share));
   const bar = byId("coverage-bar"), limit = within(bar, "em");
   fillBar("coverage-bar", share);
   styleOf(limit).left = `${100 * needed}%`;
@@ -260,8 +156,9 @@ export function ageWords(run, nowMs) {
 }
 
 /** @param {Heard} heard */
-export function showLamps({ run, hasFault, link }) {
-  byId("simulated").hidden = !run?.simulated;
+export function showLamps(heard) {
+  const { run, hasFault, link } = heard;
+  byId("simulated").hidden = !cardOf(heard).simulated;
   showLamp("lamp-link", run && link === "live" ? LINK_LAMPS[run.link] : DARK);
   showLamp("lamp-streaming", pointsLamp(run));
   showLamp("lamp-faults", hasFault ? ["lamp-fault", "FAULT"] : DARK);

@@ -210,7 +210,7 @@ export const middleOf = (zone) => (zone.lower_mm + zone.upper_mm) / 2;
 /**
  * How much of the tolerance a deviation uses: 1 at a limit.
  * @param {number} deviation
- * @param {ZoneLimits} zone
+ * @param {Pick<ZoneLimits, "lower_mm" | "upper_mm">} zone
  */
 export function toleranceUse(deviation, zone) {
   return Math.abs(deviation - middleOf(zone)) / ((zone.upper_mm - zone.lower_mm) / 2);
@@ -219,7 +219,7 @@ export function toleranceUse(deviation, zone) {
 /**
  * @param {number} deviation
  * @param {number} verdict
- * @param {ZoneLimits} zone
+ * @param {Pick<ZoneLimits, "lower_mm" | "upper_mm">} zone
  * @returns {PointClass}
  */
 export function classOf(deviation, verdict, zone) {

@@ -202,6 +202,7 @@ export interface RunRow {
   readonly part: string;
   readonly serial_number: string;
   readonly section: string;
+  readonly simulated: boolean;
   readonly state: string;
   readonly received: number;
   readonly verdict: "conform" | "uncertain" | "nonconform" | null;
@@ -233,13 +234,14 @@ export interface SectionRow {
   readonly warnings: readonly string[];
 }
 
-/** The CT surface that is inspected, or was inspected last; `word` and `shape` are those of its worst section so far. */
+/** The CT surface that is inspected, or was inspected last. `word` and `shape` are those of its worst section, or say how early it ended; `message` says what came of it, `notes` what was assumed about the surface and its nominals. */
 export interface SurfaceState {
   readonly plan: string;
   readonly word: string;
   readonly shape: "conform" | "not-proven" | "not-conform" | "ended-early" | "none";
   readonly state: "none" | "reading" | "inspecting" | "done" | "failed";
   readonly message: string;
+  readonly notes: readonly string[];
   readonly done: number;
   readonly total: number;
   readonly remaining_s: number | null;

@@ -126,12 +126,19 @@ def bench(make_bench: MakeBench) -> Bench:
 
 @pytest.fixture
 def keep(request: pytest.FixtureRequest) -> Callable[[Page, str], None]:
-    """Keeps a picture of a page where the test run was told to."""
+    """Keeps pictures of a page, one a size of screen, where the test run was told to."""
     folder = request.config.getoption("--screenshots")
 
     def keep_picture(page: Page, name: str) -> None:
-        if folder:
-            Path(folder).mkdir(parents=True, exist_ok=True)
-            page.screenshot(path=Path(folder) / f"{name}.png")
+        if not folder:
+            return
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        before = page.viewport_size
+        assert before is not None
+        for width, height in ((1280, 800), (1920, 1080), (1024, 768)):
+            page.set_viewport_size({"width": width, "height": height})
+            page.wait_for_timeout(400)  # until the drawings have taken their new size
+            page.screenshot(path=Path(folder) / f"{name}-{width}x{height}.png")
+        page.set_viewport_size(before)
 
     return keep_picture

@@ -32,6 +32,7 @@ from .conftest import TOKEN, Bench, MakeBench
 from .played import CLOSED, PLAN, batches, measured, opened
 
 Keep = Callable[[Page, str], None]
+Summary = tuple[str, Sequence[str]]
 
 
 def number(page: Page, name: str) -> int:
@@ -162,8 +163,8 @@ def test_device_that_fails_ends_the_run_as_not_proven(bench: Bench, keep: Keep) 
         opened(2000), *batches(measured(bench.profile, 2000, seed=1), 50)[:30], LinkError("COM3 does not answer any more")
     )
     expect(page.locator("#verdict-word")).to_have_text(re.compile(r"INTERRUPTED AT 7\d %"))
-    expect(page.locator("#verdict-why")).to_have_text("no verdict: the scan was interrupted; none out until then")
-    expect(page.locator("#reasons li").first).to_have_text("COM3 does not answer any more")
+    expect(page.locator("#verdict-why")).to_have_text("COM3 does not answer any more")
+    expect(page.locator("#reasons li").first).to_have_text("no verdict: the scan was interrupted; none out until then")
     expect(page.locator("#alarm-text")).to_have_text("Device failed: COM3 does not answer any more")
     expect(page.locator("#received")).to_have_text("1,500")
     keep(page, "device-failed")
@@ -217,6 +218,7 @@ def test_full_disk_stops_the_run_and_says_so(make_bench: MakeBench, tmp_path: Pa
     keep(page, "disk-full")
     page.keyboard.press("3")
     expect(page.locator("#runs tbody tr")).to_have_text([re.compile("^INTERRUPTED.*interrupted")])
+    keep(page, "disk-full-history")
 
 
 def test_invalid_plan_is_shown_with_its_line(make_bench: MakeBench, keep: Keep) -> None:
@@ -529,7 +531,7 @@ def test_no_screen_shows_two_opposite_verdicts(make_bench: MakeBench, tmp_path: 
     bad = measured(bench.profile, 2000, seed=1, defect_mm=0.4)
     bench.device.source.put(opened(2000), *batches(bad, 50), Damaged(17, "checksum"), CLOSED)
     expect(page.locator("#verdict-word")).to_have_text("NOT CONFORM")
-    assert bench.station.wait(20.0)
+    expect(page.locator("#next")).to_be_enabled()
     page.keyboard.press("n")
     expect(page.locator("#serial-number")).to_have_text("B-0042")
     expect(page.locator("#verdict-word")).to_have_text("READY")
@@ -570,7 +572,7 @@ def test_surface_is_imported_with_progress_and_its_sections_opened(make_bench: M
     plan = tmp_path / "ct.yaml"
     released = threading.Event()
 
-    def inspect(file: Path, stop: threading.Event, on_start: Callable[[int], None], on_section: Callable[[Section], None]) -> str:
+    def inspect(file: Path, stop: threading.Event, on_start: Callable[[int], None], on_section: Callable[[Section], None]) -> Summary:
         def one_by_one(section: Section) -> None:
             on_section(section)
             if section.height_mm == 8:
@@ -596,7 +598,10 @@ def test_surface_is_imported_with_progress_and_its_sections_opened(make_bench: M
     expect(page.locator("#ct-bar")).to_be_visible()
     expect(page.locator("#abort")).to_be_enabled()
     released.set()
-    expect(page.locator("#ct-message")).to_contain_text("NOT CONFORM: 4 sections of")
+    expect(page.locator("#ct-message")).to_have_text("2 of 4 sections of blade.stl NOT CONFORM")
+    expect(page.locator("#verdict-word")).to_have_text("NOT CONFORM")
+    expect(page.locator("#notes li").first).to_contain_text("section.yaml: ")
+    expect(page.locator("#worst-value")).to_contain_text("+0.08")
     expect(page.locator("#sections tbody td:first-child")).to_have_text(["CONFORM", "CONFORM", "NOT CONFORM", "NOT CONFORM"])
     keep(page, "ct")
     focus(page, "sections")
@@ -613,11 +618,16 @@ def test_surface_is_imported_with_progress_and_its_sections_opened(make_bench: M
     page.keyboard.press("Escape")
     expect(page.locator("#banners")).to_be_hidden()
     page.wait_for_function(f"!({INKED})('#profile') && !({INKED})('#strip')")  # nothing is left of what is no longer shown
+    check_sections_on_record(page)
+
+
+def check_sections_on_record(page: Page) -> None:
+    """Each section stands in the history, and is replayed from there; the chart of parts does not count it."""
     page.keyboard.press("3")
     heights = ("16.000", "12.000", "8.000", "4.000")
     told = [re.compile(f"blade 7, section {4 - k} of 4 at {height} mm") for k, height in enumerate(heights)]
     expect(page.locator("#runs tbody tr")).to_have_text(told)
-    expect(page.locator("#chart-words")).to_be_empty()  # the sections of a surface are no parts
+    expect(page.locator("#chart-words")).to_be_empty()
     page.keyboard.press("r")
     expect(page.locator("#banners")).to_contain_text("identical to the recorded result, to the last bit")
     expect(page.locator("#verdict-word")).to_have_text("NOT CONFORM")
@@ -650,7 +660,7 @@ def test_everything_is_on_the_screen_without_scrolling(bench: Bench, keep: Keep,
     page.keyboard.press("Enter")
     bench.device.source.put(opened(2000), *batches(measured(bench.profile, 2000, seed=2, defect_mm=0.12, at_mm=60.0), 50), CLOSED)
     expect(page.locator("#verdict[data-final=true] .word")).to_have_text("NOT CONFORM")
-    seen = "verdict-word verdict-why worst-value worst-where worst-use coverage lost age abort serial-number strip profile"
+    seen = "verdict-word verdict-why worst-value worst-where worst-use coverage lost age abort serial-number strip profile remarks"
     for name in seen.split():
         box = page.locator(f"#{name}").bounding_box()
         assert box is not None
@@ -659,14 +669,14 @@ def test_everything_is_on_the_screen_without_scrolling(bench: Bench, keep: Keep,
         assert box["x"] + box["width"] <= width
         assert box["y"] + box["height"] <= height
     assert overflowing(page) == []
-    keep(page, f"defect-{width}x{height}")
+    keep(page, "defect")
 
 
 def overflowing(page: Page) -> list[str]:
-    """Elements of the result whose text does not fit into their box."""
+    """Elements of the result whose text does not fit into their box; the list of reasons and notes scrolls."""
     found: list[str] = page.evaluate(
         """() => [...document.querySelectorAll('aside .card, aside .verdict, aside dd, .word, .why, .big, .where')]
-           .filter(e => e.offsetParent && (e.scrollWidth > e.clientWidth + 1
+           .filter(e => e.offsetParent && e.id !== 'remarks' && (e.scrollWidth > e.clientWidth + 1
                || (!e.matches('.word, .big') && e.scrollHeight > e.clientHeight + 3)))  // their lines are set closer than their letters
            .map(e => e.className + ' ' + e.id)"""
     )

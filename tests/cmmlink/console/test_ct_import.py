@@ -1,7 +1,7 @@
 """The inspection of a surface, while others look at its sections."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -19,6 +19,8 @@ from cmmlink.run_view import RunContext
 from inspection import NominalProfile, NurbsCurve, ToleranceZone, discretize
 
 from .played import Device, setup_of
+
+Summary = tuple[str, Sequence[str]]
 
 
 @pytest.fixture(scope="module")
@@ -79,12 +81,12 @@ def test_section_is_given_or_not_however_many_imports_begin_meanwhile(profile: N
 def test_section_of_a_surface_is_opened_while_the_next_import_has_begun(profile: NominalProfile, tmp_path: Path) -> None:
     begun, released = threading.Event(), threading.Event()
 
-    def inspect(file: Path, stop: threading.Event, on_start: Callable[[int], None], on_section: Callable[[Section], None]) -> str:
+    def inspect(file: Path, stop: threading.Event, on_start: Callable[[int], None], on_section: Callable[[Section], None]) -> Summary:
         on_start(1)
         on_section(section_at(3.0, profile))
         begun.set()
         assert stop.wait(60.0) or released.is_set()
-        return "done"
+        return "done", ("a note",)
 
     setup = setup_of({}, Device().connect)
     station = Station(replace(setup, ct_plans=lambda: {"ct.yaml": tmp_path / "ct.yaml"}, inspect_surface=inspect))

@@ -1,0 +1,146 @@
+// The card at the right of the page: whose verdict it is, the verdict, and what it rests on.
+
+import { classOf, toleranceUse } from "./points.js";
+import { CODE_OF } from "./verdicts.js";
+
+/** @import { Control, RunRow, RunState, SectionRow, StationState, SurfaceState } from "./protocol.js" */
+/** @import { LinkState } from "./link.js" */
+/** @import { PointClass } from "./points.js" */
+/** @typedef {{ lower_mm: number, upper_mm: number }} Zone */
+/** @typedef {{ deviation: number, station: number, kind: PointClass, zone: Zone }} Worst */
+/**
+ * What stands at the right of the page.
+ * @typedef {object} Card
+ * @property {string} part
+ * @property {string} serial
+ * @property {(string | undefined)[]} names plan, operator, run
+ * @property {string} word
+ * @property {RunState["verdict"]["shape"]} shape
+ * @property {boolean} final
+ * @property {string} why
+ * @property {readonly string[]} reasons every further one
+ * @property {readonly string[]} notes
+ * @property {string} phase
+ * @property {string} badge
+ * @property {string} before
+ * @property {Worst | null} worst
+ * @property {boolean} simulated
+ * @property {RunState | null} run where the card is that of a run, its numbers
+ */
+/**
+ * What the station says, as far as it was heard.
+ * @typedef {object} Heard
+ * @property {RunState | null} run the run that is shown
+ * @property {boolean} isRecorded whether that run comes from the records
+ * @property {StationState | null} station
+ * @property {Control | null} control
+ * @property {string} view what the page shows: live, part, history or ct
+ * @property {RunRow | null} chosen the run chosen in the history
+ * @property {SurfaceState | null} surface
+ * @property {boolean} hasFault
+ * @property {boolean} isRemote whether the station is open to the network, unencrypted
+ * @property {LinkState} link
+ */
+
+/** @type {Card} */
+const NO_CARD = {
+  part: "", serial: "", names: [], word: "", shape: "none", final: false, why: "", reasons: [], notes: [], phase: "", badge: "", before: "",
+  worst: null, simulated: false, run: null,
+};
+const PHASES = { preparing: "preparing", starting: "connecting", measuring: "so far", ending: "ending", finished: "" };
+const BADGES = { run: "", section: "SECTION", replay: "REPLAY of", recorded: "RECORDED" };
+
+/**
+ * What stands at the right: it always belongs to what the view shows, and a run that is on stands there whatever is looked at.
+ * @param {Heard} heard
+ * @returns {Card}
+ */
+export function cardOf({ run, isRecorded, station, view, chosen, surface }) {
+  const isOn = run !== null && run.phase !== "finished" && !isRecorded;
+  if (!isOn && view === "part") return cardOfNextPart(run, station);
+  if (!isOn && view === "history" && chosen) return cardOfRow(chosen);
+  if (!isOn && view === "ct" && surface) return cardOfSurface(surface);
+  return run ? cardOfRun(run) : cardOfNextPart(null, station);
+}
+
+/**
+ * @param {RunState} run
+ * @returns {Card}
+ */
+function cardOfRun(run) {
+  const { part, serial_number: serial, plan, operator, began, notes, simulated, zone } = run;
+  const { word, shape, final, why, reasons } = run.verdict;
+  const badge = run.kind === "replay" || run.kind === "recorded" ? `${BADGES[run.kind]} ${began}` : BADGES[run.kind];
+  const worst = run.worst && {
+    deviation: run.worst.deviation_mm, station: run.worst.station_mm, zone,
+    kind: classOf(run.worst.deviation_mm, CODE_OF[run.worst.verdict], zone),
+  };
+  return {
+    part, serial, names: [plan, operator], word, shape, final, why, reasons, notes, phase: final ? "" : PHASES[run.phase],
+    badge, before: "", worst, simulated, run,
+  };
+}
+
+/**
+ * While the next part is prepared, the verdict on the last one is a line with its own serial number and time.
+ * @param {RunState | null} run
+ * @param {StationState | null} station
+ * @returns {Card}
+ */
+function cardOfNextPart(run, station) {
+  const choice = station?.choice, last = run && [run.serial_number || run.part, run.verdict.word, run.began];
+  return {
+    ...NO_CARD, ...readiness(station), part: choice?.part ?? "", serial: station?.serial_number ?? "",
+    names: [choice?.name, station?.operator], before: last ? `Before: ${last.filter(Boolean).join("  \u00b7  ")}` : "",
+  };
+}
+
+/**
+ * @param {RunRow} row
+ * @returns {Card}
+ */
+function cardOfRow(row) {
+  const { part, serial_number: serial, section, word, shape, counted, began, run, simulated } = row;
+  return {
+    ...NO_CARD, part, serial, names: [section, run], word, shape, final: counted, why: "as recorded; O opens the run",
+    badge: `RECORDED ${began}`, worst: worstOf(row), simulated,
+  };
+}
+
+/**
+ * @param {SurfaceState} surface
+ * @returns {Card}
+ */
+function cardOfSurface({ plan, word, shape, state, message, notes, done, total, sections }) {
+  const progress = total ? `${done} of ${total} sections` : "choose a CT plan";
+  const why = state === "done" || state === "failed" ? message : progress;
+  const worst = sections.map(worstOf).reduce((one, other) => (useOf(other) > useOf(one) ? other : one), null);
+  return {
+    ...NO_CARD, part: plan || "No surface", names: ["CT surface"], word: word || "NO SURFACE", shape, final: state === "done",
+    why, notes, worst,
+  };
+}
+
+/** @param {Worst | null} worst */
+const useOf = (worst) => (worst ? toleranceUse(worst.deviation, worst.zone) : -1);
+
+/**
+ * The worst point of a run or a section as a table holds it; outside the zone it is out only where the verdict says so.
+ * @param {Pick<RunRow | SectionRow, "worst_mm" | "worst_station_mm" | "lower_mm" | "upper_mm" | "verdict">} row
+ * @returns {Worst | null}
+ */
+function worstOf({ worst_mm: deviation, worst_station_mm: station, lower_mm, upper_mm, verdict }) {
+  if (deviation === null || station === null || lower_mm === null || upper_mm === null) return null;
+  const zone = { lower_mm, upper_mm }, isOutside = deviation < lower_mm || deviation > upper_mm;
+  const code = CODE_OF[verdict === "nonconform" ? "nonconform" : "uncertain"];
+  return { deviation, station, zone, kind: classOf(deviation, isOutside ? code : CODE_OF.conform, zone) };
+}
+
+/**
+ * What stands in the verdict's place before a run.
+ * @param {StationState | null} station
+ */
+export function readiness(station) {
+  if (station?.can_start) return { word: "READY", why: "start when the part is in place" };
+  return { word: "NO PLAN", why: station?.choice ? `${station.choice.name} cannot be run` : "choose a plan" };
+}
