@@ -72,6 +72,19 @@ def test_a_section_on_record_gives_the_same_result_to_the_last_bit(told: tuple[P
     assert refused["events"][1]["count"] == slices[2]["received"]
 
 
+def test_a_doubt_about_the_outline_is_on_record_and_in_the_replay(tmp_path: Path, spline: BSpline) -> None:
+    outline = spline(np.linspace(0, 1, 600))
+    bad = outline + np.array([0.0, 100.0])
+    bad[100:140, 1] += 0.5 * np.sin(np.linspace(0, np.pi, 40))
+    both = np.concatenate([tube(ring, np.array([0.0, 20.0])) for ring in (outline, bad)])
+    mesh, nominal = write(tmp_path / "two.stl", binary_stl(both)), write_spline(spline, tmp_path / "n.yaml")
+    options = ("--nominal", nominal, "--tolerance", -0.1, 0.1, "--heights", 5, "--cutter", "numpy", "--records", tmp_path / "records")
+    (cut,) = cmmlink("ct", mesh, *options, "--json").json()["slices"]
+    again = cmmlink("replay", "last", "--records", tmp_path / "records", "--json").json()
+    assert (cut["verdict"], cut["reasons"][0]["kind"]) == ("uncertain", "outline")
+    assert (again["identical"], again["reasons"]) == (True, cut["reasons"])
+
+
 def test_a_stack_is_not_recorded_where_that_is_asked_and_not_inspected_where_it_cannot_be(
     blade: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

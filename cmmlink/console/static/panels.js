@@ -13,6 +13,8 @@ import { POSE_MOVES } from "./protocol.js";
 
 const NONE = "\u2013";
 const LONG_WORD = 9; // letters; a longer word is set smaller, so that it stays in its card
+const NEEDS_ADDRESS = "This page has no access. An address opens one page, once, within a minute: "
+  + "press Enter where the console runs, or Another page on a page that is open, and open the new address here.";
 const SIGNS = { over: "\u25b2", under: "\u25bc", "not-proven": "\u25c6", in: "\u25cf", near: "\u25cf" };
 
 /** @type {Readonly<Record<RunState["link"], Lamp>>} */
