@@ -13,19 +13,23 @@ demo: .venv/installed
 
 install: .venv/all-installed
 
+# A file stays with one process, which so prepares its nominals and its browser once; tests/conftest.py has the order.
+TWO_AT_ONCE := -n 2 --dist loadfile --no-loadscope-reorder
+
 test: .venv/test-installed
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/pytest -n 2 $(PYTEST_OPTIONS)
+	$(BIN)/pytest $(TWO_AT_ONCE) $(PYTEST_OPTIONS)
 	@tests/page/check $(PAGE_OPTIONS)
 
-# The lowest versions that pyproject.toml allows, on Python 3.11 and without the extras, must pass the fast tests.
+# The lowest versions that pyproject.toml allows, on Python 3.11 and without the extras, must pass the fast tests: the first case of
+# every test of the four packages, but for those in a browser; not the tests of devices and documents, which start processes.
 LOWEST_PYTHON ?= python3.11
-SLOW_TESTS := tests/integration tests/docs tests/cmmlink/console/test_console_browser.py
+FAST_TESTS := --first-case tests/inspection tests/drivers tests/simulators tests/cmmlink --ignore=tests/cmmlink/console/test_console_browser.py
 lowest: .venv/lowest/installed
-	.venv/lowest/bin/python -m pytest -n 2 $(SLOW_TESTS:%=--ignore=%)
+	.venv/lowest/bin/python -m pytest $(TWO_AT_ONCE) $(FAST_TESTS)
 
 # For every system of the README the versions of constraints.txt must exist as wheels.
 platforms: .venv/test-installed

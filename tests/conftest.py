@@ -1,5 +1,6 @@
 """Options that point the tests of devices at hardware, and those of the console at a browser; what all tests of a process share."""
 
+import sys
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +28,17 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--require-browser", action="store_true", help="fail where the tests in a browser would be skipped")
     group.addoption("--require-open3d", action="store_true", help="fail where the tests with Open3D would be skipped")
     group.addoption("--screenshots", metavar="DIR", help="keep pictures of the console's pages in this folder")
+    parser.getgroup("quick").addoption("--first-case", action="store_true", help="run the first case only of tests that have several")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mix the files of all packages, so that tests that wait for a device run beside tests that compute."""
+    items.sort(key=lambda item: (item.path.name, str(item.path)))
+    if config.getoption("--first-case"):
+        first = {item.nodeid.partition("[")[0]: item for item in reversed(items)}
+        others = [item for item in items if first[item.nodeid.partition("[")[0]] is not item]
+        config.hook.pytest_deselected(items=others)
+        items[:] = [item for item in items if first[item.nodeid.partition("[")[0]] is item]
 
 
 @pytest.fixture(autouse=True, scope="session")
@@ -41,6 +53,9 @@ def _records_of_their_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[
 @pytest.fixture(autouse=True, scope="session")
 def _preparations_made_once() -> Iterator[None]:
     """Discretise a nominal, and rehearse on it, once for all runs of a process: half their time goes there, and both have tests."""
+    if "cmmlink.run" not in sys.modules:  # no test that was collected runs anything
+        yield
+        return
     from inspection import discretize, rehearse
 
     made: dict[tuple[object, ...], NominalProfile] = {}
