@@ -22,23 +22,10 @@ from drivers.links.serial_scanner import SerialScanner
 from drivers.source import PointBatch
 from tests.cmmlink.recorded import plan_with_known_pose, record, today
 from tests.integration.simulated import Simulated, simulated
+from tests.integration.split_off import split_off
 
 RATE_HZ, LONGEST_SCAN = 10_000.0, 60_000
 ROOT = Path(__file__).resolve().parents[2]
-
-
-def start_recorder(folder: Path, address: str, say: Connection) -> multiprocessing.process.BaseProcess:
-    """Start a process that records one scan. Where a system can fork, it is split off from one that has loaded everything once."""
-    arguments = (folder, address, say)
-    process: multiprocessing.process.BaseProcess
-    if "forkserver" in multiprocessing.get_all_start_methods():
-        forking = multiprocessing.get_context("forkserver")
-        forking.set_forkserver_preload([__name__])
-        process = forking.Process(target=record_scan, args=arguments)
-    else:
-        process = multiprocessing.get_context("spawn").Process(target=record_scan, args=arguments)
-    process.start()
-    return process
 
 
 def record_scan(folder: Path, address: str, say: Connection) -> None:
@@ -67,7 +54,7 @@ def kill_one(folder: Path, rng: random.Random) -> tuple[str, int]:
         simulated("serial", "127.0.0.1:0", Path(place), count=LONGEST_SCAN, rate_hz=RATE_HZ) as device,
     ):
         listen, say = multiprocessing.Pipe(duplex=False)
-        process = start_recorder(folder, device.address, say)
+        process = split_off(record_scan, folder, device.address, say)
         say.close()
         with listen:
             said = [(0, 0), *itertools.islice(_said(listen), rng.randint(0, 4))]

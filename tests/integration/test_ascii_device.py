@@ -64,8 +64,8 @@ def test_a_device_that_dies_ends_with_a_clear_error_and_what_was_received(line: 
     with simulated("serial", line, tmp_path, "--fault=die@400") as device:
         with pytest.raises(LinkError, match="the link was lost"):
             arrivals.extend(SerialScanner(device.address, AsciiDecoder()).arrivals())
-        status = device.process.wait()
-    assert status == 9
+        device.process.join()
+        assert device.process.exitcode == 9
     assert account(arrivals).sequence == list(range(len(account(arrivals).sequence)))
 
 
