@@ -167,7 +167,7 @@ def test_a_killed_device_ends_the_run_with_a_message_and_what_was_received(tmp_p
     facts = partial(tmp_path, 1000)
     assert re.search(r"cmmlink: .*the link was lost", screen.screen)
     assert "NOT PROVEN" in screen.screen
-    assert "the scan was cut short" in screen.screen
+    assert "The scan did not come to its end." in screen.screen
     assert f"received {facts['received']} = judged {facts['judged']} + rejected {facts['rejected']}; " in screen.screen
 
 
