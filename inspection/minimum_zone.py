@@ -3,8 +3,11 @@
 ISO 1101 judges form by the minimum zone, not by least squares. At each step the deviations are linearised in the three
 unknowns of the pose, and linear programming finds the smallest zone of the linear problem within a trust region. At most four
 active points and their multipliers prove the last zone optimal. The linearisation is local, and so is the optimum.
+
+Of many points few stand for all: the zone of some points is never wider than that of all, so it is that of all where they lie in it.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,11 +21,15 @@ from inspection.methods import Method
 from inspection.nominal import NominalProfile
 from inspection.registration import Registration
 from inspection.rigid import RigidTransform, rotation_about
+from inspection.telling_points import MANY, telling_rows
 
 Array = NDArray[np.float64]
+DeviationsOf = Callable[[Array], Deviations]
 
 _MOST_PROGRAMS = 50
 _WORKING_SHARE = 0.3  # of the largest deviation; the program begins with the points above it and adds those its solution violates
+_MOST_ROUNDS = 20  # in which points join the few that stand for all
+_ROUND_OFF = 1e-12
 _STANDSTILL_MM = 1e-10
 _MULTIPLIER = 1e-9
 
@@ -65,8 +72,39 @@ def fit_minimum_zone(
     points = check_registrable(points_mm)
     begin = register(points, nominal, method, tip_radius_mm=tip_radius_mm) if start is None else start
     pose = begin.nominal_from_section if isinstance(begin, Registration) else begin
+
+    def deviations_of(moved: Array) -> Deviations:
+        return deviations(moved, nominal, method, tip_radius_mm)
+
+    if len(points) <= MANY:
+        return _fit_all(points, deviations_of, pose, middle_mm)
+    return _fit_by_few(points, deviations_of, pose, middle_mm, nominal.length_mm)
+
+
+def _fit_by_few(points: Array, deviations_of: DeviationsOf, pose: RigidTransform, middle_mm: float, length_mm: float) -> MinimumZone:
+    """The minimum zone of those points that stand for all, which others join until all lie in it."""
+    d = deviations_of(pose.apply(points))
+    smallest = MinimumZone(pose, 2 * _half_zone(d, middle_mm), middle_mm, np.empty(0, np.int64), np.empty(0), 0, False)
+    rows, outside, programs = np.empty(0, np.int64), np.flatnonzero(~d.beyond_end), 0
+    for _ in range(_MOST_ROUNDS):
+        rows = np.union1d(rows, outside[telling_rows(d.station_mm[outside], d.deviation_mm[outside], length_mm)])
+        few = _fit_all(points[rows], deviations_of, pose, middle_mm)
+        pose, programs = few.nominal_from_section, programs + few.programs
+        d = deviations_of(pose.apply(points))
+        zone = 2 * _half_zone(d, middle_mm)
+        holds = zone <= few.zone_mm * (1 + _ROUND_OFF)
+        if holds or zone < smallest.zone_mm:
+            smallest = MinimumZone(pose, zone, middle_mm, rows[few.active], few.multipliers, programs, few.converged and holds)
+        outside = np.flatnonzero(~d.beyond_end & (2 * np.abs(d.deviation_mm - middle_mm) > few.zone_mm))
+        if holds or not len(np.setdiff1d(outside, rows)):
+            break
+    return smallest
+
+
+def _fit_all(points: Array, deviations_of: DeviationsOf, pose: RigidTransform, middle_mm: float) -> MinimumZone:
+    """The minimum zone of points (m, 2), begun at a pose."""
     moved = pose.apply(points)
-    d = deviations(moved, nominal, method, tip_radius_mm)
+    d = deviations_of(moved)
     trust = _half_zone(d, middle_mm)
     active, multipliers = np.empty(0, dtype=np.int64), np.empty(0)
     programs, converged = 0, False
@@ -77,7 +115,7 @@ def fit_minimum_zone(
         moves = float(np.hypot(step[0], step[1]) + abs(step[2]) * reach)
         trial = rotation_about(centre, step[2], step[:2]).after(pose)
         trial_moved = trial.apply(points)
-        trial_d = deviations(trial_moved, nominal, method, tip_radius_mm)
+        trial_d = deviations_of(trial_moved)
         now, then = _half_zone(d, middle_mm), _half_zone(trial_d, middle_mm)
         converged = moves <= _STANDSTILL_MM or now - promised <= 1e-12 * now
         if then < now:

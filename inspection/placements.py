@@ -9,7 +9,7 @@ search is every anchor in the nominal's box grown by the zone, and every angle, 
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -18,9 +18,10 @@ from numpy.typing import ArrayLike, NDArray
 from inspection.coarse import check_registrable
 from inspection.kernels import project
 from inspection.kernels.layout import OPEN_END
-from inspection.minimum_zone import fit_minimum_zone
+from inspection.minimum_zone import MinimumZone, fit_minimum_zone
 from inspection.nominal import NominalProfile
 from inspection.rigid import RigidTransform
+from inspection.telling_points import MANY, telling_rows
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -108,7 +109,26 @@ class PlacementSearch:
         if self._excess(points, zone.nominal_from_section) <= 0:
             self._passed = zone.nominal_from_section
             return PlacementProof("fits", self._passed, (), 0)
-        return self._search(points, zone.active.tolist(), most_boxes, is_over)
+        if len(points) <= MANY:
+            return self._search(points, zone.active.tolist(), most_boxes, is_over)
+        return self._search_by_few(points, zone, most_boxes, is_over)
+
+    def _search_by_few(self, points: Array, zone: MinimumZone, most_boxes: int, is_over: Callable[[], bool]) -> PlacementProof:
+        """Search with few points that stand for all: what they refute is refuted, and what fits them is asked of all the others."""
+        rows, pose, boxes = zone.active, zone.nominal_from_section, 0
+        while True:
+            feet = project(pose.apply(points), self._nominal.grid)
+            out = self._nominal.outward * feet.distance_mm - self._tip - self._middle
+            worst = int(self._outside(pose.apply(points), np.zeros(len(points))).argmax())
+            rows = np.union1d(rows, np.append(telling_rows(feet.station_mm, out, self._nominal.length_mm), worst))
+            proof = self._search(points[rows], np.flatnonzero(np.isin(rows, zone.active)).tolist(), most_boxes - boxes, is_over)
+            boxes += proof.boxes
+            proof = replace(proof, boxes=boxes, witnesses=tuple(rows[list(proof.witnesses)].tolist()))
+            if proof.pose is None or self._excess(points, proof.pose) <= 0:
+                return proof
+            if boxes >= most_boxes or is_over():
+                return replace(proof, outcome="undecided", pose=None)
+            pose = proof.pose
 
     def _search(self, points: Array, active: list[int], most_boxes: int, is_over: Callable[[], bool]) -> PlacementProof:
         """Refute boxes of motions until none is left, best first; `active` are the points that hold the minimum zone nearby."""

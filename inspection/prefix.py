@@ -16,12 +16,12 @@ from inspection.placements import PlacementSearch
 from inspection.result import NOT_JUDGED
 from inspection.rigid import RigidTransform
 from inspection.scan_rows import ScanRows
+from inspection.telling_points import SHARES, telling_rows
 from inspection.terms import Terms
 
 Array = NDArray[np.float64]
 
 _SURELY = 3.0  # of what the pose can slide along an open end (95 %): points nearer to the end may lie beyond it at the last pose
-_BINS = 512  # shares of the length of which the lowest and the highest point stand for all, where there are more points
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,14 +66,9 @@ class PrefixSearch:
             return False
 
     def _telling_rows(self, prefix: Prefix) -> NDArray[np.int64]:
-        """Rows, in their order, of points that stand for all: the lowest and the highest of every share of the length."""
+        """Rows, in their order, of points that stand for all."""
         count = len(prefix.points_mm)
-        if count <= 2 * _BINS:
-            return np.arange(count)
-        bins = np.minimum((prefix.station_mm * (_BINS / self._length)).astype(np.int64), _BINS - 1)
-        order = np.lexsort((prefix.deviation_mm, bins))
-        borders = np.flatnonzero(np.diff(bins[order]))
-        return np.unique(np.concatenate([order[[0, -1]], order[borders], order[borders + 1]]))
+        return np.arange(count) if count <= 2 * SHARES else telling_rows(prefix.station_mm, prefix.deviation_mm, self._length)
 
 
 def prefix_of(rows: ScanRows, pose: RigidTransform, slide_mm: float, terms: Terms) -> Prefix | None:

@@ -59,14 +59,18 @@ def rounded(points: Array, chord_mm: float) -> NominalProfile:
 @cache
 def nominal_of(number: int) -> NominalProfile:
     """One of four nominals of chord 100 mm."""
-    if number % 4 == 0:
+    if number >= 4:
+        return nominal_of(number % 4)
+    if number == 0:
         return rounded(np.loadtxt(GOE404, skiprows=1), 100.0)
-    return rounded(naca_points(*((0.02, 0.12), (0.04, 0.15), (0.03, 0.09))[number % 4 - 1]), 100.0)
+    return rounded(naca_points(*((0.02, 0.12), (0.04, 0.15), (0.03, 0.09))[number - 1]), 100.0)
 
 
 @cache
 def _dense(number: int) -> tuple[Array, Array, Array]:
     """Parameters (DENSE,), their points, and stations by summing chords."""
+    if number >= 4:
+        return _dense(number % 4)
     curve = nominal_of(number).curve
     u = np.linspace(*curve.domain, DENSE)
     points = curve.point(u)

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from inspection import NominalProfile, NurbsCurve, RigidTransform, discretize
+from inspection import NominalProfile, NurbsCurve, RigidTransform, discretize, fit_minimum_zone
 from inspection.placements import PlacementSearch
 from tests.inspection import profiles
 from tests.inspection.profiles import AIRFOILS, Array
@@ -123,3 +123,17 @@ def test_centres_of_a_ball_are_held_against_their_surface_points() -> None:
 
 def test_a_search_that_may_not_go_on_is_undecided() -> None:
     assert PlacementSearch(nominal_of("goe404"), 0.05).look(dented("goe404")[:240], most_boxes=300).outcome == "undecided"
+
+
+def test_what_few_of_many_points_prove_holds_for_all() -> None:
+    """A single point in a long scan decides: refuted with it, and a placement that is found is one of all the points."""
+    name, count = "goe404", 9000
+    points = scan(name, count, reference_form(name, count), 92, (15, -7))
+    half = fit_minimum_zone(points, nominal_of(name)).zone_mm / 2
+    for allowed, outcome in ((half + 1e-6, "fits"), (half - 1e-5, "refuted")):
+        found = PlacementSearch(nominal_of(name), allowed).look(points)
+        assert found.outcome == outcome
+        assert all(0 <= witness < count for witness in found.witnesses)
+    form = reference_form(name, count)
+    form[4321] -= 0.12
+    assert PlacementSearch(nominal_of(name), half + 0.005).look(scan(name, count, form, 92, (15, -7))).outcome == "refuted"
