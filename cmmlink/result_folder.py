@@ -26,7 +26,12 @@ def check_placeholders(folder: Path) -> None:
 
 
 def folder_of(pattern: Path, *, part: str, serial_number: str, run: str) -> Path:
-    """The folder of one run: its placeholders filled in as safe names, none of which leads to another folder."""
+    """The folder of one run: its placeholders filled in as safe names, none of which leads to another folder.
+
+    Where a part has no serial number, {serial} is left out together with the underscore behind it.
+    """
+    if not serial_number.strip():
+        pattern = Path(str(pattern).replace("{serial}_", ""))
     names = {"part": safe_name(part), "serial": safe_name(serial_number), "run": safe_name(run)}
     return Path(_PLACEHOLDER.sub(lambda found: names.get(found[1], found[0]), str(pattern)))
 

@@ -182,6 +182,7 @@ def inspect(
         "gap_max_mm": gap_max,
         "end_allowance_mm": end_allowance,
         "allow": {"unseen_mm": allow_unseen},
+        "out": None,
     }
     plan = plan_from_options(Plan, settings, _OPTION_OF)
     profile = profile_of(plan)

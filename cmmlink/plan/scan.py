@@ -46,8 +46,8 @@ _RECONNECT = "how long a lost link is tried again while the run goes on"
 _PARITY = "the parity of a serial port: none, even or odd"
 RECORDS = "the folder of the run records; null: the user's own. A console keeps all its runs in one folder"
 OUT = (
-    "the folder for the results, like results/{part}/{serial}_{run}; null: no results are written. What an earlier run left in the "
-    "same folder is moved aside, never overwritten"
+    "the folder for the results, like results/{part}/{serial}_{run}, seen from the plan; null: no results are written. What an earlier "
+    "run left in the same folder is moved aside, never overwritten"
 )
 _AXIS = "what makes points of the distances of a one-dimensional sensor"
 _LEAST_SINE = 1e-3  # between x axis and normal: below it the direction of x in the plane is noise
@@ -333,7 +333,7 @@ class Plan(Deciding):
     registration: Registration = Field(default=Registration(), description="how the points come onto the nominal")
     discretisation: Discretisation = Field(default=Discretisation(), description="how finely the nominal is sampled")
     buffer_points: int = Field(default=CAPACITY_POINTS, ge=1, description="how many points may wait between the device and the inspection")
-    out: ResultFolder | None = Field(default=None, description=OUT)
+    out: ResultFolder | None = Field(default=Path("results/{part}/{serial}_{run}"), description=OUT)
     records: Path | None = Field(default=None, description=RECORDS)
 
     def with_address(self, address: str) -> "Plan":

@@ -14,14 +14,19 @@ from cmmlink.run import FinishedRun
 from inspection import InspectionResult, NominalProfile
 
 
-def prepare(folder: Path | None) -> None:
-    """Create the folder and check that it can be written, before anything is measured. Raises PlanError."""
-    if folder is None:
+def prepare(pattern: Path | None) -> None:
+    """Check that the folder can be written, before anything is measured. Raises PlanError.
+
+    A folder without placeholders is created here; one that is named by the run is created once there is something to write.
+    """
+    if pattern is None:
         return
-    folder = fixed_part(folder)
+    folder = fixed_part(pattern)
     with _or_refuse(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
+        if folder == pattern:
+            folder.mkdir(parents=True, exist_ok=True)
+        there = next(above for above in (folder, *folder.parents) if above.exists())
+        with tempfile.TemporaryFile(dir=there):
             pass
 
 
@@ -62,4 +67,5 @@ def _or_refuse(folder: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise PlanError(f"{folder}: the results cannot be written ({error.strerror}); choose another folder with --out") from None
+        mend = "choose another folder with --out, or none with out: null in the plan"
+        raise PlanError(f"{folder}: the results cannot be written ({error.strerror}); {mend}") from None

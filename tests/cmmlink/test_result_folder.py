@@ -13,6 +13,7 @@ def test_every_run_has_a_folder_of_its_own() -> None:
     folders = {folder_of(PATTERN, part="blade", serial_number=serial, run=run) for serial in ("B-1", "B-2") for run in ("1", "2")}
     assert len(folders) == 4
     assert Path("results/blade/B-1_1") in folders
+    assert folder_of(PATTERN, part="blade", serial_number="", run="1") == Path("results/blade/1")
 
 
 @pytest.mark.parametrize("name", ["../../etc", "..", ".", "", "/", "C:\\x", "a/b", "CON", "a\0b", "{run}", "x" * 500, " .. "])

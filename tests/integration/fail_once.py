@@ -88,6 +88,7 @@ part: {{name: oval, serial_number: 7}}
 nominal: {{file: oval.yaml}}
 tolerance: {{lower_mm: -0.05, upper_mm: 0.05}}
 device: {{type: serial, address: "{address}", reconnect_s: 2, silence_s: 1}}
+out: null
 registration: {{datum: {{}}}}
 discretisation: {{samples: 400}}
 """

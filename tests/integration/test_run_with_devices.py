@@ -27,6 +27,7 @@ part: {{name: oval}}
 nominal: {{file: nominal.csv, closed: true}}
 tolerance: {{lower_mm: -0.05, upper_mm: 0.05}}
 device: {device}
+out: null
 discretisation: {{samples: 1000}}
 """
 

@@ -1,5 +1,6 @@
 """The commands `run`, `check` and `demo`: plans carried out, and plans refused."""
 
+import json
 import re
 from pathlib import Path
 
@@ -35,6 +36,27 @@ def test_run_without_a_terminal_prints_the_summary_alone(nominal: Path) -> None:
     ended = cmmlink("run", write_plan(nominal, 0.01))
     assert (ended.code, ended.err) == (0, "")
     assert ended.out.startswith("CONFORM   oval 0012, file points.csv\nreceived 360 = judged 360 + rejected 0; lost 0 points\n")
+
+
+def test_a_plan_that_says_nothing_has_a_folder_for_every_run_and_null_has_none(nominal: Path) -> None:
+    plan = write_plan(nominal, 0.0)
+    results = nominal.parent / "results"
+    runs = [cmmlink("run", plan, "--json", "--records", nominal.parent / "records").json()["run"] for _ in range(2)]
+    assert sorted(path.name for path in (results / "oval").iterdir()) == [f"0012_{run}" for run in runs]
+    for run in runs:
+        facts = json.loads((results / "oval" / f"0012_{run}" / "result.json").read_text(encoding="utf-8"))
+        assert (facts["run"], facts["serial_number"]) == (run, "0012")
+    words = cmmlink("run", plan, "--records", nominal.parent / "records").out
+    assert f"results in {results / 'oval'}" in words
+    assert len(list(results.rglob("result.json"))) == 3
+    assert cmmlink("run", write_plan(nominal, 0.0, PLAN + "out: null\n")).code == 0
+    assert len(list(results.rglob("result.json"))) == 3
+
+
+def test_nothing_is_written_of_a_run_without_a_point(nominal: Path) -> None:
+    plan = write_plan(nominal, 0.0, PLAN.replace("{type: file, file: points.csv}", "{type: serial, address: no-such-port}"))
+    assert cmmlink("run", plan, "--json").code == 4
+    assert not (nominal.parent / "results").exists()
 
 
 def test_out_of_a_plan_is_relative_to_the_plan_and_yields_to_the_option(nominal: Path) -> None:

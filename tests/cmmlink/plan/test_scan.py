@@ -59,7 +59,7 @@ def test_short_plan_gets_the_documented_defaults(tmp_path: Path) -> None:
     assert (plan.registration.fit, plan.registration.method, plan.registration.datum) == ("best-fit", "exact", None)
     assert plan.registration.coverage_min == 0.95
     assert (plan.discretisation.samples, plan.discretisation.pole_angle_min_deg, plan.discretisation.step_min) == (10_000, 178.0, 1e-4)
-    assert (plan.buffer_points, plan.out, plan.records) == (500_000, None, None)
+    assert (plan.buffer_points, plan.out, plan.records) == (500_000, tmp_path / "results/{part}/{serial}_{run}", None)
 
 
 def test_full_plan_says_what_it_says(tmp_path: Path) -> None:
