@@ -66,7 +66,7 @@ def density_notes(rows: JudgedRows | None, length_mm: float) -> list[str]:
     at = int(counts.argmax()) * length_mm / _PLACES
     return [
         f"the points lie {densest / sparse:.0f} times as dense at station {at:.1f} .. {at + length_mm / _PLACES:.1f} mm as elsewhere: "
-        "a fit that counts points follows them"
+        "with weights by points a fit follows them"
     ]
 
 

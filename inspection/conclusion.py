@@ -29,6 +29,7 @@ ReasonKind = Literal[
     "gap",
     "fit",
     "outline",
+    "shift",
 ]
 
 

@@ -14,7 +14,7 @@ from inspection.registration import Registration, datum_registration
 from inspection.result import NOT_JUDGED, InspectionResult, Rejection, rejections_by_reason, stretches
 from inspection.rigid import RigidTransform
 from inspection.scan_rows import ScanRows
-from inspection.setup_check import check_fit, check_points
+from inspection.setup_check import check_fit, check_points, shift_reservation
 from inspection.terms import Terms
 from inspection.tolerance import Verdict
 
@@ -183,6 +183,9 @@ def _result(settled: _Settled, terms: Terms, complete: bool, missing: Missing) -
         converged=settled.registration.converged,
     )
     conclusion = conclude(findings, missing, limits, complete)
+    reasons = conclusion.reasons
+    if conclusion.verdict is Verdict.NONCONFORM and (reservation := shift_reservation(deviation, terms)):
+        reasons = (*reasons, Reason("shift", reservation))
     known = terms.known_pose is not None
     return InspectionResult(
         actual_mm=rows.actual,
@@ -192,7 +195,7 @@ def _result(settled: _Settled, terms: Terms, complete: bool, missing: Missing) -
         verdicts=rows.verdicts,
         rejection=rows.rejection,
         verdict=conclusion.verdict,
-        reasons=conclusion.reasons,
+        reasons=reasons,
         coverage=findings.coverage,
         gap=gap,
         gap_max_mm=limits.gap_max_mm,

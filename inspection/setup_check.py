@@ -6,7 +6,6 @@ better; or the pose that was given lies far off although the points fit.
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +15,10 @@ from inspection.coarse import FEWEST_POINTS
 from inspection.deviations import deviations
 from inspection.errors import NotMeasured
 from inspection.fine import MISFIT, register
-from inspection.kernels.layout import OFF_SECTION
 from inspection.nominal import NominalProfile
+from inspection.plane_check import STRAIGHT, check_plane, check_section
 from inspection.registration import Registration
 from inspection.scan_rows import ScanRows
-from inspection.section import SectionPlane
 from inspection.terms import Terms
 
 Array = NDArray[np.float64]
@@ -34,12 +32,9 @@ _MARK_SIZES, _MARK_STEPS = 0.03, 5.0  # of the nominal's size, and of the steps 
 _MOST_MARKS = 5  # different values: a device has one or two
 _MOST_OF_ALL = 0.9
 _TYPICAL = 1000  # points that show how near to each other they lie
-_PLANE_LIMIT = 0.01  # of the nominal's size: heights that differ by less leave one section
-_THIN = 0.1  # of the heights' range: points nearer to a plane lie in it
-_LEVEL_MM = 0.5  # between two heights that are two sections
 _FAR_STRAIGHTER = 0.1  # of the rms at the best fit
-_STRAIGHT = 1e-3  # of the length: narrower points lie on a line, through which many planes go
 _SIZES_APART = 1.25
+_GROUPS_APART = 0.2  # of the size: no gap of a scan that still goes round is so wide
 _FACTOR_NEAR = 1.05
 _NEARLY_CLOSED = 3.0  # steps between the last point and the first
 _IN_ORDER = 3.0  # times the length round the points: a longer way leaps to and fro
@@ -67,14 +62,14 @@ def check_points(rows: ScanRows, terms: Terms) -> Rows:
     Returns the rows of points that lie far from all others; there are none unless outliers are to be rejected.
     """
     usable = rows.usable_rows()
-    _check_section(rows, len(usable), terms.off_section_max_mm)
+    check_section(rows, len(usable), terms.off_section_max_mm)
     if len(usable) < FEWEST_POINTS:
         return usable[:0]
     space = np.column_stack([rows.points[usable], rows.height[usable]])
     far = _far_points(space, terms.nominal) | _marks(space, terms.nominal)
     if far.any() and not terms.reject_outliers:
         raise NotMeasured(_words_of_far(space, usable, far))
-    _check_plane(space[~far], rows.plane, terms)
+    check_plane(space[~far], rows.plane, terms)
     _check_size(space[~far, :2], terms)
     return usable[far]
 
@@ -91,6 +86,7 @@ def check_fit(points_mm: Array, registration: Registration, terms: Terms) -> Non
         return
     size = terms.nominal.size_mm
     _check_straight(kept, direct)
+    _check_unit_of_part(kept, direct, terms)
     if terms.known_pose is not None and found.rms_mm > MISFIT * size and direct.rms_mm < _FITS_INSTEAD * found.rms_mm:
         raise NotMeasured(_words_of_pose(found.rms_mm, direct, registration))
     _check_mirrored(kept, direct, terms)
@@ -101,10 +97,23 @@ def check_fit(points_mm: Array, registration: Registration, terms: Terms) -> Non
         )
 
 
+def _check_unit_of_part(points_mm: Array, direct: Registration, terms: Terms) -> None:
+    """Raise NotMeasured where points (m, 2), a scan of a part of the profile, fit far better in a larger unit."""
+    for factor, mend in _FACTORS:
+        if factor <= 1.0 or factor * _across(points_mm) > _SIZES_APART * _across(terms.nominal.points_mm):
+            continue
+        fitted = _fit(points_mm * factor, terms)
+        if fitted is not None and fitted.rms_mm < _FITS_INSTEAD * direct.rms_mm:
+            raise NotMeasured(
+                f"the points fit the nominal to {fitted.rms_mm:.4g} mm (rms) when they are taken {factor:g} times as large, instead of to "
+                f"{direct.rms_mm:.4g} mm: {mend}"
+            )
+
+
 def _check_straight(points_mm: Array, direct: Registration) -> None:
     """Raise NotMeasured where the points (m, 2) lie on a straight line and the nominal does not: a curve was looked at from its edge."""
     length, width = np.linalg.svd(points_mm - points_mm.mean(axis=0), compute_uv=False) / np.sqrt(len(points_mm))
-    if width <= _STRAIGHT * length and width <= _FAR_STRAIGHTER * direct.rms_mm:
+    if width <= STRAIGHT * length and width <= _FAR_STRAIGHTER * direct.rms_mm:
         raise NotMeasured(
             f"the points lie on a straight line (within {width:.2g} mm rms), the nominal does not (rms {direct.rms_mm:.4g} mm at the best "
             "fit): are these the columns of x and y (--columns), and is this the plane of the section (--plane)?"
@@ -129,15 +138,6 @@ class _Found:
         middle, half = terms.zone.middle_mm, (terms.zone.upper_mm - terms.zone.lower_mm) / 2
         away = np.abs(deviation - middle)
         return cls(deviation, float(np.sqrt((away**2).mean())), float(away.max()) - half)
-
-
-def _check_section(rows: ScanRows, usable: int, off_section_max_mm: float) -> None:
-    off = int(np.count_nonzero(rows.rejection[: rows.count] == OFF_SECTION))
-    if usable < FEWEST_POINTS <= off:
-        raise NotMeasured(
-            f"{off} of {rows.count} points lie farther than {off_section_max_mm:g} mm from the plane of the section: "
-            "are its origin and its normal right?"
-        )
 
 
 def _far_points(space_mm: Array, nominal: NominalProfile) -> NDArray[np.bool_]:
@@ -183,60 +183,6 @@ def _words_of_far(space_mm: Array, usable: Rows, far: NDArray[np.bool_]) -> str:
     )
 
 
-def _check_plane(space_mm: Array, plane: SectionPlane, terms: Terms) -> None:
-    """Raise NotMeasured where the points (m, 3: x and y in the section, height above it) lie in another plane, or in several."""
-    low, high = np.quantile(space_mm[:, 2], [0.02, 0.98])
-    spread = float(high - low)
-    limit = _PLANE_LIMIT * terms.nominal.size_mm if not np.isfinite(terms.off_section_max_mm) else float("inf")
-    if spread <= min(limit, _LEVEL_MM):
-        return
-    centred = space_mm - np.median(space_mm, axis=0)
-    _, singular, axes = np.linalg.svd(centred, full_matrices=False)
-    off = np.quantile(centred @ axes[2], [0.02, 0.98])
-    if spread > limit and off[1] - off[0] < _THIN * spread and singular[1] > _STRAIGHT * singular[0]:
-        raise NotMeasured(_words_of_plane(space_mm, axes[2], plane))
-    levels = _levels(space_mm[:, 2])
-    if len(levels) > 1:
-        *first, last = (f"{_machine_height(plane, level):.4g}" for level in levels)
-        raise NotMeasured(
-            f"the points lie at several heights, {', '.join(first)} and {last} mm: this is more than one section. Give one at a time, or "
-            "name the height (section.origin_mm with section.off_plane_max_mm)"
-        )
-    if spread > limit:
-        raise NotMeasured(
-            f"the points lie at heights from {_machine_height(plane, low):.4g} to {_machine_height(plane, high):.4g} mm, not in one plane "
-            f"(within {limit:.3g} mm): is the section's plane right (--plane), or its height (section.off_plane_max_mm)?"
-        )
-
-
-def _machine_height(plane: SectionPlane, height_mm: float) -> float:
-    """The height of a section point along the normal, from the machine's origin, rounded for people."""
-    return round(float(plane.origin_mm @ plane.normal) + height_mm, 3) + 0.0
-
-
-def _words_of_plane(space_mm: Array, normal: Array, plane: SectionPlane) -> str:
-    """Name the plane that the points (m, 3) lie in, by its normal in the section's coordinates, and how to say so."""
-    turn = np.array([plane.x_axis, np.cross(plane.normal, plane.x_axis), plane.normal])  # (3, 3) the section's axes, a row each
-    direction = normal @ turn
-    direction = direction * np.sign(direction[np.argmax(np.abs(direction))])
-    axis = int(np.argmax(np.abs(direction)))
-    place = float(np.median((plane.origin_mm + space_mm @ turn) @ direction))
-    if abs(direction[axis]) > 0.9999:
-        return f"the points lie in the plane {'xyz'[axis]} = {place:.5g}: say --plane {('yz', 'xz', 'xy')[axis]} (section.normal)"
-    told = ", ".join(f"{round(value, 4) + 0.0:g}" for value in direction)
-    tilt = np.degrees(np.arccos(min(1.0, abs(float(normal[2])))))
-    return f"the points lie in a plane that is tilted by {tilt:.3g} deg against the section: say section.normal [{told}]"
-
-
-def _levels(heights_mm: Array) -> list[float]:
-    """Heights at which many points lie, each apart from the next; fewer than two where heights run on."""
-    ordered = np.sort(heights_mm)
-    groups = np.split(ordered, np.flatnonzero(np.diff(ordered) > _LEVEL_MM) + 1)
-    many = [group for group in groups if len(group) >= max(FEWEST_POINTS, 0.05 * len(ordered))]
-    gaps = [after[0] - before[-1] for before, after in pairwise(many)]
-    return [float(np.median(group)) for group in many] if gaps and min(gaps) > max(np.ptp(group) for group in many) else []
-
-
 def _check_size(points_mm: Array, terms: Terms) -> None:
     """Raise NotMeasured where a scan that goes round is not of the nominal's size, or where a known factor would make all of it fit."""
     nominal = terms.nominal
@@ -254,8 +200,22 @@ def _check_size(points_mm: Array, terms: Terms) -> None:
         which, size = ("is the nominal", scan / want) if want <= 2.0 else ("are the points", factor)
         mend = f", a factor of {factor:.4g}: {which} in chord units? Give the scale, about {size:.4g}"
     else:
-        mend = ". Check the unit, the scale and the nominal"
+        mend = _words_of_groups(points_mm, want) or ". Check the unit, the scale and the nominal"
     raise NotMeasured(f"the points do not fit the nominal: they are {scan:.4g} mm across, the nominal {want:.4g} mm{mend}")
+
+
+def _words_of_groups(points_mm: Array, across_mm: float) -> str:
+    """Say where the points (m, 2) lie in two groups, far apart: another part, or a fixture, is among them."""
+    centred = points_mm - points_mm.mean(axis=0)
+    along = centred @ np.linalg.svd(centred, full_matrices=False)[2][0]
+    order = np.argsort(along)
+    gaps = np.diff(along[order])
+    cut = int(np.argmax(gaps)) + 1
+    if gaps[cut - 1] < _GROUPS_APART * max(across_mm, np.ptp(along)):
+        return ""
+    groups = (points_mm[order[:cut]], points_mm[order[cut:]])
+    places = " and ".join(f"{len(group)} around ({group.mean(axis=0)[0]:.4g}, {group.mean(axis=0)[1]:.4g})" for group in groups)
+    return f". They lie in two groups, {places}, {gaps[cut - 1]:.4g} mm apart: leave out what is not of this part"
 
 
 def _across(points_mm: Array) -> float:
@@ -314,18 +274,40 @@ def _check_ball(points_mm: Array, found: _Found, terms: Terms) -> None:
         away = abs(shift - terms.zone.middle_mm)
     if away <= width or away <= _SHIFT_SCATTERS * scatter:
         return
-    if radius and any(abs(shift + times * radius) < _RADIUS_NEAR * radius for times in (1, 2)):
-        if abs(shift + radius) < _RADIUS_NEAR * radius:
-            mend = f"was the radius of the ball taken off twice? Leave out the tip radius of {radius:g} mm (--tip-radius)"
-        else:
-            mend = "is the ball on the other side of the material (--material)?"
-    elif away < max(_SHIFT_ZONES * width, _SHIFT_MM):
+    if not _is_a_radius(shift, radius) and away < max(_SHIFT_ZONES * width, _SHIFT_MM):
         return
-    elif shift > 0:
-        mend = f"ball centres? Give the radius of the tip (--tip-radius {shift:.3g}). Or is the material on the other side (--material)?"
+    raise NotMeasured(f"all points are {_words_of_shift(shift, scatter, radius)}")
+
+
+def shift_reservation(deviation_mm: Array, terms: Terms) -> str:
+    """What is to be said of a part that does not conform where all deviations (k,) are out by the same, as ball centres are; or nothing.
+
+    The part itself may be too large, so this is no reason to refuse it.
+    """
+    shift, scatter = _shift(deviation_mm)
+    if abs(shift - terms.zone.middle_mm) <= max((terms.zone.upper_mm - terms.zone.lower_mm) / 2, _SHIFT_SCATTERS * scatter):
+        return ""
+    return f"All points are {_words_of_shift(shift, scatter, terms.tip_radius_mm)}"
+
+
+def _is_a_radius(shift_mm: float, radius_mm: float) -> bool:
+    """Tell whether points are inside by what is known of the ball: its radius, its diameter, or half of what was given."""
+    return radius_mm > 0 and any(abs(shift_mm + times * radius_mm) < _RADIUS_NEAR * radius_mm for times in (0.5, 1, 2))
+
+
+def _words_of_shift(shift_mm: float, scatter_mm: float, radius_mm: float) -> str:
+    side = "or is the material on the other side (--material)?"
+    if radius_mm > 0 and abs(shift_mm + radius_mm) < _RADIUS_NEAR * radius_mm:
+        mend = f"was the radius of the ball taken off twice? Leave out the tip radius of {radius_mm:g} mm (--tip-radius)"
+    elif radius_mm > 0 and abs(shift_mm + 2 * radius_mm) < _RADIUS_NEAR * radius_mm:
+        mend = "is the ball on the other side of the material (--material)?"
+    elif radius_mm > 0 and radius_mm + shift_mm > 0:
+        mend = f"is {radius_mm:g} mm the radius of the tip? With {radius_mm + shift_mm:.3g} mm the points would fit (--tip-radius), {side}"
+    elif shift_mm > 0:
+        mend = f"ball centres? Give the radius of the tip (--tip-radius {shift_mm:.3g}), {side}"
     else:
-        mend = "was the radius of a ball taken off twice? Or is the material on the other side (--material)?"
-    raise NotMeasured(f"all points are {abs(shift):.3f} mm {'out' if shift > 0 else 'inside'} (scatter {scatter:.3f} mm): {mend}")
+        mend = f"was the radius of a ball taken off twice, {side}"
+    return f"{abs(shift_mm):.3f} mm {'out' if shift_mm > 0 else 'inside'} (scatter {scatter_mm:.3f} mm): {mend}"
 
 
 def _shift(deviation_mm: Array) -> tuple[float, float]:

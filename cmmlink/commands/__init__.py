@@ -81,6 +81,7 @@ def _run_command() -> int | str | None:
     """Run the command that the arguments name. Returns its exit status."""
     code: int | str | None
     try:
+        _refuse_strange_bytes(sys.argv[1:])
         with while_compiling(_say_that_it_compiles):
             code = app(prog_name="cmmlink", standalone_mode=False)
         sys.stdout.flush()
@@ -105,6 +106,16 @@ def _run_command() -> int | str | None:
         traceback.print_exc()
         code = fail(f"a defect of cmmlink, please report it: {error}", UNUSABLE)
     return code
+
+
+def _refuse_strange_bytes(words: list[str]) -> None:
+    """Raise PlanError for a name that is no text: no record and no result file could hold it."""
+    for word in words:
+        try:
+            word.encode("utf-8")
+        except UnicodeEncodeError:
+            told = word.encode("utf-8", "backslashreplace").decode()
+            raise PlanError(f"{told}: the name holds bytes that are no text (UTF-8); rename the file or folder") from None
 
 
 def _prepare_streams() -> None:

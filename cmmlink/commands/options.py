@@ -84,7 +84,7 @@ def columns_from(text: str | None) -> dict[str, int] | None:
     if text is None:
         return None
     told = [part.partition("=") for part in text.replace(" ", "").lower().split(",")]
-    columns = {axis: int(place) for axis, _, place in told if axis in ("x", "y", "z") and place.isdecimal()}
+    columns = {axis: int(place) for axis, _, place in told if axis in ("x", "y", "z") and place.isdecimal() and len(place) < 7}
     if len(columns) != len(told) or len(columns) < 2 or len(set(columns.values())) < len(columns) or min(columns.values()) < 1:
         raise PlanError(f"--columns {text}: expected different columns, counted from 1, for two or three of x, y and z, like x=2,y=3")
     return columns

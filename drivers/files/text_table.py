@@ -30,6 +30,7 @@ _COMMENT = re.compile(r"#|%|!|//")
 _COMMENT_STARTS = ("#", "%", "!", "/")
 _REMARK = re.compile(r"\s*(?:#|!|//).*")  # behind the numbers of a row
 _PERCENT_REMARK = re.compile(r"(?<=\d)\s+%\s.*")  # of rows alone: in words, a percent sign follows its number
+_COUNT = re.compile(r"\d{1,12}")  # a longer number counts nothing
 _UNDERLINE = re.compile(r"[-=+|\s]+")
 _VECTOR_NAMES = tuple("xyzijk")
 
@@ -206,7 +207,7 @@ def _split_lines(text: str, wanted: tuple[int, ...]) -> tuple[Numbered, Numbered
         if remark:
             line = line[remark.end() :].lstrip("#%!/ ")
             remarks.append((number, line))
-        elif line and len(data) == 1 and data[0][1].isdecimal() and _is_header(line):
+        elif line and len(data) == 1 and _COUNT.fullmatch(data[0][1]) and _is_header(line):
             header.append((number, line))  # below the count of points
         elif line and (data or _is_data(line, wanted, bool(header))):
             data.append((number, _PERCENT_REMARK.sub("", _REMARK.sub("", line, count=1))))
@@ -330,7 +331,7 @@ def _find_reading(data: Numbered, wanted: tuple[int, ...]) -> tuple[_Reading, tu
 def _drop_count(data: Numbered, reading: _Reading, notes: list[str]) -> Numbered:
     """Drop a first line that counts the points (pts and xyz files), and refuse a file that holds another number of them."""
     number, line = data[0]
-    if len(data) < 2 or not line.isdecimal() or not reading.explains(data[1][1]):
+    if len(data) < 2 or not _COUNT.fullmatch(line) or not reading.explains(data[1][1]):
         return data
     if int(line) != len(data) - 1:
         raise PointFileError(f"line {number}: announces {line} points, but {len(data) - 1} follow; expected the whole file")

@@ -100,6 +100,21 @@ def test_a_nominal_in_chord_units_is_named() -> None:
     )
 
 
+@pytest.mark.parametrize(("factor", "mend"), [(1 / 25.4, "--unit inch"), (0.1, "points in centimetres")])
+def test_a_scan_of_a_part_in_another_unit_is_named_where_it_fits_far_better(nominal: NominalProfile, factor: float, mend: str) -> None:
+    told = refusal(scan(nominal, share=0.5) * factor, nominal, zone=ToleranceZone(-0.01, 0.01))
+    assert "times as large" in told
+    assert mend in told
+
+
+def test_what_is_not_of_the_part_is_named_by_its_place(nominal: NominalProfile) -> None:
+    points = scan(nominal)
+    assert "two groups, 400 around" in refusal(np.vstack([points, points + np.array([200.0, 0.0])]), nominal)
+    fixture = np.random.default_rng(1).uniform(300.0, 301.0, (100, 2))
+    assert "100 around (300.5, 300.5)" in refusal(np.vstack([points, fixture]), nominal)
+    assert "groups" not in refusal(points * 39.37, nominal)
+
+
 @pytest.mark.parametrize("share", [0.03, 0.1, 0.5, 0.9])
 def test_a_part_of_a_profile_is_no_other_size(nominal: NominalProfile, share: float) -> None:
     assert judge(scan(nominal, share=share), nominal, coverage_min=0.95).verdict != Verdict.CONFORM
@@ -126,6 +141,27 @@ def test_points_in_the_plane_that_is_set_up_are_measured(nominal: NominalProfile
     place, _ = PLANES["xz"]
     plane = SectionPlane(np.zeros(3), np.array([1.0, 0, 0]), np.array([0.0, -1.0, 0]))
     assert judge(place(scan(nominal), 12.0), nominal, section=plane).verdict == Verdict.CONFORM
+
+
+@pytest.mark.parametrize("tilt_deg", [30.0, 45.0, 80.0, -45.0])
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_tilted_plane_is_named_with_the_side_up_that_keeps_x_and_y(nominal: NominalProfile, tilt_deg: float, axis: int) -> None:
+    points, angle = scan(nominal), np.radians(tilt_deg)
+    space = np.column_stack([points, np.zeros(400)])
+    space[:, 2] = points[:, axis] * np.sin(angle)
+    space[:, axis] *= np.cos(angle)
+    told = refusal(space, nominal)
+    normal = np.array([float(value) for value in told.rsplit("[", 1)[1].rstrip("]").split(",")])
+    assert normal[2] > 0
+    x_axis = np.zeros(3)
+    x_axis[0] = np.cos(angle) if axis == 0 else 1.0
+    x_axis[2] = np.sin(angle) if axis == 0 else 0.0
+    assert judge(space, nominal, section=SectionPlane(np.zeros(3), x_axis, normal)).verdict == Verdict.CONFORM
+
+
+def test_points_off_the_section_are_told_with_their_heights(nominal: NominalProfile) -> None:
+    told = refusal(np.column_stack([scan(nominal), np.full(400, 60.0)]), nominal, off_section_max_mm=0.5)
+    assert "400 of 400 points lie farther than 0.5 mm from the plane of the section, at heights from 60 to 60 mm" in told
 
 
 @pytest.mark.parametrize("heights", [(10.0, 20.0, 30.0), (-3.0, 0.0), (5.0, 6.5)])
@@ -237,6 +273,20 @@ def test_ball_centres_are_named(nominal: NominalProfile, radius: float) -> None:
 def test_a_ball_taken_off_twice_is_named(nominal: NominalProfile) -> None:
     assert re.match(r"all points are 1\.00\d mm inside \(scatter .*taken off twice", refusal(scan(nominal, -1.0), nominal))
     assert "taken off twice? Leave out the tip radius of 1 mm" in refusal(scan(nominal), nominal, tip_radius_mm=1.0)
+
+
+@pytest.mark.parametrize(("given", "true"), [(2.0, 1.0), (1.0, 2.0), (1.0, 1.5)])
+def test_a_diameter_or_another_radius_is_named_with_the_radius_that_fits(nominal: NominalProfile, given: float, true: float) -> None:
+    told = refusal(scan(nominal, true), nominal, tip_radius_mm=given)
+    assert f"is {given:g} mm the radius of the tip? With {true:g} mm the points would fit" in told
+
+
+def test_a_part_that_is_too_large_throughout_is_bad_and_its_verdict_asks_for_ball_centres(nominal: NominalProfile) -> None:
+    result = judge(scan(nominal, 0.2), nominal)
+    assert result.verdict == Verdict.NONCONFORM
+    assert [reason.kind for reason in result.reasons] == ["out-of-tolerance", "shift"]
+    assert result.reasons[-1].words.startswith("All points are 0.200 mm out (scatter 0.00")
+    assert "ball centres?" in result.reasons[-1].words
 
 
 @pytest.mark.parametrize("fit", ["best-fit", "minimum-zone", "none"])
