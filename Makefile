@@ -7,7 +7,7 @@ INSTALL := $(PIP) --no-build-isolation --editable
 # The tests start a hundred processes; where Python may keep no compiled files, each of them compiles every file anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo install test lowest platforms upgrade bench paper faults powercuts kills proofs laws audit
+.PHONY: demo install test lowest platforms upgrade bench paper faults powercuts kills damage proofs laws audit
 demo: .venv/installed
 	$(BIN)/cmmlink demo --out demo-result
 
@@ -53,6 +53,10 @@ powercuts: .venv/test-installed
 # A hundred recording processes killed at random moments; every acknowledged point must be there.
 kills: .venv/test-installed
 	$(BIN)/python -m tests.integration.killed soak 100
+
+# The file of records damaged in thousands of ways: every command answers in words, and verify calls none of them sound.
+damage: .venv/test-installed
+	$(BIN)/pytest -n 2 --timeout 7200 --damages 100000 tests/cmmlink/record/test_damage.py
 
 # The proof in mid-scan over 1,200 simulated scans of six kinds, 200 each: no part that passes may be proven out.
 proofs: .venv/test-installed

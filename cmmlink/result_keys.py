@@ -331,6 +331,13 @@ class Alteration(_Json):
     message: str = Field(description="all of this in one sentence")
 
 
+class Against(_Json):
+    """What came of holding a result file against the records."""
+
+    run: str = Field(description="the run that the result file names")
+    disagreements: list[str] = Field(description="what the two say differently, in words; empty where they agree")
+
+
 class Verified(_Json):
     """The answer of `verify`."""
 
@@ -339,3 +346,4 @@ class Verified(_Json):
     records: int = Field(description="the number of sound records")
     chain_sha256: str = Field(description="the hash of the last sound record")
     first: Alteration | None = Field(description="the first record that was altered")
+    against: Against | None = Field(default=None, description="with `--against`: whether the result file and the records agree")

@@ -75,3 +75,8 @@ def headline_of(verdict: Verdict | None, ending: str = "complete", share: float 
         at = "" if not share else f" AT {math.floor(100 * share)} %"  # rounded down: 99.9 % is not the whole
         return Headline(_ENDINGS[ending] + at, "ended-early")
     return NOT_MEASURED if verdict is None else Headline(VERDICT_WORDS[verdict], _SHAPES[verdict])
+
+
+def printable(text: str) -> str:
+    """The text without signs that steer a terminal, each spelled out in its place; lines stay lines."""
+    return "".join(sign if sign.isprintable() or sign == "\n" else repr(sign)[1:-1] for sign in text)

@@ -24,6 +24,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--points", type=int, default=100, help="points to read (default 100)")
     group.addoption("--baud-rate", type=int, default=115_200)
     group.addoption("--parity", default="N", choices=["N", "E", "O"])
+    group = parser.getgroup("damage", "tests/cmmlink/record/test_damage.py")
+    group.addoption("--damages", type=int, default=12, metavar="N", help="kinds of damage to the records to try (default 12)")
     group = parser.getgroup("browser", "tests/cmmlink/console in Chromium")
     group.addoption("--require-browser", action="store_true", help="fail where the tests in a browser would be skipped")
     group.addoption("--require-open3d", action="store_true", help="fail where the tests with Open3D would be skipped")

@@ -4,6 +4,7 @@ import json
 import logging
 import sys
 
+from cmmlink.words import printable
 from inspection import NotMeasured, Verdict
 
 EXIT_OF = {Verdict.CONFORM: 0, Verdict.NONCONFORM: 1, Verdict.UNCERTAIN: 3}
@@ -18,7 +19,7 @@ _log = logging.getLogger(__name__)
 def fail(message: str, code: int) -> int:
     """Write a message to standard error, and to the log together with the error being handled. Returns the code."""
     _log.error("%s", message, exc_info=sys.exc_info()[0] is not None)
-    sys.stderr.write(f"cmmlink: {message}\n")
+    sys.stderr.write(f"cmmlink: {printable(message)}\n")
     return code
 
 

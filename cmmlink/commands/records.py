@@ -12,13 +12,35 @@ from cmmlink.commands.exit_codes import EXIT_OF, NO_RECORD, UNUSABLE, fail
 from cmmlink.commands.options import Json, Out, Records, RunName, records_folder
 from cmmlink.commands.output import now, print_json, terminal
 from cmmlink.devices import decoder_of
-from cmmlink.record import Replay, check_chain, describe, export_run, find_run, list_runs, open_to_read, recorded_run, replay_run
+from cmmlink.errors import PlanError
+from cmmlink.record import (
+    Replay,
+    check_chain,
+    describe,
+    disagreements,
+    export_run,
+    find_run,
+    list_runs,
+    open_to_read,
+    read_result,
+    recorded_run,
+    replay_run,
+)
 from cmmlink.report import print_summary, write_results
 from cmmlink.result_keys import RunLine
-from cmmlink.words import headline_of, local_words, section_words, utc_words
+from cmmlink.words import headline_of, local_words, printable, section_words, utc_words
 from inspection import Method, Verdict
 
 _DETAILS = ("run", "started", "ended", "state", "message", "verdict", "part", "serial_number", "operator", "device", "chain_sha256")
+_MOST_DISAGREEMENTS = 5
+_PROVES = (
+    "This shows that the file fits together as it is. It does not show a file that was written anew, hashes and all, or whose last runs "
+    "were cut off: `cmmlink verify --against result.json` does, with a result that was kept elsewhere."
+)
+_PROVES_AGAINST = (
+    "The result of run {run} and the records agree: nothing up to the end of that run was changed, cut off or added since the result was "
+    "written. What was recorded later is not covered by it."
+)
 _LONGEST_HEADLINE = len("INTERRUPTED AT 99 %")
 
 
@@ -31,9 +53,9 @@ def runs(records: Records = None, as_json: Json = False) -> int:
     for entry in found:
         received = "-" if entry["received"] is None else entry["received"]
         head = f"{entry['run']}  {_local(entry['started']):<25}  {entry['state']:<11}  {_headline(entry):<{_LONGEST_HEADLINE}}"
-        typer.echo(f"{head}  {received:>9} points  {_part_in(entry)}")
+        _say(f"{head}  {received:>9} points  {_part_in(entry)}")
     if not found:
-        typer.echo(f"no run was recorded yet in {records_folder(records)}")
+        _say(f"no run was recorded yet in {records_folder(records)}")
     return 0
 
 
@@ -59,20 +81,25 @@ def show(name: RunName, records: Records = None, as_json: Json = False) -> int:
     if as_json:
         print_json(found)
         return 0
-    typer.echo(f"{_headline(found)}   {_part_in(found)}".rstrip())
+    _say(f"{_headline(found)}   {_part_in(found)}".rstrip())
     for key in _DETAILS:
         if found[key] and (key != "verdict" or found["state"] == "complete"):
             value = _local(found[key]) if key in ("started", "ended") else found[key]
-            typer.echo(f"{key:<14} {value}{' (simulated)' if key == 'device' and found['simulated'] else ''}")
+            _say(f"{key:<14} {value}{' (simulated)' if key == 'device' and found['simulated'] else ''}")
     for note in found.get("notes", ()):
-        typer.echo(f"note: {note}")
+        _say(f"note: {note}")
     for key in ("software", "recorded"):
-        typer.echo(f"{key:<14} {', '.join(f'{name} {value}' for name, value in found[key].items() if value)}")
+        _say(f"{key:<14} {', '.join(f'{name} {value}' for name, value in found[key].items() if value)}")
     for event in found["events"]:
         told = ", ".join(f"{name} {value}" for name, value in event.items() if name not in ("event", "time_s", "after_points"))
-        typer.echo(f"  {event['time_s'] - found['clock_s']:9.3f} s  after {event['after_points']} points: {event['event']} {told}")
-    typer.echo("\n" + found["plan"].rstrip())
+        _say(f"  {event['time_s'] - found['clock_s']:9.3f} s  after {event['after_points']} points: {event['event']} {told}")
+    _say("\n" + found["plan"].rstrip())
     return 0
+
+
+def _say(text: str) -> None:
+    """Print what stands in the records; nothing there may steer the terminal."""
+    typer.echo(printable(text))
 
 
 def export(
@@ -133,16 +160,40 @@ def _print_replay(again: Replay, run_id: str) -> None:
 
 def verify(
     name: Annotated[str | None, typer.Argument(metavar="[RUN]", help="One run; without it all records.")] = None,
+    against: Annotated[
+        Path | None, typer.Option(metavar="result.json", help="Hold a result file against all records, which its hash covers.")
+    ] = None,
     records: Records = None,
     as_json: Json = False,
 ) -> int:
-    """Recompute the hash chain and name the first record that was altered."""
+    """Recompute the hash chain and name the first record that was altered.
+
+    A chain has no key: whoever may write the file can write it anew, hashes and all, or cut off its end. A result file that was kept
+    elsewhere shows that, with --against.
+    """
+    result = None if against is None else read_result(against)
     with open_to_read(records_folder(records), now, close_interrupted=False) as store:
-        found = check_chain(store, find_run(store, name) if name else None)
+        run = find_run(store, name) if name else None
+        if result is not None and run not in (None, result["run"]):
+            raise PlanError(f"{against}: it is the result of run {result['run']}, not of run {run}")
+        found = check_chain(store, None if result is not None else run)
+        if result is not None:
+            found["against"] = {"run": result["run"], "disagreements": [] if found["altered"] else disagreements(store, result)}
     if as_json:
         print_json(found)
-    elif found["altered"]:
-        return fail(found["first"]["message"], NO_RECORD)
-    else:
+    return _verified(found, silent=as_json)
+
+
+def _verified(found: Mapping[str, Any], silent: bool) -> int:
+    """Say what was found, and what that proves. Returns the exit code."""
+    against = found.get("against", {"run": None, "disagreements": []})
+    if found["altered"]:
+        return NO_RECORD if silent else fail(found["first"]["message"], NO_RECORD)
+    if against["disagreements"]:
+        told = "; ".join(against["disagreements"][:_MOST_DISAGREEMENTS])
+        more = len(against["disagreements"]) - _MOST_DISAGREEMENTS
+        return NO_RECORD if silent else fail(told + (f"; and {more} more" if more > 0 else ""), NO_RECORD)
+    if not silent:
         typer.echo(f"nothing was altered: {found['records']} records, chain {found['chain_sha256']}")
-    return NO_RECORD if found["altered"] else 0
+        typer.echo(_PROVES if against["run"] is None else _PROVES_AGAINST.format(run=against["run"]))
+    return 0

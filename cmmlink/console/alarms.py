@@ -8,6 +8,7 @@ from datetime import datetime
 from itertools import islice
 
 from cmmlink.console.protocol import AlarmList, AlarmRow, Severity
+from cmmlink.console.refused import without_folders
 from cmmlink.events import Arrived, Event, Judged, RunFinished, RunStarted
 from drivers import Damaged, LinkDown, LinkUp, Lost, Rejected
 
@@ -65,7 +66,9 @@ class Alarms:
                 _log.log(logging.ERROR if severity == "fault" else logging.WARNING, "alarm %d: %s: %s", self._number, what, detail)
                 self._of_this_run[(what, detail)] = self._number
                 since = self._now().strftime("%Y-%m-%d %H:%M:%S")
-                self._alarms[self._number] = AlarmRow(self._number, severity, what, detail, count, since, self._run, True, active, False)
+                self._alarms[self._number] = AlarmRow(
+                    self._number, severity, what, without_folders(detail), count, since, self._run, True, active, False
+                )
                 self._drop_oldest()
             self._publish()
 

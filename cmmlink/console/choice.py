@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cmmlink.console.protocol import ChosenPlan
+from cmmlink.console.refused import without_folders
 from cmmlink.devices import words_of
 from cmmlink.errors import PlanError
 from cmmlink.from_plan import check_plan
@@ -45,7 +46,9 @@ def check_choice(name: str, file: Path) -> Choice:
     except (PlanError, InspectionError, PointFileError, ValueError) as error:
         found = re.search(r"\bline (\d+)", str(error))
         about_plan = isinstance(error, PlanError) and str(error).startswith(str(file))
-        return _refusal(name, text, str(error).replace(str(file), file.name), int(found[1]) if found and about_plan else None)
+        return _refusal(
+            name, text, without_folders(str(error).replace(str(file), file.name)), int(found[1]) if found and about_plan else None
+        )
     return Choice(name, CheckedPlan(plan, profile), _description(name, text, plan, profile))
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from cmmlink.console.protocol import SectionRow, SurfaceState
+from cmmlink.console.refused import without_folders
 from cmmlink.endings import Ended
 from cmmlink.events import RunStarted
 from cmmlink.run_view import RunContext
@@ -75,7 +76,14 @@ class CtImport:
         """Note that it is over, what came of it, and what was assumed."""
         with self._lock:
             headline = NOT_MEASURED if failed or not self._sections else _headline_of(self._sections, self._state.total)
-            ended = replace(self._state, word=headline.words, shape=headline.shape, message=message, notes=tuple(notes), remaining_s=None)
+            ended = replace(
+                self._state,
+                word=headline.words,
+                shape=headline.shape,
+                message=without_folders(message),
+                notes=tuple(map(without_folders, notes)),
+                remaining_s=None,
+            )
             self._state = replace(ended, state="failed" if failed else "done")
 
     def section(self, index: int) -> Section | None:

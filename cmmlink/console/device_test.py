@@ -6,6 +6,7 @@ from contextlib import AbstractContextManager
 
 from cmmlink.console.job import Job
 from cmmlink.console.protocol import DeviceTest
+from cmmlink.console.refused import without_folders
 from cmmlink.devices import Connected
 from cmmlink.errors import PlanError
 from drivers import DeviceError, PointBatch, PointFileError, ScanOpened
@@ -23,7 +24,7 @@ def listen_to_device(job: Job, connect: Callable[[], AbstractContextManager[Conn
             job.attach(connected.source)
             message = _listen(connected, clock)
     except (DeviceError, PlanError, PointFileError) as error:
-        return DeviceTest("failed", str(error))
+        return DeviceTest("failed", without_folders(str(error)))
     return DeviceTest("aborted", "aborted") if job.stop.is_set() else DeviceTest("passed", message)
 
 

@@ -112,7 +112,7 @@ class PastRuns:
         with tempfile.TemporaryDirectory(dir=folder) as files, open_to_read(self.folder, self.now) as store:
             run = find_run(store, run)
             export_files(store, run, Path(files))
-            return Path(shutil.make_archive(str(folder / run), "zip", files))
+            return Path(shutil.make_archive(str(folder / "run"), "zip", files))
 
 
 def _key(entry: dict[str, Any]) -> tuple[str, str]:

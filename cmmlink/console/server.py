@@ -14,7 +14,7 @@ import logging
 import threading
 import time
 from collections.abc import Iterator
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from importlib import resources
 from typing import Any
 
@@ -49,9 +49,10 @@ from cmmlink.console.protocol import (
     ShownRun,
     json_of,
 )
-from cmmlink.console.refused import Refused, words_of
+from cmmlink.console.refused import Refused, without_folders, words_of
 from cmmlink.console.run_archive import RunArchives
 from cmmlink.console.station import Station
+from cmmlink.run_state import RunState
 
 _log = logging.getLogger(__name__)
 
@@ -305,9 +306,14 @@ class ConsoleServer:
         yield Control(self._controller is page, self._controller is not None, len(self._pages))
         yield station.state
         yield station.alarms.shown
-        yield ShownRun(view.state() if view else None, page.opened is not None)
+        yield ShownRun(_for_page(view.state()) if view else None, page.opened is not None)
         yield station.history
         yield station.ct.state
+
+
+def _for_page(run: RunState) -> RunState:
+    """The state of a run as pages see it: what went wrong is told without the folders that files lie in."""
+    return replace(run, message=without_folders(run.message), remark=without_folders(run.remark))
 
 
 def _static_files() -> list[Any]:

@@ -1,5 +1,6 @@
 """The hash-chained record of every run: written, read, replayed, exported. This is the front door of the package."""
 
+from cmmlink.record.against import disagreements, read_result
 from cmmlink.record.bodies import unpack_document, unpack_judged
 from cmmlink.record.chain import Draft, Record
 from cmmlink.record.export import export_run
@@ -39,6 +40,7 @@ __all__ = [
     "check_chain",
     "default_folder",
     "describe",
+    "disagreements",
     "end_missing",
     "export_run",
     "find_run",
@@ -46,6 +48,7 @@ __all__ = [
     "open_to_read",
     "open_to_record",
     "points_of",
+    "read_result",
     "reads_of",
     "recorded_plan",
     "recorded_profile",

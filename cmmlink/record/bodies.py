@@ -16,13 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmmlink.errors import StoreError
+from cmmlink.record.shapes import Placed, checked, read_document
 from drivers import Arrival, PointBatch, WireBytes
 from inspection import JudgedRows
 
 POINT_BYTES = 40
 _JUDGED_BYTES = 50
 _JUDGED_ROWS = 20_000  # of a record of deviations: about a megabyte
-_ARRIVALS = {kind.__name__: kind for kind in get_args(Arrival)}
+_ARRIVALS = {kind.__name__: kind for kind in get_args(Arrival) if kind not in (PointBatch, WireBytes)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,8 +42,8 @@ def pack_document(document: object) -> bytes:
 
 
 def unpack_document(body: bytes) -> Any:
-    """Read a document."""
-    return json.loads(body)
+    """Read a document. Raises StoreError where it is none."""
+    return read_document(body)
 
 
 def pack_reads(reads: Sequence[WireBytes]) -> bytes:
@@ -103,14 +104,14 @@ def pack_arrivals(moments: Iterable[PlacedArrival]) -> bytes:
 
 
 def unpack_arrivals(body: bytes) -> list[PlacedArrival]:
-    """Unpack arrivals. Raises StoreError for an arrival that this version does not know."""
-    return [_placed_arrival(entry) for entry in unpack_document(body)]
+    """Unpack arrivals. Raises StoreError for an arrival that this version does not know, or that is none."""
+    return [_placed_arrival(entry) for entry in checked(list[Placed], unpack_document(body))]
 
 
-def _placed_arrival(entry: dict[str, Any]) -> PlacedArrival:
-    if entry["event"] not in _ARRIVALS:
-        raise StoreError(f"the record holds an event {entry['event']!r} that this version of cmmlink does not know")
-    return PlacedArrival(entry["time_s"], entry["reads"], entry["points"], _ARRIVALS[entry["event"]](**entry["values"]))
+def _placed_arrival(entry: Placed) -> PlacedArrival:
+    if entry.event not in _ARRIVALS:
+        raise StoreError(f"the record holds an event {entry.event!r} that this version of cmmlink does not know")
+    return PlacedArrival(entry.time_s, entry.reads, entry.points, checked(_ARRIVALS[entry.event], entry.values))
 
 
 def pack_judged(result: JudgedRows) -> Iterator[tuple[int, bytes]]:

@@ -50,7 +50,7 @@ class Alteration:
 
     def __str__(self) -> str:
         kind = f" ({self.kind} of run {self.run})" if self.run else ""
-        return f"record {self.number}{kind}: {self.problem}"
+        return f"record {self.number}{kind}: {self.problem}" if self.number else f"the file of records: {self.problem}"
 
 
 def chain_record(draft: Draft, number: int, time_s: float, previous: bytes) -> Record:

@@ -11,6 +11,7 @@ from cmmlink.deviations_csv import write_deviations
 from cmmlink.errors import PlanError
 from cmmlink.record.bodies import unpack_judged
 from cmmlink.record.reader import arrivals_of, describe, event_document, points_of, reads_of, recorded_run
+from cmmlink.record.shapes import plain_name
 from cmmlink.record.store import Store
 
 POINT_COLUMNS = {
@@ -43,7 +44,7 @@ def export_run(store: Store, run: str, folder: Path) -> list[Path]:
 
 def _documents(store: Store, run: str, folder: Path) -> list[Path]:
     recorded = recorded_run(store, run)
-    nominal = folder / f"nominal-{Path(str(recorded.header['nominal'])).name}"
+    nominal = folder / f"nominal-{plain_name(recorded.header['nominal'])}"
     nominal.write_bytes(recorded.nominal)
     plan = folder / "plan.yaml"
     plan.write_bytes(recorded.plan.encode())

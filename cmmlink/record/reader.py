@@ -19,12 +19,14 @@ from cmmlink.errors import RunError, StationBusyError, StoreError
 from cmmlink.record.bodies import PlacedArrival, unpack_arrivals, unpack_document, unpack_points, unpack_reads
 from cmmlink.record.chain import Record, is_damaged
 from cmmlink.record.recorder import end_draft
+from cmmlink.record.shapes import End, Header, Result, checked
 from cmmlink.record.station_lock import PATIENCE_S
 from cmmlink.record.store import FILE_NAME, Store
 from drivers import Arrival, PointBatch, Rejected, WireBytes
 
 _FROM_HEADER = ("run", "started", "part", "serial_number", "simulated")
 _FROM_END = ("state", "received", "verdict", "coverage")
+_SHAPES: dict[str, type[Any]] = {"run": Header, "result": Result, "end": End}
 _CUT_OFF = "the program ended before the run did: power failure, crash or kill"
 
 
@@ -108,33 +110,61 @@ def recorded_run(store: Store, run: str) -> RecordedRun:
     for kind in ("run", "plan", "nominal"):
         if kind not in found:
             raise StoreError(f"{store.path}: the {kind} record of run {run} is missing; `cmmlink verify` says more")
-    documents = {kind: unpack_document(found[kind].body) for kind in ("run", "result", "end") if kind in found}
-    sha256 = found["end"].sha256.hex() if "end" in found else ""
-    plan = found["plan"].body.decode()
+    documents = {kind: _document(store, found[kind]) for kind in _SHAPES if kind in found}
+    sha256 = bytes(found["end"].sha256).hex() if "end" in found else ""
+    plan = found["plan"].body.decode(errors="replace")  # it is read as a plan, and refused there
     return RecordedRun(documents["run"], plan, found["nominal"].body, documents.get("end"), documents.get("result"), sha256)
+
+
+def _document(store: Store, record: Record) -> dict[str, Any]:
+    """The document of a record, checked. Raises StoreError."""
+    with _named(store, record):
+        document: dict[str, Any] = unpack_document(record.body)
+        checked(_SHAPES[record.kind], document)
+        return document
+
+
+@contextmanager
+def _named(store: Store, record: Record) -> Iterator[None]:
+    """Say which record it is that cannot be read."""
+    try:
+        yield
+    except StoreError as error:
+        what = f"record {record.number} ({record.kind} of run {record.run})"
+        raise StoreError(f"{store.path}: {what} cannot be read: {error}; `cmmlink verify` says more") from None
 
 
 def reads_of(store: Store, run: str) -> Iterator[WireBytes]:
     """Every read of raw bytes, in order."""
     for record in store.records(run, "wire"):
-        yield from unpack_reads(record.body)
+        with _named(store, record):
+            reads = unpack_reads(record.body)
+        yield from reads
 
 
 def points_of(store: Store, run: str) -> Iterator[PointBatch]:
     """Every point, in order, as many at once as a record holds."""
     for record in store.records(run, "points"):
-        yield unpack_points(record.body)
+        with _named(store, record):
+            batch = unpack_points(record.body)
+        yield batch
 
 
 def arrivals_of(store: Store, run: str) -> Iterator[PlacedArrival]:
     """Every arrival other than bytes and points, in order."""
     for record in store.records(run, "events"):
-        yield from unpack_arrivals(record.body)
+        with _named(store, record):
+            moments = unpack_arrivals(record.body)
+        yield from moments
 
 
 def registrations_of(store: Store, run: str) -> list[dict[str, Any]]:
     """The history of the registration: a document for each pose that was noted."""
-    return [pose for record in store.records(run, "registration") for pose in unpack_document(record.body)]
+    found: list[dict[str, Any]] = []
+    for record in store.records(run, "registration"):
+        with _named(store, record):
+            found += checked(list[dict[str, Any]], unpack_document(record.body))
+    return found
 
 
 def describe(store: Store, run: str) -> dict[str, Any]:
@@ -182,10 +212,14 @@ def _is_telling(arrival: Arrival) -> bool:
 
 
 def _entry(store: Store, begin: Record, end: Record | None) -> dict[str, Any]:
+    damaged = {"run": str(begin.run), "state": "damaged"} | dict.fromkeys((*_FROM_HEADER[1:], "stack", *_FROM_END[1:]))
     if is_damaged(begin) or (end is not None and is_damaged(end)):
-        return {"run": begin.run, "state": "damaged"} | dict.fromkeys((*_FROM_HEADER[1:], "stack", *_FROM_END[1:]))
-    header = unpack_document(begin.body)
-    closing = unpack_document(end.body) if end else end_missing(store, begin.run)
+        return damaged
+    try:
+        header = _document(store, begin)
+        closing = _document(store, end) if end else end_missing(store, begin.run)
+    except StoreError:
+        return damaged
     stack = header.get("stack")
     place = {key: value for key, value in stack.items() if key != "plan"} if stack else None
     return {key: header.get(key) for key in _FROM_HEADER} | {"stack": place} | {key: closing.get(key) for key in _FROM_END}

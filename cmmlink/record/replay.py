@@ -22,6 +22,7 @@ from cmmlink.plan import Device, Plan, read_model
 from cmmlink.record.bodies import PlacedArrival
 from cmmlink.record.reader import RecordedRun, arrivals_of, points_of, reads_of
 from cmmlink.record.recorder import result_sha256, software
+from cmmlink.record.shapes import plain_name
 from cmmlink.record.store import Store
 from cmmlink.result_json import density_notes, result_json
 from drivers import Arrival, Capture, Decoder, LinkDown, LinkUp, PointBatch
@@ -128,7 +129,7 @@ def _with_changes(plan: Plan, tolerance: tuple[float, float] | None, method: str
 def recorded_profile(plan: Plan, recorded: RecordedRun) -> NominalProfile:
     """Discretise the nominal from its recorded file; the one that the plan names may have changed since, or be gone."""
     with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / Path(str(recorded.header["nominal"])).name
+        file = Path(folder) / f"nominal-{plain_name(recorded.header['nominal'])}"
         file.write_bytes(recorded.nominal)
         return profile_of(plan.model_copy(update={"nominal": plan.nominal.model_copy(update={"file": file})}))
 

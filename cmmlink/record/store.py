@@ -156,7 +156,10 @@ class Store:
         execute = self._connection.execute
         if run is None:
             known = execute("SELECT seq FROM sqlite_sequence WHERE name = 'record'").fetchone()
-            return 1, known[0] if known else 0, GENESIS
+            count = known[0] if known else 0
+            if not isinstance(count, int):
+                raise sqlite3.DatabaseError(f"the number of its last record is {count!r:.40}")
+            return 1, count, GENESIS
         (first,) = execute("SELECT min(number) FROM record WHERE run = ? AND kind = 'run'", (run,)).fetchone()
         (following,) = execute("SELECT min(number) FROM record WHERE number > ? AND kind = 'run'", (first,)).fetchone()
         before = execute("SELECT sha256 FROM record WHERE number = ?", (first - 1,)).fetchone()
@@ -164,9 +167,14 @@ class Store:
 
     def _unsound_file(self, number: int) -> Alteration | None:
         """Damage that the chain cannot show: records beyond its end, and damage of the file itself."""
-        (beyond,) = self._connection.execute("SELECT max(number) FROM record").fetchone()
+        lowest, beyond = self._connection.execute("SELECT min(number), max(number) FROM record").fetchone()
         if (beyond or 0) > number:
             return Alteration(number + 1, "", "", "was added without being counted")
+        if lowest is not None and lowest < 1:
+            return Alteration(lowest, "", "", "was added before the first: numbers begin with 1")
+        foreign = self._connection.execute("SELECT name FROM sqlite_master WHERE type IN ('trigger', 'view')").fetchone()
+        if foreign is not None:
+            return Alteration(0, "", "", f"every record is sound, but the file holds {foreign[0]!r:.60}, which cmmlink never writes")
         (report,) = self._connection.execute("PRAGMA integrity_check(1)").fetchone()
         return None if report == "ok" else Alteration(0, "", "", f"every record is sound, but the file is damaged: {report}")
 
