@@ -111,6 +111,8 @@ def recorded_run(store: Store, run: str) -> RecordedRun:
         if kind not in found:
             raise StoreError(f"{store.path}: the {kind} record of run {run} is missing; `cmmlink verify` says more")
     documents = {kind: _document(store, found[kind]) for kind in _SHAPES if kind in found}
+    if documents["run"]["run"] != run:
+        raise StoreError(f"{store.path}: run {run} says that it is another; `cmmlink verify` says more")
     sha256 = bytes(found["end"].sha256).hex() if "end" in found else ""
     plan = found["plan"].body.decode(errors="replace")  # it is read as a plan, and refused there
     return RecordedRun(documents["run"], plan, found["nominal"].body, documents.get("end"), documents.get("result"), sha256)

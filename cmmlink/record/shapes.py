@@ -7,11 +7,12 @@ import json
 from datetime import datetime
 from functools import cache
 from pathlib import PurePosixPath
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from cmmlink.errors import StoreError
+from cmmlink.words import VerdictName
 
 Kept = TypeVar("Kept")
 _LONGEST_NAME = 100
@@ -23,7 +24,6 @@ def _require_moment(text: str) -> str:
 
 
 Moment = Annotated[str, AfterValidator(_require_moment)]
-VerdictWord = Literal["conform", "nonconform", "uncertain"]
 
 
 class _Document(BaseModel):
@@ -63,7 +63,7 @@ class End(_Document):
     message: str
     ended: Moment
     received: int | None
-    verdict: VerdictWord | None
+    verdict: VerdictName | None
     coverage: float | None = None
     result_sha256: str = ""
 
@@ -86,7 +86,7 @@ class Result(_Document):
     """The result of a run, as far as anything but a person reads it."""
 
     received: int
-    verdict: VerdictWord | None
+    verdict: VerdictName | None
     coverage: float | None = None
     worst: Worst | None = None
     tolerance: Limits | None = None

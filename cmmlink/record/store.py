@@ -161,6 +161,8 @@ class Store:
                 raise sqlite3.DatabaseError(f"the number of its last record is {count!r:.40}")
             return 1, count, GENESIS
         (first,) = execute("SELECT min(number) FROM record WHERE run = ? AND kind = 'run'", (run,)).fetchone()
+        if first is None:
+            raise sqlite3.DatabaseError(f"run {run} has no beginning")
         (following,) = execute("SELECT min(number) FROM record WHERE number > ? AND kind = 'run'", (first,)).fetchone()
         before = execute("SELECT sha256 FROM record WHERE number = ?", (first - 1,)).fetchone()
         return first, following - 1 if following else self._where(None)[1], before[0] if before else GENESIS
