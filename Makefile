@@ -7,7 +7,7 @@ INSTALL := $(PIP) --no-build-isolation --editable
 # The tests start a hundred processes; where Python may keep no compiled files, each of them compiles every file anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo install test lowest platforms upgrade bench paper faults powercuts kills damage proofs laws audit
+.PHONY: demo install test lowest platforms upgrade bench paper faults powercuts kills fuzz damage proofs laws audit
 demo: .venv/installed
 	$(BIN)/cmmlink demo --out demo-result
 
@@ -49,6 +49,11 @@ faults: .venv/test-installed
 CUTS ?= 2000
 powercuts: .venv/test-installed
 	$(BIN)/python -m tests.integration.power_cuts $(CUTS)
+
+# Mutated inputs for every reader, codec, plan, map, record and message; what goes wrong is kept in tests/fuzz/corpus.
+MINUTES ?= 10
+fuzz: .venv/test-installed
+	$(BIN)/python -m tests.fuzz.grow $(MINUTES) $(TARGETS)
 
 # A hundred recording processes killed at random moments; every acknowledged point must be there.
 kills: .venv/test-installed

@@ -36,15 +36,16 @@ def read_obj(path: Path, scale: float = 1.0) -> SurfaceMesh:
     """
     checked_scale(scale)
     text = _parse(read_whole(path), path)
-    corners_mm = text.corners * scale
     by_size: dict[int, list[list[int]]] = {}
     for face in text.faces:
         by_size.setdefault(len(face), []).append(face)
     triangles, off = [np.empty((0, 3), dtype=np.intp)], []
-    for size, faces in sorted(by_size.items()):
-        numbers = np.array(faces, dtype=np.intp)  # (f, size)
-        off.append(_off_plane_mm(corners_mm[numbers]))
-        triangles.append(_cut_up(numbers, corners_mm) if size > 3 else numbers)
+    with np.errstate(over="ignore", invalid="ignore"):  # what is no coordinate of a part is refused with its triangle
+        corners_mm = text.corners * scale
+        for size, faces in sorted(by_size.items()):
+            numbers = np.array(faces, dtype=np.intp)  # (f, size)
+            off.append(_off_plane_mm(corners_mm[numbers]))
+            triangles.append(_cut_up(numbers, corners_mm) if size > 3 else numbers)
     notes = text.notes + _note_on_planes(np.concatenate(off)) if off else text.notes
     if not text.faces:
         raise MeshError(f"{path}: no face is in it{_with(notes)}; export the surface again, or as STL")
