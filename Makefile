@@ -25,11 +25,12 @@ test: .venv/test-installed
 	@tests/page/check $(PAGE_OPTIONS)
 
 # The lowest versions that pyproject.toml allows, on Python 3.11 and without the extras, must pass the fast tests: the first case of
-# every test of the four packages, but for those in a browser; not the tests of devices and documents, which start processes.
+# every test of the four packages, but for the files that are about processes: browser, console, streams of a command, compiled code.
 LOWEST_PYTHON ?= python3.11
-FAST_TESTS := --first-case tests/inspection tests/drivers tests/simulators tests/cmmlink --ignore=tests/cmmlink/console/test_console_browser.py
+PACKAGES := inspection drivers simulators cmmlink
+OF_PROCESSES := cmmlink/console/test_console_browser.py cmmlink/console/test_launch.py cmmlink/commands/test_main.py inspection/kernels/test_compiling.py
 lowest: .venv/lowest/installed
-	.venv/lowest/bin/python -m pytest $(TWO_AT_ONCE) $(FAST_TESTS)
+	.venv/lowest/bin/python -m pytest $(TWO_AT_ONCE) --first-case $(PACKAGES:%=tests/%) $(OF_PROCESSES:%=--ignore=tests/%)
 
 # For every system of the README the versions of constraints.txt must exist as wheels.
 platforms: .venv/test-installed

@@ -57,21 +57,21 @@ def _intervals(curve: NurbsCurve) -> tuple[Array, Array]:
 
 def _measure(curve: NurbsCurve, start: Array, end: Array) -> tuple[Array, Array]:
     """Middle points (g, 2) and a radius (g,) about each that holds its interval."""
-    middle = (start + end) / 2
-    samples = np.concatenate([start, middle, np.nextafter(end, start)])
-    speed = np.linalg.norm(curve.derivatives(samples, 1)[1], axis=1).reshape(3, -1).max(axis=0)
-    return np.asarray(curve.derivatives(middle, 0)[0]), 1.2 * speed * (end - start) / 2
+    samples = np.concatenate([start, (start + end) / 2, np.nextafter(end, start)])
+    point, velocity = curve.derivatives(samples, 1)
+    speed = np.hypot(velocity[:, 0], velocity[:, 1]).reshape(3, -1).max(axis=0)
+    return point[len(start) : 2 * len(start)], 1.2 * speed * (end - start) / 2
 
 
 def _closest(curve: NurbsCurve, start: Array, end: Array, points: Array) -> Closest:
     middle, radius = _measure(curve, start, end)
-    distance = np.linalg.norm(points[:, None] - middle[None], axis=2)
+    distance = np.hypot(points[:, 0, None] - middle[:, 0], points[:, 1, None] - middle[:, 1])
     best = distance.min(axis=1)
     row, column = np.nonzero(distance - radius <= best[:, None])
     a, b = start[column], end[column]
     while True:
         middle, radius = _measure(curve, a, b)
-        distance = np.linalg.norm(points[row] - middle, axis=1)
+        distance = np.hypot(*(points[row] - middle).T)
         np.minimum.at(best, row, distance)
         keep = distance - radius <= best[row]
         row, a, b = row[keep], a[keep], b[keep]

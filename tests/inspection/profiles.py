@@ -6,6 +6,7 @@ The other airfoils are read from coordinate files beside the checkout, because s
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -174,8 +175,10 @@ def curve_of(name: str) -> NurbsCurve:
 
 @cache
 def nominal_of(name: str, samples: int = 2000, material: Material = "left") -> NominalProfile:
-    """A nominal whose smallest step is the starting step, so that it has about that many samples."""
-    return discretize(curve_of(name), samples=samples, step_min=1.0 / samples, material=material)
+    """A nominal whose smallest step is the starting step, so that it has about that many samples; the side changes none of them."""
+    if material == "right":
+        return replace(nominal_of(name, samples), material=material)
+    return discretize(curve_of(name), samples=samples, step_min=1.0 / samples)
 
 
 def moved_curve(curve: NurbsCurve, rotation_deg: float, translation_mm: tuple[float, float]) -> NurbsCurve:

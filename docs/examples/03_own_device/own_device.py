@@ -10,6 +10,7 @@ It prints:
 """
 
 import json
+import shlex
 import shutil
 import subprocess
 import sys
@@ -18,7 +19,7 @@ from pathlib import Path
 
 HERE = Path(__file__).parent
 CMMLINK = [sys.executable, "-m", "cmmlink"]
-SCAN = ["--path", "path.csv", "--rate", "2000", "--speed", "300", "--count", "1000", "--form-error-mm", "0.01", "--noise-mm", "0.001"]
+SCAN = shlex.split("--path path.csv --rate 2000 --speed 300 --count 1000 --form-error-mm 0.01 --noise-mm 0.001 --unpaced")
 
 
 def simulate(folder: Path) -> tuple[subprocess.Popen[str], str]:

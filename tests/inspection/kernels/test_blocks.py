@@ -51,7 +51,7 @@ def test_closest_point_of_every_profile(name: str) -> None:
 @pytest.mark.parametrize("name", profiles.FILES + profiles.SECTIONS)
 def test_closest_point_of_airfoils(name: str) -> None:
     curve = curve_of(name)
-    points = scattered(curve, np.random.default_rng(32), 40)
+    points = scattered(curve, np.random.default_rng(32), 20)
     assert_closest(project(points, grid_of(name)), closest_point(curve, points), points, curve)
 
 
