@@ -1,7 +1,8 @@
 """The proof in mid-scan that a part will fail, sought in a thread of its own while the run goes on.
 
 The run hands over copies of the points so far and never waits; where it hands them over faster than they are looked at, the
-newest take the place of those that wait. A proof found is for display: the final verdict is reached over all points without it.
+newest take the place of those that wait. It works in slices of a few milliseconds, and sleeps between them, so that whoever shares
+the interpreter with it is let through. A proof found is for display: the final verdict is reached over all points without it.
 """
 
 import threading
@@ -11,6 +12,7 @@ from inspection import LiveInspection, Prefix
 
 _GROWTH = 1 / 32  # share by which the points must have grown before they are handed over again: copying stays cheap
 _FEWEST_NEW = 16
+_LET_THROUGH_S = 2e-4  # slept between two slices
 
 
 class LiveProof:
@@ -61,9 +63,13 @@ class LiveProof:
 
     def _seek(self) -> None:
         while (prefix := self._take()) is not None:
-            if self._search.refutes(prefix, self._closing.is_set):
+            if self._search.refutes(prefix, self._is_over):
                 self._refuted = prefix.received
                 return
+
+    def _is_over(self) -> bool:
+        """Let other threads through, and tell whether the run is over."""
+        return self._closing.wait(_LET_THROUGH_S)
 
     def _take(self) -> Prefix | None:
         """Wait for the newest prefix; None when the run is over."""

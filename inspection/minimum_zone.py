@@ -64,10 +64,12 @@ def fit_minimum_zone(
     method: Method = "exact",
     tip_radius_mm: float = 0.0,
     middle_mm: float = 0.0,
+    is_over: Callable[[], bool] = lambda: False,
 ) -> MinimumZone:
     """Minimum zone of section points (m, 2), begun at `start` or at their best fit. Points beyond open ends take no part.
 
     middle_mm : middle of the tolerance zone that the deviations are held against; zero for an equally disposed zone
+    is_over   : asked before every linear program; once it says so, the fit ends where it stands, not converged
     """
     points = check_registrable(points_mm)
     begin = register(points, nominal, method, tip_radius_mm=tip_radius_mm) if start is None else start
@@ -77,18 +79,20 @@ def fit_minimum_zone(
         return deviations(moved, nominal, method, tip_radius_mm)
 
     if len(points) <= MANY:
-        return _fit_all(points, deviations_of, pose, middle_mm)
-    return _fit_by_few(points, deviations_of, pose, middle_mm, nominal.length_mm)
+        return _fit_all(points, deviations_of, pose, middle_mm, is_over)
+    return _fit_by_few(points, deviations_of, pose, middle_mm, nominal.length_mm, is_over)
 
 
-def _fit_by_few(points: Array, deviations_of: DeviationsOf, pose: RigidTransform, middle_mm: float, length_mm: float) -> MinimumZone:
+def _fit_by_few(
+    points: Array, deviations_of: DeviationsOf, pose: RigidTransform, middle_mm: float, length_mm: float, is_over: Callable[[], bool]
+) -> MinimumZone:
     """The minimum zone of those points that stand for all, which others join until all lie in it."""
     d = deviations_of(pose.apply(points))
     smallest = MinimumZone(pose, 2 * _half_zone(d, middle_mm), middle_mm, np.empty(0, np.int64), np.empty(0), 0, False)
     rows, outside, programs = np.empty(0, np.int64), np.flatnonzero(~d.beyond_end), 0
     for _ in range(_MOST_ROUNDS):
         rows = np.union1d(rows, outside[telling_rows(d.station_mm[outside], d.deviation_mm[outside], length_mm)])
-        few = _fit_all(points[rows], deviations_of, pose, middle_mm)
+        few = _fit_all(points[rows], deviations_of, pose, middle_mm, is_over)
         pose, programs = few.nominal_from_section, programs + few.programs
         d = deviations_of(pose.apply(points))
         zone = 2 * _half_zone(d, middle_mm)
@@ -96,19 +100,21 @@ def _fit_by_few(points: Array, deviations_of: DeviationsOf, pose: RigidTransform
         if holds or zone < smallest.zone_mm:
             smallest = MinimumZone(pose, zone, middle_mm, rows[few.active], few.multipliers, programs, few.converged and holds)
         outside = np.flatnonzero(~d.beyond_end & (2 * np.abs(d.deviation_mm - middle_mm) > few.zone_mm))
-        if holds or not len(np.setdiff1d(outside, rows)):
+        if holds or not len(np.setdiff1d(outside, rows)) or is_over():
             break
     return smallest
 
 
-def _fit_all(points: Array, deviations_of: DeviationsOf, pose: RigidTransform, middle_mm: float) -> MinimumZone:
+def _fit_all(
+    points: Array, deviations_of: DeviationsOf, pose: RigidTransform, middle_mm: float, is_over: Callable[[], bool]
+) -> MinimumZone:
     """The minimum zone of points (m, 2), begun at a pose."""
     moved = pose.apply(points)
     d = deviations_of(moved)
     trust = _half_zone(d, middle_mm)
     active, multipliers = np.empty(0, dtype=np.int64), np.empty(0)
     programs, converged = 0, False
-    while programs < _MOST_PROGRAMS and not converged:
+    while programs < _MOST_PROGRAMS and not converged and not is_over():
         centre, step, promised, active, multipliers = _linear_step(moved, d, middle_mm, trust)
         programs += 1
         reach = np.hypot(*(moved - centre).T).max()

@@ -100,12 +100,12 @@ class PlacementSearch:
 
         start      : a pose near which a placement that passes is sought first; None begins at the points' best fit
         most_boxes : the search gives up after so many boxes, undecided
-        is_over    : asked between two waves of boxes; the search gives up once it says so, undecided
+        is_over    : asked every few milliseconds, between two waves of boxes or programs; the search gives up once it says so, undecided
         """
         points = check_registrable(points_mm)
         if self._passed is not None and self._excess(points, self._passed) <= 0:
             return PlacementProof("fits", self._passed, (), 0)
-        zone = fit_minimum_zone(points, self._nominal, start, tip_radius_mm=self._tip, middle_mm=self._middle)
+        zone = fit_minimum_zone(points, self._nominal, start, tip_radius_mm=self._tip, middle_mm=self._middle, is_over=is_over)
         if self._excess(points, zone.nominal_from_section) <= 0:
             self._passed = zone.nominal_from_section
             return PlacementProof("fits", self._passed, (), 0)

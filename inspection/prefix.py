@@ -57,7 +57,7 @@ class PrefixSearch:
     def refutes(self, prefix: Prefix, is_over: Callable[[], bool] = lambda: False) -> bool:
         """Whether it is proven that no placement of a prefix passes, and so that the part will fail. False says nothing.
 
-        is_over : asked now and then; the search is given up once it says so
+        is_over : asked every few milliseconds; the search is given up once it says so. Who asks may sleep in it, to let others through
         """
         rows = self._telling_rows(prefix)
         try:

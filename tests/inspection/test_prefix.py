@@ -93,3 +93,22 @@ def test_a_search_that_is_told_to_end_proves_nothing() -> None:
     prefix = live.prefix()
     assert prefix is not None
     assert not live.prefix_search().refutes(prefix, is_over=lambda: True)
+
+
+def test_a_look_is_cut_into_slices_between_which_others_are_let_through() -> None:
+    """Between two questions lies one wave of boxes or one linear program, so that none of them takes long."""
+    given = live_scan("step", 1)
+    live, looks = LiveInspection(given.nominal, ZONE), list[int]()
+    for first in range(0, len(given.points_mm), 100):
+        live.add(given.points_mm[first : first + 100])
+        prefix, asked = live.prefix(), [0]
+
+        def is_over(asked: list[int] = asked) -> bool:
+            asked[0] += 1
+            return False
+
+        if prefix is not None:
+            live.prefix_search().refutes(prefix, is_over)
+            looks.append(asked[0])
+    assert min(looks) >= 1
+    assert max(looks) >= 5
