@@ -2,7 +2,10 @@
 
 import csv
 import math
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+
+import numpy as np
 
 from inspection import NOT_JUDGED, JudgedRows, Rejection, Verdict
 
@@ -17,19 +20,25 @@ COLUMNS = {
     "verdict": "conform, nonconform or uncertain; of a rejected point `rejected:` and the reason, beside empty numbers",
 }
 
+_WORDS = {int(verdict): verdict.word for verdict in Verdict}
 
-def write_deviations(rows: JudgedRows, path: Path) -> None:
-    """Write the actual points in nominal coordinates, their feet, deviations and verdicts; rejected points say why."""
+
+def write_deviations(blocks: Iterable[JudgedRows], path: Path) -> None:
+    """Write the actual points in nominal coordinates, their feet, deviations and verdicts; rejected points say why.
+
+    blocks : the rows of a result piece by piece, as `InspectionResult.blocks` gives them
+    """
     with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
+        writer, index = csv.writer(file), 0
         writer.writerow(COLUMNS)
-        writer.writerows(_row(rows, index) for index in range(rows.received))
+        for rows in blocks:
+            writer.writerows(_lines(rows, index))
+            index += rows.received
 
 
-def _row(rows: JudgedRows, index: int) -> tuple[str | int, ...]:
-    x, y = rows.actual_mm[index]
-    foot_x, foot_y = rows.foot_mm[index]
-    values = (x, y, rows.station_mm[index], foot_x, foot_y, rows.deviation_mm[index])
-    code = rows.verdicts[index]
-    word = f"rejected: {Rejection(int(rows.rejection[index])).words}" if code == NOT_JUDGED else Verdict(int(code)).word
-    return (index, *("" if math.isnan(value) else f"{value:.6f}" for value in values), word)
+def _lines(rows: JudgedRows, first: int) -> Iterator[tuple[str | int, ...]]:
+    values = np.column_stack([rows.actual_mm, rows.station_mm, rows.foot_mm, rows.deviation_mm]).tolist()
+    codes = zip(values, rows.verdicts.tolist(), rows.rejection.tolist(), strict=True)
+    for index, (numbers, verdict, rejection) in enumerate(codes, start=first):
+        word = f"rejected: {Rejection(rejection).words}" if verdict == NOT_JUDGED else _WORDS[verdict]
+        yield (index, *("" if math.isnan(value) else f"{value:.6f}" for value in numbers), word)

@@ -1,6 +1,6 @@
 """How a run ended, and why, in sentences for whoever looks at it."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -16,7 +16,7 @@ _EARLY = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ended:
-    """How a run ended: its ending, why there is no result, the result as the command line prints it, and its judged points.
+    """How a run ended: its ending, why there is no result, the result as the command line prints it, and what gives its rows, by pieces.
 
     A run on record may be one that another process still records: then it is running.
     """
@@ -24,7 +24,7 @@ class Ended:
     ending: Ending | Literal["running"]
     message: str
     result: Mapping[str, Any]
-    rows: JudgedRows | None
+    blocks: Callable[[], Iterable[JudgedRows]] | None
 
 
 def reasons_of(ended: Ended, verdict: Verdict | None) -> list[str]:

@@ -12,7 +12,7 @@ from cmmlink.errors import PlanError
 from cmmlink.events import RunStarted
 from cmmlink.nominal_files import NominalFile, load_nominal, material_side
 from cmmlink.plan import CtPlan, Datum, Discretisation, Nominal, Plan, place_of
-from inspection import FitName, LiveInspection, Method, NominalProfile, RigidTransform, RuleName, SectionPlane, WeightName, discretize
+from inspection import FitName, LiveInspection, Method, NominalProfile, RigidTransform, Room, RuleName, SectionPlane, WeightName, discretize
 
 
 def check_plan(plan: Plan, plan_file: Path) -> NominalProfile:
@@ -67,8 +67,11 @@ def pose_of(datum: Datum | None) -> RigidTransform | None:
     return None if datum is None else RigidTransform(math.radians(datum.rotation_deg), np.array(datum.translation_mm))
 
 
-def inspection_of(plan: Plan, profile: NominalProfile, *, provisional: bool = True) -> LiveInspection:
-    """A fresh inspection as a plan describes it. Points that are all there from the start need no provisional verdicts."""
+def inspection_of(plan: Plan, profile: NominalProfile, room: Room = np.empty, *, provisional: bool = True) -> LiveInspection:
+    """A fresh inspection as a plan describes it. Points that are all there from the start need no provisional verdicts.
+
+    room : gives the arrays that grow with the scan, like numpy.empty
+    """
     section = plan.section
     return LiveInspection(
         profile,
@@ -78,6 +81,7 @@ def inspection_of(plan: Plan, profile: NominalProfile, *, provisional: bool = Tr
         section=SectionPlane(np.array(section.origin_mm), np.array(section.x_axis), np.array(section.normal)),
         off_section_max_mm=section.off_plane_max_mm,
         provisional=provisional,
+        room=room,
     )
 
 

@@ -6,29 +6,34 @@ verdict on what was received; a sink that raises ends it too, and its error is p
 
 import threading
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from cmmlink.buffer import Buffer
+from cmmlink.errors import StoreError
 from cmmlink.events import Arrived, Counts, Ending, Event, Judged, ProvenOut, RunFinished, RunStarted, Sink
 from cmmlink.live_proof import LiveProof
 from drivers import HARMLESS_REASONS, Arrival, Damaged, DeviceError, Lost, PointBatch, Rejected, ScanClosed, ScanOpened, ScanSource
 from inspection import InspectionError, InspectionResult, LiveInspection, Missing, Reason, Rejection, Verdict, reasons_of_abort
 
+Refusal = Callable[[int, int | None], str]
+"""Says, from the points received and those announced, why there is no room for more; nothing where there is."""
+
+_ROOM_EVERY = 100_000  # points between two looks whether there is room for more
 _LOOK_S = 0.05  # how often the run looks whether it was asked to stop
 _MOST_AT_ONCE = 4096  # points judged at once when many wait; more would keep the sinks waiting for news
 
 
 @dataclass(frozen=True, slots=True)
 class RunOutcome:
-    """How a run ended. `failure` is the device's error, `refusal` why no result could be given."""
+    """How a run ended. `failure` is the device's error, or why there was no room for more; `refusal` why no result could be given."""
 
     ending: Ending
     result: InspectionResult | None
     counts: Counts
-    failure: DeviceError | None
+    failure: DeviceError | StoreError | None
     refusal: InspectionError | None
 
     @property
@@ -74,7 +79,7 @@ class _Tally:
         rejected = {reason: count for reason, count in self.rejected_by_driver.items() if count and reason not in HARMLESS_REASONS}
         return Missing(self.lost, self.damaged_bytes, rejected, self.announced, self._arrived, self.begun)
 
-    def counts(self, judged: int, rejected_by_reason: dict[str, int], buffer: "Buffer[tuple[float, Arrival]]") -> Counts:
+    def counts(self, judged: int, rejected_by_reason: Mapping[str, int], buffer: "Buffer[tuple[float, Arrival]]") -> Counts:
         reasons = Counter(self.rejected_by_driver)
         reasons.update(rejected_by_reason)
         rejected = sum(reasons.values())
@@ -103,11 +108,13 @@ def run_inspection(
     stop: threading.Event,
     watch: Callable[[], None] = lambda: None,
     doubt: Reason | None = None,
+    no_room: Refusal = lambda received, announced: "",
 ) -> RunOutcome:
     """Carry out one run to its end and publish every event to every sink. Setting `stop` aborts the run.
 
     watch : called every twentieth of a second, also while no points arrive; what it raises ends the run as an error of a sink does
     doubt : a reason known beforehand why no verdict can be proven
+    no_room : asked now and then whether there is room for what is still to come; where it says why not, the run ends with what it has
     """
     buffer: Buffer[tuple[float, Arrival]] = Buffer(buffer_points)
     failures: list[DeviceError] = []
@@ -118,14 +125,14 @@ def run_inspection(
         _publish(sinks, started)
         _start(reader, failures, acquired)
         with LiveProof(live) as proof:
-            _judge_all(source, live, proof, sinks, buffer, tally, acquired, clock, stop, watch)
+            full = _judge_all(source, live, proof, sinks, buffer, tally, acquired, clock, stop, watch, no_room)
             proven_out = proof.refuted is not None
     finally:
         source.stop()
         buffer.close()
         if reader.is_alive():
             reader.join()
-    failure = failures[0] if failures else None
+    failure = full or (failures[0] if failures else None)
     ending: Ending = "interrupted" if failure else "aborted" if stop.is_set() else "complete"
     result, refusal = _finish(live, ending, tally.missing(), proven_out, doubt)
     judged, reasons = (result.judged, result.rejected_by_reason) if result else (0, _reasons_without_pose(live))
@@ -173,9 +180,10 @@ def _judge_all(
     clock: Callable[[], float],
     stop: threading.Event,
     watch: Callable[[], None],
-) -> None:
-    """Take what arrives and judge it until acquisition has ended and the buffer is empty."""
-    told = False
+    no_room: Refusal,
+) -> StoreError | None:
+    """Take what arrives and judge it until acquisition has ended and the buffer is empty. Returns why, where there was no room for more."""
+    told, full, next_look = False, None, 0
     while True:
         ended = acquired.is_set()  # read before the buffer is emptied: after it is set, nothing more is handed over
         taken = buffer.take(0.0 if ended else _LOOK_S)
@@ -183,7 +191,7 @@ def _judge_all(
         if stop.is_set():
             source.stop()
         if not taken and ended:
-            return
+            return full
         batches: list[tuple[float, PointBatch]] = []
         for time_s, arrival in taken:
             tally.add(arrival)
@@ -193,6 +201,11 @@ def _judge_all(
                 if sum(len(batch) for _, batch in batches) >= _MOST_AT_ONCE:
                     _judge(live, sinks, buffer, tally, batches, clock)
                     batches = []
+            if tally.received >= next_look or isinstance(arrival, ScanOpened):
+                next_look = tally.received + _ROOM_EVERY
+                if full is None and (why := no_room(tally.received, tally.announced)):
+                    full = StoreError(why)
+                    source.stop()
         if batches:
             _judge(live, sinks, buffer, tally, batches, clock)
             proof.offer()

@@ -1,16 +1,18 @@
 """The result as the JSON object of `--json` and `result.json`: stable keys, numbers or null."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cmmlink.events import Counts, RunStarted
-from inspection import NOT_JUDGED, InspectionResult, JudgedRows, Registration, Verdict
+from inspection import InspectionResult, Registration, Verdict
 
 _PLACES = 50  # of the profile, whose numbers of points are compared
 _DENSER = 10.0
+_AT_ONCE = 1 << 16  # points looked at together
 _SHARE_OF_A_PLACE = 0.05  # of the points: fewer move no fit
 
 
@@ -54,12 +56,26 @@ def result_json(result: InspectionResult | None, counts: Counts) -> dict[str, An
     }
 
 
-def density_notes(rows: JudgedRows | None, length_mm: float) -> list[str]:
+def density_of(stations_mm: Iterable[NDArray[np.float64]], length_mm: float) -> NDArray[np.int64]:
+    """How many points lie in each of fifty places of the profile, of stations that come piece by piece; NaN where none was judged."""
+    counts = np.zeros(_PLACES, dtype=np.int64)
+    for station in stations_mm:
+        counts += np.histogram(station[np.isfinite(station)], bins=_PLACES, range=(0.0, length_mm))[0]
+    return counts
+
+
+def stations_of(result: InspectionResult | None) -> Iterator[NDArray[np.float64]]:
+    """The stations of a result, piece by piece."""
+    for first in range(0, result.received if result is not None else 0, _AT_ONCE):
+        assert result is not None
+        yield result.station_mm[first : first + _AT_ONCE]
+
+
+def density_notes(counts: NDArray[np.int64], length_mm: float) -> list[str]:
     """A reservation where the points lie far denser in one place of the profile than in others, for a fit by points follows them."""
-    judged = 0 if rows is None else int(np.count_nonzero(rows.verdicts != NOT_JUDGED))
-    if rows is None or not judged:
+    judged = int(counts.sum())
+    if not judged:
         return []
-    counts = np.histogram(rows.station_mm[np.isfinite(rows.station_mm)], bins=_PLACES, range=(0.0, length_mm))[0]
     densest, sparse = int(counts.max()), float(np.quantile(counts[counts > 0], 0.1))
     if densest < _SHARE_OF_A_PLACE * judged or densest <= _DENSER * sparse:
         return []
@@ -119,14 +135,14 @@ def _gap(result: InspectionResult) -> dict[str, float]:
 
 
 def _worst(result: InspectionResult) -> dict[str, float] | None:
-    index = result.worst
-    if index is None:
+    worst = result.worst_row
+    if worst is None:
         return None
     return {
-        "station_mm": float(result.station_mm[index]),
-        "x_mm": float(result.actual_mm[index, 0]),
-        "y_mm": float(result.actual_mm[index, 1]),
-        "deviation_mm": float(result.deviation_mm[index]),
+        "station_mm": float(worst.station_mm[0]),
+        "x_mm": float(worst.actual_mm[0, 0]),
+        "y_mm": float(worst.actual_mm[0, 1]),
+        "deviation_mm": float(worst.deviation_mm[0]),
     }
 
 

@@ -21,7 +21,8 @@ from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan import Plan
 from cmmlink.record import PATIENCE_S, Recorder, RecordReference, RunInputs, open_to_record
 from cmmlink.result_folder import folder_of
-from cmmlink.result_json import density_notes, identity_json, result_json
+from cmmlink.result_json import density_notes, density_of, identity_json, result_json, stations_of
+from cmmlink.scratch import scratch_in, words_of_room
 from cmmlink.words import utc_words
 from inspection import NominalProfile, rehearse
 
@@ -50,7 +51,8 @@ class FinishedRun:
     @property
     def notes(self) -> list[str]:
         """What was assumed about the nominal and the points, and what the reader of the verdict has to know of them."""
-        return [*self.started.notes, *density_notes(self.outcome.result, self.profile.length_mm)]
+        length_mm = self.profile.length_mm
+        return [*self.started.notes, *density_notes(density_of(stations_of(self.outcome.result), length_mm), length_mm)]
 
     def result_json(self) -> dict[str, Any]:
         """The run as `--json` and result.json hold it."""
@@ -91,7 +93,9 @@ def carry_out(
     """
     _log.info("nominal %s, %s, %s", plan.nominal.file, plan.tolerance.zone, plan.registration)
     rehearse(profile, plan.registration.method, plan.registration.reject_outliers)
-    live = inspection_of(plan, profile)
+    scratch = scratch_in(records)
+    _log.info("%s", words_of_room(scratch.folder))
+    live = inspection_of(plan, profile, scratch)
     started = run_started(plan, device.device, device.simulated, (*notes_on_nominal(plan), *device.notes))
     on_ready()
     began = now()
@@ -101,9 +105,16 @@ def carry_out(
             store = stack.enter_context(open_to_record(records, now, patience_s))
             recorder = stack.enter_context(Recorder(store, RunInputs.of(plan), clock=clock, now=now))
         listeners: list[Sink] = [*([recorder] if recorder else []), *sinks, log_event]
-        watch = recorder.check if recorder else lambda: None
         outcome = run_inspection(
-            device.source, live, listeners, started, buffer_points=plan.buffer_points, clock=clock, stop=stop, watch=watch
+            device.source,
+            live,
+            listeners,
+            started,
+            buffer_points=plan.buffer_points,
+            clock=clock,
+            stop=stop,
+            watch=recorder.check if recorder else lambda: None,
+            no_room=scratch.refusal,
         )
     evidence = recorder.evidence if recorder else None
     if evidence is not None:

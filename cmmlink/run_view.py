@@ -19,7 +19,7 @@ from cmmlink.endings import Ended, count_words, reasons_of
 from cmmlink.events import Arrived, Counts, Event, Judged, ProvenOut, RunStarted
 from cmmlink.extremes import DEVIATION, FOOT_X, NORMAL_X, STATION, VERDICT, ChangedBins, Extremes, PointsVersion
 from cmmlink.plan import Plan
-from cmmlink.result_json import density_notes, number, result_json
+from cmmlink.result_json import density_notes, density_of, number, result_json
 from cmmlink.run_state import LinkPhase, Phase, RegistrationState, RunKind, RunState, VerdictState, WorstPoint, ZoneLimits
 from cmmlink.words import LOOKS_OUT, NOT_MEASURED, VERDICT_NAMES, Headline, headline_of, local_words
 from drivers import Heartbeat, LinkDown, LinkUp, PointBatch, Rejected, ScanClosed, ScanOpened
@@ -112,7 +112,8 @@ class RunView:
         elif isinstance(event, ProvenOut):
             self._take_proof(event)
         else:
-            self._end(Ended(event.ending, event.message, result_json(event.result, event.counts), event.result), event.counts)
+            blocks = event.result.blocks if event.result is not None else None
+            self._end(Ended(event.ending, event.message, result_json(event.result, event.counts), blocks), event.counts)
 
     def recall(self, started: RunStarted, ended: Ended) -> None:
         """Show a run as the records hold it."""
@@ -218,16 +219,18 @@ class RunView:
 
     def _end(self, ended: Ended, counts: Counts) -> None:
         """Replace everything provisional by the result."""
-        rows, extremes = ended.rows, self._extremes
-        if rows is not None:
+        extremes, places = self._extremes, density_of([], self.context.profile.length_mm)
+        if ended.blocks is not None:
             extremes = self._empty_extremes()
-            extremes.add(rows.station_mm, rows.deviation_mm, rows.foot_mm, rows.actual_mm, rows.verdicts)
+            for rows in ended.blocks():
+                extremes.add(rows.station_mm, rows.deviation_mm, rows.foot_mm, rows.actual_mm, rows.verdicts)
+                places += density_of([rows.station_mm], self.context.profile.length_mm)
         with self._lock:
             self._phase, self._ended, self._counts, self._extremes = "finished", ended, counts, extremes
             self._link = "down" if ended.ending == "interrupted" else "closed"
             self._coverage, self._out = ended.result["coverage"], ended.result["out_of_tolerance"]
-            self._notes = (*self._started.notes, *density_notes(rows, self.context.profile.length_mm))
-            if rows is not None:
+            self._notes = (*self._started.notes, *density_notes(places, self.context.profile.length_mm))
+            if ended.blocks is not None:
                 self._verdict_at = self._now()
             self._publish()
 

@@ -12,7 +12,7 @@ from inspection.deviations import Deviations, deviations, profile_error_mm
 from inspection.errors import InspectionError, NominalError, NotMeasured, RegistrationError
 from inspection.fine import register, register_fine
 from inspection.gaps import Gap, coverage, default_gap_max_mm
-from inspection.kernels import compiled_code_folder, while_compiling
+from inspection.kernels import Room, compiled_code_folder, while_compiling
 from inspection.live import LiveInspection, LiveUpdate, State, rehearse
 from inspection.methods import Method, WeightName
 from inspection.minimum_zone import MinimumZone, fit_minimum_zone
@@ -24,6 +24,7 @@ from inspection.result import NOT_JUDGED, InspectionResult, JudgedRows, Rejectio
 from inspection.rigid import RigidTransform
 from inspection.section import SectionPlane
 from inspection.self_crossings import Crossing, find_crossings
+from inspection.telling_points import telling_rows
 from inspection.terms import FitName, RuleName
 from inspection.tolerance import ToleranceZone, Verdict
 
@@ -57,6 +58,7 @@ __all__ = [
     "RegistrationError",
     "Rejection",
     "RigidTransform",
+    "Room",
     "RuleName",
     "SectionPlane",
     "State",
@@ -79,5 +81,6 @@ __all__ = [
     "register_fine",
     "rehearse",
     "synthetic",
+    "telling_rows",
     "while_compiling",
 ]

@@ -6,15 +6,19 @@ points nor how densely they lie changes a pose. Added for scans that cover only 
 function of arc length is slid along that of the nominal, in both directions (Arkin et al. 1991; Wolfson 1990).
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike, NDArray
 
+from inspection.cloud import Cloud
 from inspection.contour_order import Contour, trace_contour
 from inspection.deviations import check_points
 from inspection.errors import RegistrationError
 from inspection.frame import Frame, arc_length_weights, dominant_points, principal_frame
 from inspection.kernels import project, strides
+from inspection.medians import median_place
 from inspection.nominal import NominalProfile
 from inspection.registration import Registration
 from inspection.rigid import RigidTransform, best_motion, rotate
@@ -36,7 +40,7 @@ def register_coarse(points_mm: ArrayLike, nominal: NominalProfile) -> Registrati
     Raises RegistrationError for fewer than 8 points or points all in one place.
     """
     points = check_registrable(points_mm)
-    poses = coarse_poses(points, nominal)
+    poses = poses_of_contour(contour_of(Cloud(points), nominal), nominal)
     scores = [trimmed_mean_square(points, pose, nominal) for pose in poses]
     pose = poses[int(np.argmin(scores))]
     return Registration(
@@ -61,31 +65,43 @@ def check_registrable(points_mm: ArrayLike) -> Array:
     return points
 
 
-def coarse_poses(points_mm: Array, nominal: NominalProfile) -> list[RigidTransform]:
-    """Candidate poses: those of the boxes, the published one first, then those at the best shifts of the turning angle."""
-    return poses_of_contour(contour_of(points_mm, nominal), nominal)
+def check_cloud(points: ArrayLike | Cloud) -> Cloud:
+    """The same for points that may be a cloud already, whose points are finite."""
+    if not isinstance(points, Cloud):
+        return Cloud(np.ascontiguousarray(check_registrable(points)))
+    if len(points) < FEWEST_POINTS:
+        raise RegistrationError(f"{len(points)} points: a registration needs at least {FEWEST_POINTS}")
+    low, high = points.corners()
+    if (low == high).all():
+        raise RegistrationError(f"all {len(points)} points coincide at ({low[0]:g}, {low[1]:g})")
+    return points
 
 
 def poses_of_contour(contour: Contour, nominal: NominalProfile) -> list[RigidTransform]:
-    """Candidate poses of a measured contour."""
+    """Candidate poses of a measured contour: of the boxes, the published one first, then at the best shifts of the turning angle."""
     nominal_frame = principal_frame(nominal.points_mm, arc_length_weights(nominal.points_mm, nominal.curve.closed))
     poses = list(align_boxes(principal_frame(contour.points_mm, contour.weights_mm), nominal_frame))
     poses[0] = tune_on_dominant_points(contour.points_mm, poses[0], nominal)
     return poses + _signature_poses(contour.walk_mm, nominal)
 
 
-def contour_of(points_mm: Array, nominal: NominalProfile) -> Contour:
+def contour_of(points: Cloud, nominal: NominalProfile) -> Contour:
     """A bounded number of points that stand for the scan in any order and density.
 
     Points that are too far from the others to be of the same part are left out, so that no single number costs memory or time.
     """
-    away = np.abs(points_mm - np.median(points_mm, axis=0)).max(axis=1)
-    near = points_mm[away <= _NEAR * nominal.size_mm]
-    if len(near) >= FEWEST_POINTS:
+    middle, most = median_place(points), _NEAR * nominal.size_mm
+
+    def near() -> Iterator[Array]:
+        for block in points.blocks():
+            yield block[np.abs(block - middle).max(axis=1) <= most]
+
+    if sum(len(block) for block in near()) >= FEWEST_POINTS:
         contour = trace_contour(near, nominal.length_mm / (_SIGNATURE_STEPS * _CELLS_A_STEP))
         if len(contour.points_mm) >= FEWEST_POINTS:
             return contour
-    few = points_mm[np.lexsort(points_mm.T)][:: max(1, len(points_mm) // FEWEST_POINTS)]  # all in a few cells, or none near another
+    some = points.few()
+    few = some[np.lexsort(some.T)][:: max(1, len(some) // FEWEST_POINTS)]  # all in a few cells, or none near another
     return Contour(few, np.ones(len(few)), np.arange(len(few)))
 
 

@@ -5,6 +5,7 @@ the means runs along the contour, since on a sampled curve the nearest neighbour
 The tree is a part of the Delaunay triangulation (Shamos & Hoey 1975), which keeps the search nearly linear.
 """
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,12 +40,14 @@ class Contour:
         return self.points_mm[self.walk]
 
 
-def trace_contour(points_mm: Array, step_mm: float) -> Contour:
-    """Trace the contour of points (m, 2) through their means in cells of `step_mm`.
+def trace_contour(blocks: Callable[[], Iterable[Array]], step_mm: float) -> Contour:
+    """Trace the contour of points through their means in cells of `step_mm`.
+
+    blocks : gives the points piece by piece (k, 2), as often as they are asked for
 
     The direction of the walk, and where a closed contour is opened, follow from the points alone.
     """
-    means = _cell_means(points_mm, step_mm)
+    means = _cell_means(blocks, step_mm)
     first, second = _edges(means).T.astype(np.int32)  # the width that the graph searches of every SciPy take
     lengths = np.hypot(*(means[first] - means[second]).T)
     network = coo_array((lengths, (first, second)), shape=(len(means), len(means))).tocsr()
@@ -72,15 +75,27 @@ def _edges(means: Array) -> Rows:
     return np.column_stack([order[:-1], order[1:]])
 
 
-def _cell_means(points_mm: Array, step_mm: float) -> Array:
+def _cell_means(blocks: Callable[[], Iterable[Array]], step_mm: float) -> Array:
     """The mean of the points in every cell that has any, in the order of the cells."""
-    low = points_mm.min(axis=0)
-    cells = np.floor((points_mm - low) / step_mm).astype(np.int64)
-    _, which = np.unique(cells[:, 0] * (cells[:, 1].max() + 1) + cells[:, 1], return_inverse=True)
-    count = np.bincount(which)
-    means = np.column_stack([np.bincount(which, points_mm[:, axis] - low[axis]) / count for axis in (0, 1)])
+    corners = [(block.min(axis=0), block.max(axis=0)) for block in blocks() if len(block)]
+    low = np.min([corner for corner, _ in corners], axis=0)
+    across = int(np.floor((np.max([corner for _, corner in corners], axis=0) - low) / step_mm)[1]) + 1
+    keys, sums = (
+        np.empty(0, dtype=np.int64),
+        np.empty((3, 0)),
+    )  # of each cell: number of points, sums of x and y
+    for block in blocks():
+        cells = np.floor((block - low) / step_mm).astype(np.int64)
+        own, which = np.unique(cells[:, 0] * across + cells[:, 1], return_inverse=True)
+        grown = np.union1d(keys, own)
+        before, place = sums, np.searchsorted(grown, own)[which]
+        sums = np.zeros((3, len(grown)))
+        sums[:, np.searchsorted(grown, keys)] = before
+        for total, values in zip(sums, (np.ones(len(block)), *(block - low).T), strict=True):
+            np.add.at(total, place, values)  # one after the other, so that the pieces do not show
+        keys = grown
     grain = _ROUND_STEPS * step_mm
-    rounded: Array = np.round(means / grain) * grain + low
+    rounded: Array = np.round((sums[1:] / sums[0]).T / grain) * grain + low
     return rounded
 
 

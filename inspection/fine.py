@@ -12,15 +12,16 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inspection.coarse import check_registrable, contour_of, poses_of_contour, trimmed_mean_square
+from inspection.cloud import MANY, Cloud
+from inspection.coarse import check_cloud, contour_of, poses_of_contour, trimmed_mean_square
 from inspection.contour_order import Contour
 from inspection.deviations import feet_on
-from inspection.gaps import station_weights
-from inspection.kernels import OutlierLimit, PoseEstimate, PoseFit, project
+from inspection.gaps import weigh_by_station
+from inspection.kernels import AT_ONCE, OutlierLimit, PoseEstimate, PoseFit, project
 from inspection.kernels.layout import OPEN_END
 from inspection.methods import Method, WeightName
 from inspection.nominal import NominalProfile
-from inspection.registration import Registration
+from inspection.registration import Registration, no_outliers
 from inspection.rigid import RigidTransform, best_motion
 
 Array = NDArray[np.float64]
@@ -42,7 +43,7 @@ _SAME_POSE = 0.01  # of the size of the part; two poses that are closer than thi
 
 
 def register(
-    points_mm: ArrayLike,
+    points_mm: ArrayLike | Cloud,
     nominal: NominalProfile,
     method: Method = "exact",
     scheme: Scheme = "gauss-newton",
@@ -58,7 +59,7 @@ def register(
     that fit equally well are reported as `rivals`. `robust` finds gross outliers first and leaves them out; `target_mm` and `weights`
     say what the fit aims at and how points count in it: see register_fine. Raises RegistrationError for too few points.
     """
-    points = check_registrable(points_mm)
+    points = check_cloud(points_mm)
     ranked = ranked_poses(points, nominal, tip_radius_mm + target_mm)
     close = [pose for rms, pose in ranked if rms <= _CLOSE_RMS * ranked[0][0]]
     settings = (method, scheme, tip_radius_mm, robust, gross_mm, target_mm, weights)
@@ -68,22 +69,22 @@ def register(
     return replace(best, rivals=tuple(pose for rms, pose in others if rms <= _EQUAL_RMS * best.rms_mm))
 
 
-def ranked_poses(points_mm: ArrayLike, nominal: NominalProfile, tip_radius_mm: float = 0.0) -> list[tuple[float, RigidTransform]]:
+def ranked_poses(points_mm: ArrayLike | Cloud, nominal: NominalProfile, tip_radius_mm: float = 0.0) -> list[tuple[float, RigidTransform]]:
     """Distinct poses refined on a few of the points, best first, each with the rms of the nearer 80 % of them.
 
     The ratio of the first two says how clearly the points determine the pose.
     """
-    points = check_registrable(points_mm)
+    points = check_cloud(points_mm)
     contour = contour_of(points, nominal)
     few = contour.points_mm[:: max(1, len(contour.points_mm) // _SCOUTS)]
     poses = _promising_poses(few, contour, nominal)
     return _drop_equal_poses([_scout_pose(few, nominal, pose, tip_radius_mm) for pose in poses], points)
 
 
-def _drop_equal_poses(scored: list[tuple[float, RigidTransform]], points: Array) -> list[tuple[float, RigidTransform]]:
-    """The poses, best first, without those that bring the points (m, 2) to the same place as a better one."""
-    corners = np.array([points.min(axis=0), points.max(axis=0)])
-    apart = _SAME_POSE * np.hypot(*np.ptp(points, axis=0))
+def _drop_equal_poses(scored: list[tuple[float, RigidTransform]], points: Cloud) -> list[tuple[float, RigidTransform]]:
+    """The poses, best first, without those that bring the points to the same place as a better one."""
+    corners = points.corners()
+    apart = _SAME_POSE * np.hypot(*(corners[1] - corners[0]))
     distinct: list[tuple[float, RigidTransform]] = []
     for rms, pose in sorted(scored, key=lambda one: one[0]):
         if all(np.abs(pose.apply(corners) - other.apply(corners)).max() > apart for _, other in distinct):
@@ -101,13 +102,15 @@ def _promising_poses(few: Array, contour: Contour, nominal: NominalProfile) -> l
 
 def _scout_pose(few: Array, nominal: NominalProfile, pose: RigidTransform, tip_radius_mm: float) -> tuple[float, RigidTransform]:
     """A pose refined on few points (m, 2), and the rms of the nearer 80 % of them."""
-    refined = _pose_of(_pose_fit(few, nominal, "exact", tip_radius_mm).settle(_pose_numbers(pose), _SCOUT_STEPS))
+    refined = _pose_of(
+        _pose_fit(Cloud(np.ascontiguousarray(few)), nominal, "exact", tip_radius_mm).settle(_pose_numbers(pose), _SCOUT_STEPS)
+    )
     off = np.sort(np.abs(nominal.outward * project(refined.apply(few), nominal.grid).distance_mm - tip_radius_mm))
     return float(np.sqrt((off[: max(1, int(0.8 * len(off)))] ** 2).mean())), refined
 
 
 def register_fine(
-    points_mm: ArrayLike,
+    points_mm: ArrayLike | Cloud,
     nominal: NominalProfile,
     start: Registration | RigidTransform,
     method: Method = "exact",
@@ -129,30 +132,35 @@ def register_fine(
     weights : "points" counts every point alike; "arc-length" counts it by how much of the profile it stands for, so that neither
               dwelling nor a dense side moves the pose (Gauss-Newton only)
     """
-    points = check_registrable(points_mm)
+    points = check_cloud(points_mm)
     pose = start.nominal_from_section if isinstance(start, Registration) else start
     if scheme == "icp":
-        return _icp(points, nominal, pose, method, tip_radius_mm + target_mm)
+        return _icp(points.few(len(points)), nominal, pose, method, tip_radius_mm + target_mm)
     if scheme != "gauss-newton":
         raise ValueError(f"scheme must be gauss-newton or icp, not {scheme!r}")
-    fit, outliers = _pose_fit(points, nominal, method, tip_radius_mm + target_mm), np.zeros(len(points), dtype=bool)
+    aimed_mm, outliers = tip_radius_mm + target_mm, no_outliers(len(points))
     if robust:
-        outliers = fit.find_outliers(_pose_numbers(pose), OutlierLimit(_OUTLIER_MADS, float(gross_mm), _SETTLED_WEIGHTS_MM), _ROBUST_STEPS)
-        fit = _pose_fit(points[~outliers], nominal, method, tip_radius_mm + target_mm)
+        limit = OutlierLimit(_OUTLIER_MADS, float(gross_mm), _SETTLED_WEIGHTS_MM)
+        outliers = _pose_fit(points, nominal, method, aimed_mm, MANY).find_outliers(_pose_numbers(pose), limit, _ROBUST_STEPS)
+        points = points.without(outliers)
+    fit = _pose_fit(points, nominal, method, aimed_mm)
     found = fit.settle(_pose_numbers(pose), _MOST_STEPS)
     if weights == "arc-length":
         for _ in range(_WEIGHINGS):
-            _weigh_by_arc_length(fit, points[~outliers], found, nominal)
+            _weigh_by_arc_length(fit, points, found, nominal)
             again = fit.settle(found.pose, _MOST_STEPS)
             found = again._replace(steps=found.steps + again.steps)
     return _registration(found, found.steps, found.settled, outliers)
 
 
-def _weigh_by_arc_length(fit: PoseFit, points: Array, found: PoseEstimate, nominal: NominalProfile) -> None:
+def _weigh_by_arc_length(fit: PoseFit, points: Cloud, found: PoseEstimate, nominal: NominalProfile) -> None:
     """Let every point count by how much of the profile it stands for at the pose found so far."""
-    feet = project(_pose_of(found).apply(points), nominal.grid)
-    counts = fit.weights > 0
-    fit.weights[:] = np.where(counts, station_weights(feet.station_mm, counts & (feet.vertex != OPEN_END), nominal), 0.0)
+    station, at = points.room((len(points),), np.float64), 0
+    for block in points.blocks():
+        feet, rows = project(_pose_of(found).apply(block), nominal.grid), slice(at, at + len(block))
+        station[rows] = np.where((fit.weights[rows] > 0) & (feet.vertex != OPEN_END), feet.station_mm, np.nan)
+        at = rows.stop
+    weigh_by_station(station, fit.weights, nominal, points.room)
 
 
 def _icp(points: Array, nominal: NominalProfile, pose: RigidTransform, method: Method, tip_radius_mm: float) -> Registration:
@@ -170,12 +178,13 @@ def _icp(points: Array, nominal: NominalProfile, pose: RigidTransform, method: M
         previous = now
         touched = moved - (nominal.outward * deviation)[:, None] * feet.gradient
         pose = best_motion(moved[used], touched[used]).after(pose)
-    here = _pose_fit(points, nominal, method, tip_radius_mm).settle(_pose_numbers(pose), 0)
-    return _registration(here, iteration, converged, np.zeros(len(points), dtype=bool))
+    here = _pose_fit(Cloud(np.ascontiguousarray(points)), nominal, method, tip_radius_mm).settle(_pose_numbers(pose), 0)
+    return _registration(here, iteration, converged, no_outliers(len(points)))
 
 
-def _pose_fit(points: Array, nominal: NominalProfile, method: Method, tip_radius_mm: float) -> PoseFit:
-    return PoseFit(points, nominal.grid, nominal.sample_table, method, nominal.outward, tip_radius_mm)
+def _pose_fit(points: Cloud, nominal: NominalProfile, method: Method, tip_radius_mm: float, at_once: int = AT_ONCE) -> PoseFit:
+    curve = (nominal.grid, nominal.sample_table, method, nominal.outward, tip_radius_mm)
+    return PoseFit(points.points_mm, *curve, points.left_out, points.room, at_once)
 
 
 def _pose_numbers(pose: RigidTransform) -> tuple[float, float, float]:

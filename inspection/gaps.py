@@ -4,14 +4,19 @@ What lies between two neighbouring points was not seen. It counts as measured wh
 only the places of the points decide, never their density: a further point never lowers the coverage, a lost one never raises it.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from inspection.cloud import row_blocks
+from inspection.kernels import Room
 from inspection.nominal import NominalProfile
+from inspection.station_order import extremes_of, in_station_order
 
 Array = NDArray[np.float64]
+Rows = NDArray[np.int64]
 
 _UNDULATIONS = 50  # on the whole profile: the shortest form that a part is taken to have, as roundness filters have it
 _GAPS_A_WAVE = 2  # a gap of half a wave still has a point on every crest and in every hollow
@@ -36,11 +41,12 @@ def default_gap_max_mm(nominal: NominalProfile) -> float:
     return nominal.length_mm / (_UNDULATIONS * _GAPS_A_WAVE)
 
 
-def gap_lengths(sorted_mm: Array, nominal: NominalProfile) -> Array:
-    """Distances between neighbouring stations (j,) in rising order: over the seam as the last, or from both ends as first and last."""
-    if nominal.curve.closed:
-        return np.diff(np.append(sorted_mm, sorted_mm[0] + nominal.length_mm))
-    return np.diff(np.concatenate([[0.0], sorted_mm, [nominal.length_mm]]))
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """How much of a profile points measured: the share of its length between neighbours that are near, and the longest gap."""
+
+    coverage: float
+    gap: Gap
 
 
 def coverage(station_mm: Array, nominal: NominalProfile, gap_max_mm: float | None = None) -> float:
@@ -48,26 +54,51 @@ def coverage(station_mm: Array, nominal: NominalProfile, gap_max_mm: float | Non
 
     gap_max_mm : None takes `default_gap_max_mm`
     """
-    if not len(station_mm):
-        return 0.0
-    limit = default_gap_max_mm(nominal) if gap_max_mm is None else gap_max_mm
-    gaps = gap_lengths(np.sort(station_mm), nominal)
-    return float(gaps[gaps <= limit].sum() / nominal.length_mm)
+    return measure(station_mm, nominal, gap_max_mm).coverage
 
 
 def largest_gap(station_mm: Array, nominal: NominalProfile) -> Gap:
     """The longest stretch without a judged point among stations (j,)."""
+    return measure(station_mm, nominal).gap
+
+
+def measure(station_mm: Array, nominal: NominalProfile, gap_max_mm: float | None = None, room: Room = np.empty) -> Measured:
+    """Coverage and longest gap of judged points at stations (m,); those that are NaN count for nothing.
+
+    gap_max_mm : None takes `default_gap_max_mm`
+    """
+    length = nominal.length_mm
+    limit = default_gap_max_mm(nominal) if gap_max_mm is None else gap_max_mm
+    near = room((len(station_mm) + 1,), np.float64)  # the gaps that count, one after the other: their sum depends on its order
+    count, longest, start, stop = 0, -1.0, 0.0, length
+    for stations, gaps in _gaps_in_order(station_mm, nominal, room):
+        counted = gaps[gaps <= limit]
+        near[count : count + len(counted)] = counted
+        count += len(counted)
+        at = int(gaps.argmax())
+        if gaps[at] > longest:
+            longest, start, stop = float(gaps[at]), float(stations[at]), float(stations[at + 1])
+    if longest < 0:
+        return Measured(0.0, Gap(0.0, length, length, nominal.size_mm))
+    gap = Gap(start, stop, longest, _off_the_line_mm(start, longest, nominal))
+    return Measured(float(near[:count].sum() / length), gap)
+
+
+def _gaps_in_order(station_mm: Array, nominal: NominalProfile, room: Room) -> Iterator[tuple[Array, Array]]:
+    """Distances (k,) between neighbouring stations in rising order, piece by piece, beside the stations (k + 1,) that they lie between.
+
+    The gap over the seam is the last; those to both ends of an open profile are the first and the last.
+    """
     length, closed = nominal.length_mm, nominal.curve.closed
-    if not len(station_mm):
-        return Gap(0.0, length, length, nominal.size_mm)
-    stations = np.sort(station_mm)
-    gaps = gap_lengths(stations, nominal)
-    longest = int(gaps.argmax())
-    if closed:
-        first, last = stations[longest], stations[(longest + 1) % len(stations)]
-    else:
-        first, last = np.concatenate([[0.0], stations, [length]])[longest : longest + 2]
-    return Gap(float(first), float(last), float(gaps[longest]), _off_the_line_mm(float(first), float(gaps[longest]), nominal))
+    low, high = extremes_of(station_mm)
+    last = np.empty(0) if closed else np.zeros(1)
+    for rows in in_station_order(station_mm, room):
+        stations = np.concatenate([last, station_mm[rows]])
+        last = stations[-1:]
+        if len(stations) > 1:
+            yield stations, np.diff(stations)
+    if low <= high:
+        yield np.array([high, low if closed else length]), np.array([(low + length if closed else length) - high])
 
 
 def _off_the_line_mm(first_mm: float, length_mm: float, nominal: NominalProfile) -> float:
@@ -84,24 +115,44 @@ def _off_the_line_mm(first_mm: float, length_mm: float, nominal: NominalProfile)
     return float(np.abs(chord[0] * arms[:, 1] - chord[1] * arms[:, 0]).max() / span)
 
 
-def station_weights(station_mm: Array, takes_part: NDArray[np.bool_], nominal: NominalProfile) -> Array:
-    """How much of the profile each point (m,) stands for, divided by the mean: half the distance to both neighbours in station order.
+def weigh_by_station(station_mm: Array, weights: Array, nominal: NominalProfile, room: Room = np.empty) -> None:
+    """Set how much of the profile each point (m,) stands for, divided by the mean: half the distance to both neighbours in station order.
 
     A side counts with half the default gap at most, so that the points beside a hole do not stand for what was not measured. Points
     in one place share what that place stands for, so that neither dwelling nor a dense side draws the fit to itself. Points that
-    take no part have weight 1.
+    take no part have no station, but NaN: they get weight 1 where their weight is not 0.
     """
-    weights = np.ones(len(station_mm))
-    rows = np.flatnonzero(takes_part)
-    if len(rows) < 2:
-        return weights
-    rows = rows[np.argsort(station_mm[rows], kind="stable")]
-    stations, cap = station_mm[rows], default_gap_max_mm(nominal) / 2
-    gaps = gap_lengths(stations, nominal)
-    before, after = (np.roll(gaps, 1), gaps) if nominal.curve.closed else (gaps[:-1], gaps[1:])
-    sides = np.minimum(before / 2, cap) + np.minimum(after / 2, cap)
-    if not nominal.curve.closed:  # an end belongs to its point alone
-        sides[0] += min(before[0], cap) - min(before[0] / 2, cap)
-        sides[-1] += min(after[-1], cap) - min(after[-1] / 2, cap)
-    weights[rows] = sides / sides.mean()
-    return weights
+    np.copyto(weights, 1.0, where=weights > 0)
+    sides, count = room((len(station_mm),), np.float64), 0  # one after the other, for their sum depends on its order
+    for rows, share in _sides_in_order(station_mm, nominal, room):
+        sides[count : count + len(rows)] = weights[rows] = share
+        count += len(rows)
+    if count < 2:
+        weights[np.isfinite(station_mm)] = 1.0
+        return
+    mean = sides[:count].mean()
+    for part in row_blocks(len(weights)):
+        weights[part] = np.where(np.isnan(station_mm[part]), weights[part], weights[part] / mean)
+
+
+def _sides_in_order(station_mm: Array, nominal: NominalProfile, room: Room) -> Iterator[tuple[Rows, Array]]:
+    """Rows (k,) in the order of their stations, piece by piece, with half the distances to both neighbours (k,) together."""
+    closed, cap = nominal.curve.closed, default_gap_max_mm(nominal) / 2
+    low, high = extremes_of(station_mm)
+    seam = (low + nominal.length_mm) - high
+    before = seam if closed else low
+    end = 0.0 if closed else min(before, cap) - min(before / 2, cap)  # an end belongs to its point alone
+    held = np.empty(0, dtype=np.int64)
+    for found in in_station_order(station_mm, room):
+        rows = np.concatenate([held, found])
+        gaps, held = np.diff(station_mm[rows]), rows[-1:]
+        if len(gaps):
+            sides = np.minimum(np.append(before, gaps[:-1]) / 2, cap) + np.minimum(gaps / 2, cap)
+            sides[0] += end
+            before, end = float(gaps[-1]), 0.0
+            yield rows[:-1], sides
+    if len(held):
+        after = seam if closed else nominal.length_mm - high
+        sides = np.array([min(before / 2, cap) + min(after / 2, cap)])
+        sides += end + (0.0 if closed else min(after, cap) - min(after / 2, cap))
+        yield held, sides

@@ -5,6 +5,9 @@ other, verdicts are given provisionally; every further point refines the pose at
 equations), and the whole is fitted anew when the number of points has doubled. `finish` registers all points together and
 judges every one at that settled pose.
 
+A long scan takes constant memory for this: from a number of points on the whole is fitted by a choice of them, and points that were
+judged are not judged again before the end.
+
 State moves only at fixed point numbers, never at the edges of batches: the same points in any batches give the same result.
 """
 
@@ -14,15 +17,17 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inspection.cloud import MANY, Cloud
 from inspection.conclusion import Missing
+from inspection.kernels import Room
 from inspection.methods import Method, WeightName
 from inspection.nominal import NominalProfile
 from inspection.pose_track import PoseTrack, seek_pose
 from inspection.prefix import Prefix, PrefixSearch, prefix_of
 from inspection.registration import Registration
-from inspection.result import NOT_JUDGED, InspectionResult, rejections_by_reason
+from inspection.result import InspectionResult
 from inspection.rigid import RigidTransform
-from inspection.scan_rows import ScanRows
+from inspection.scan_rows import BLOCK, ScanRows
 from inspection.section import SectionPlane
 from inspection.settled import settle
 from inspection.terms import FitName, RuleName, Terms
@@ -31,7 +36,6 @@ from inspection.tolerance import ToleranceZone
 Array = NDArray[np.float64]
 State = Literal["seeking", "provisional", "settled"]
 
-_BLOCK = 64  # points between two moves of the state
 _SEEK_GROWTH = 1.3  # the pose is sought again once the prefix has grown by this factor
 _REFIT_GROWTH = 2.0  # and fitted anew once it has grown by this one
 
@@ -75,6 +79,7 @@ class LiveInspection:
     gap_max_mm, end_allowance_mm, allow_unseen_mm : what may be unmeasured, lie beyond an open end, or be missing before conformity is
                       not proven any more (see `Terms`)
     provisional     : False seeks no pose before `finish`, for points that are all there from the start; the result is the same
+    room            : gives the arrays that grow with the scan, like numpy.empty: about 60 bytes a point until `finish` returns
     """
 
     def __init__(
@@ -96,6 +101,7 @@ class LiveInspection:
         end_allowance_mm: float | None = None,
         allow_unseen_mm: float | None = None,
         provisional: bool = True,
+        room: Room = np.empty,
     ) -> None:
         self._terms = Terms(
             nominal=nominal,
@@ -116,8 +122,9 @@ class LiveInspection:
         self._known_pose = self._terms.known_pose
         self._plane = section or SectionPlane(np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
         self._provisional = provisional
-        self._rows = ScanRows()
-        self._next_fit = _BLOCK  # received points at which the pose is sought, or fitted anew
+        self._kept = ScanRows(room=room)
+        self._handed_over = False  # the rows belong to a result by now
+        self._next_fit = BLOCK  # received points at which the pose is sought, or fitted anew
         self._track: PoseTrack | None = None
 
     @property
@@ -130,17 +137,17 @@ class LiveInspection:
     @property
     def received(self) -> int:
         """Points taken in so far."""
-        return self._rows.count
+        return self._kept.count
 
     @property
     def judged(self) -> int:
         """Points that have a verdict at this moment."""
-        return int(np.count_nonzero(self._rows.verdicts[: self._rows.count] != NOT_JUDGED))
+        return self._kept.judged
 
     @property
     def rejected_by_reason(self) -> dict[str, int]:
         """Points rejected so far, by reason."""
-        return rejections_by_reason(self._rows.rejection[: self._rows.count])
+        return self._kept.rejected_by_reason
 
     def add(self, points_mm: ArrayLike) -> LiveUpdate:
         """Take in section points (m, 2) or machine points (m, 3), in scan order."""
@@ -154,7 +161,7 @@ class LiveInspection:
             self._judge(first, rows.count)
             return self._update(first)
         changed_from = first
-        for stop in range(first - first % _BLOCK + _BLOCK, first + len(points) + _BLOCK, _BLOCK):
+        for stop in range(first - first % BLOCK + BLOCK, first + len(points) + BLOCK, BLOCK):
             begin, rows.count = rows.count, min(stop, first + len(points))
             self._judge(begin, rows.count)
             if rows.count == stop and self._advance():
@@ -187,36 +194,64 @@ class LiveInspection:
 
         Raises RegistrationError when the points cannot be brought onto the nominal.
         """
-        return settle(self._rows, self._terms, complete, missing or Missing())
+        rows, self._handed_over = self._rows, True
+        return settle(rows, self._terms, complete, missing or Missing())
+
+    @property
+    def _rows(self) -> ScanRows:
+        """The rows to work on: those that a result holds stay as they are, and a scan that goes on after it does so with a copy."""
+        if self._handed_over:
+            self._kept, self._handed_over = self._kept.copy(), False
+            self._judge_anew()
+        return self._kept
 
     def _judge(self, first: int, stop: int) -> None:
         """Deviations and verdicts of rows first .. stop - 1 at the pose of this moment, if there is one."""
         pose = self._track.pose if self._track is not None else self._known_pose
         if pose is not None:
-            self._rows.judge(first, stop, pose, self._terms, self._track.reserve_mm() if self._track is not None else 0.0)
+            self._rows.judge(first, stop, pose, self._terms, self._reserve_mm)
+
+    def _judge_anew(self) -> None:
+        """The same of all rows so far; places are kept of the newest alone, so that no memory is taken."""
+        rows, pose = self._rows, self._track.pose if self._track is not None else self._known_pose
+        if pose is not None:
+            rows.settle(pose, self._terms, self._reserve_mm, rows.base)
+            rows.judge(rows.base, rows.count, pose, self._terms, self._reserve_mm)
+
+    @property
+    def _reserve_mm(self) -> float:
+        return self._track.reserve_mm() if self._track is not None else 0.0
 
     def _advance(self) -> bool:
         """Move the state at a block's end; True when every verdict given so far is replaced."""
         rows, count = self._rows, self._rows.count
         if count < self._next_fit:
             if self._track is not None:
-                self._track.refine(rows, count - _BLOCK, count)
+                self._track.refine(rows, count - BLOCK, count)
             return False
-        points = rows.points[rows.usable_rows()]
-        self._track = seek_pose(points, self._terms) if self._track is None else self._track.refit(points)
+        points, sought = rows.usable(), self._track is None
+        few = Cloud(points.few(), room=rows.room) if len(points) > MANY else points
+        self._track = seek_pose(few, self._terms) if self._track is None else self._track.refit(few)
         self._next_fit = int(count * (_SEEK_GROWTH if self._track is None else _REFIT_GROWTH))
-        if self._track is not None:
+        if self._track is None:
+            return False
+        if count <= MANY:
             self._judge(0, count)
-        return self._track is not None
+            return True
+        self._track.count_as(len(points))
+        if sought:
+            self._judge_anew()
+        return False
 
     def _update(self, first: int) -> LiveUpdate:
         rows, stop = self._rows, self._rows.count
+        places = slice(first - rows.base, stop - rows.base)
         return LiveUpdate(
             self.state,
             first,
             stop,
-            rows.actual[first:stop].copy(),
-            rows.foot[first:stop].copy(),
+            rows.actual[places].copy(),
+            rows.foot[places].copy(),
             rows.station[first:stop].copy(),
             rows.deviation[first:stop].copy(),
             rows.verdicts[first:stop].copy(),
@@ -231,7 +266,7 @@ def rehearse(nominal: NominalProfile, method: Method = "exact", reject_outliers:
     Takes seconds on the first use after an installation, milliseconds from the cache afterwards.
     """
     live = LiveInspection(nominal, ToleranceZone(-1.0, 1.0), method=method, reject_outliers=reject_outliers)
-    points = nominal.points_mm[:: max(1, len(nominal) // (4 * _BLOCK))]
+    points = nominal.points_mm[:: max(1, len(nominal) // (4 * BLOCK))]
     live.add(np.column_stack([points, np.zeros(len(points))]))
     live.add(points)
     live.snapshot()

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from inspection.cloud import Cloud
 from inspection.deviations import deviations
 from inspection.errors import RegistrationError
 from inspection.fine import MISFIT, ranked_poses, register_fine
@@ -28,7 +29,7 @@ _PLACES = 16  # every so many samples of the nominal are asked how far a deviati
 class PoseTrack:
     """Normal equations that grow about a pose fitted before, so that every block refines the pose at constant cost."""
 
-    def __init__(self, registration: Registration, points_mm: Array, terms: Terms) -> None:
+    def __init__(self, registration: Registration, points: Cloud, terms: Terms) -> None:
         nominal = terms.nominal
         self.registration = registration
         self._terms, self._start, self._centre = terms, self.pose, registration.centre_mm
@@ -37,9 +38,10 @@ class PoseTrack:
         self._stations = nominal.station_mm[::_PLACES]
         reach = float(np.hypot(*(self._places - self._centre).T).max())
         self._sums = GrowingSums(self._centre, reach, nominal.length_mm)
-        d = deviations(self.pose.apply(points_mm), nominal, tip_radius_mm=terms.tip_radius_mm)
-        part = np.where(d.beyond_end, np.int8(NOT_JUDGED), np.int8(0))
-        self._sums.add(d.foot_mm, d.normal, d.deviation_mm - terms.target_mm, d.station_mm, part)
+        for block in points.blocks():
+            d = deviations(self.pose.apply(block), nominal, tip_radius_mm=terms.tip_radius_mm)
+            part = np.where(d.beyond_end, np.int8(NOT_JUDGED), np.int8(0))
+            self._sums.add(d.foot_mm, d.normal, d.deviation_mm - terms.target_mm, d.station_mm, part, follows=True)
         self._ends, self._tangents = _open_ends(nominal)
         self._reserve_mm: float | None = None  # asked for more often than it changes, which is once a block
 
@@ -50,18 +52,22 @@ class PoseTrack:
 
     def refine(self, rows: ScanRows, first: int, stop: int) -> None:
         """Take in a block of rows judged at this track's pose."""
-        block = slice(first, stop)
+        block, places = slice(first, stop), slice(first - rows.base, stop - rows.base)
         off = rows.deviation[block] - self._terms.target_mm
-        self._sums.add(rows.foot[block], rows.normal[block], off, rows.station[block], rows.verdicts[block])
+        self._sums.add(rows.foot[places], rows.normal[places], off, rows.station[block], rows.verdicts[block])
         self._sums.move()
         x, y, angle = self._sums.motion.tolist()
         pose = rotation_about(self._centre, angle, np.array([x, y])).after(self._start)
         self.registration = replace(self.registration, nominal_from_section=pose)
         self._reserve_mm = None
 
-    def refit(self, points_mm: Array) -> "PoseTrack":
-        """A track about the pose that fits all points (m, 2) so far, started at this one's."""
-        return _fit_track(points_mm, self.pose, self._terms)
+    def refit(self, points: Cloud) -> "PoseTrack":
+        """A track about the pose that fits all points so far, started at this one's."""
+        return _fit_track(points, self.pose, self._terms)
+
+    def count_as(self, points: int) -> None:
+        """Let the points that this track was fitted to stand for so many."""
+        self._sums.count_as(points)
 
     def reserve_mm(self) -> float:
         """How far the last pose is expected to move a deviation that was measured: what provisional verdicts leave room for.
@@ -99,10 +105,10 @@ class PoseTrack:
         return sums.noise + form * sums.count / patches
 
 
-def seek_pose(points_mm: Array, terms: Terms) -> PoseTrack | None:
-    """A track from the one pose that fits the points (m, 2) clearly better than any other, None where there is no such pose."""
+def seek_pose(points: Cloud, terms: Terms) -> PoseTrack | None:
+    """A track from the one pose that fits the points clearly better than any other, None where there is no such pose."""
     try:
-        poses = ranked_poses(points_mm, terms.nominal, terms.tip_radius_mm + terms.target_mm)
+        poses = ranked_poses(points, terms.nominal, terms.tip_radius_mm + terms.target_mm)
     except RegistrationError:
         return None
     largest_rms = MISFIT * terms.nominal.size_mm
@@ -110,13 +116,13 @@ def seek_pose(points_mm: Array, terms: Terms) -> PoseTrack | None:
     clear = len(poses) == 1 or scores[0] < _CLEARLY_BETTER * scores[1]
     if not clear or scores[0] > largest_rms:
         return None
-    track = _fit_track(points_mm, poses[0][1], terms)
+    track = _fit_track(points, poses[0][1], terms)
     return track if track.is_clear(largest_rms) else None
 
 
-def _fit_track(points_mm: Array, start: RigidTransform, terms: Terms) -> PoseTrack:
-    registration = register_fine(points_mm, terms.nominal, start, tip_radius_mm=terms.tip_radius_mm, target_mm=terms.target_mm)
-    return PoseTrack(registration, points_mm, terms)
+def _fit_track(points: Cloud, start: RigidTransform, terms: Terms) -> PoseTrack:
+    registration = register_fine(points, terms.nominal, start, tip_radius_mm=terms.tip_radius_mm, target_mm=terms.target_mm)
+    return PoseTrack(registration, points, terms)
 
 
 def _open_ends(nominal: NominalProfile) -> tuple[Array, Array]:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inspection.cloud import MANY
 from inspection.errors import RegistrationError
 from inspection.placements import PlacementSearch
 from inspection.result import NOT_JUDGED
@@ -76,7 +77,11 @@ def prefix_of(rows: ScanRows, pose: RigidTransform, slide_mm: float, terms: Term
 
     slide_mm : how far the pose may still slide along the profile at its open ends (95 %)
     """
-    judged = np.flatnonzero(rows.verdicts[: rows.count] != NOT_JUDGED)
+    count = rows.count
+    if count > MANY:
+        judged = telling_rows(rows.station[:count], rows.deviation[:count], terms.nominal.length_mm, MANY // 64)
+    else:
+        judged = np.flatnonzero(rows.verdicts[:count] != NOT_JUDGED)
     if not terms.nominal.curve.closed:
         reserve = _SURELY * slide_mm + terms.zone.upper_mm - terms.zone.lower_mm
         station = rows.station[judged]
@@ -84,7 +89,7 @@ def prefix_of(rows: ScanRows, pose: RigidTransform, slide_mm: float, terms: Term
     deviation = rows.deviation[judged]
     if np.abs(deviation - terms.target_mm).max(initial=0.0) <= _half_mm(terms):
         return None
-    return Prefix(rows.count, rows.points[judged], rows.station[judged], deviation, pose)
+    return Prefix(count, rows.points[judged], rows.station[judged], deviation, pose)
 
 
 def _half_mm(terms: Terms) -> float:

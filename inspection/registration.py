@@ -44,4 +44,9 @@ class Registration:
 
 def datum_registration(nominal_from_section: RigidTransform, points: int) -> Registration:
     """The registration of that many points whose pose is known beforehand."""
-    return Registration(nominal_from_section, float("nan"), 0, True, np.zeros((3, 3)), np.zeros(2), (), np.zeros(points, dtype=bool))
+    return Registration(nominal_from_section, float("nan"), 0, True, np.zeros((3, 3)), np.zeros(2), (), no_outliers(points))
+
+
+def no_outliers(points: int) -> NDArray[np.bool_]:
+    """Marks (points,) that say of none that it is an outlier; they take no memory."""
+    return np.broadcast_to(np.False_, (points,))

@@ -1,4 +1,8 @@
-"""The points of a scan as growing arrays, a row for every received point, with what each was found to be."""
+"""The points of a scan as growing columns, a row for every received point, with what each was found to be.
+
+Kept of a row are 42 bytes. Where its surface point and its foot lie follows from the pose: they are kept of the newest rows only,
+and worked out again for whoever asks.
+"""
 
 import math
 from functools import partial
@@ -6,85 +10,189 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from inspection.cloud import Cloud, row_blocks
 from inspection.deviations import feet_on
-from inspection.kernels import judge_rows, take_in
-from inspection.result import NOT_JUDGED, Rejection
+from inspection.kernels import JUDGED_AS, TALLY, Places, Room, judge_rows, take_in
+from inspection.result import NOT_JUDGED, JudgedRows, Rejection
 from inspection.rigid import RigidTransform
 from inspection.section import XY_PLANE, SectionPlane
 from inspection.terms import Terms
+from inspection.tolerance import Verdict
 
 Array = NDArray[np.float64]
+Rows = NDArray[np.int64]
 
+BLOCK = 64  # points between two moves of the state of a live inspection; the places of the block that is being filled are kept
+_GROWTH = 1.5  # of the columns, where they are full
 _USABLE = (Rejection.NONE, Rejection.BEYOND_END, Rejection.IN_HOLLOW)  # the last two depend on the pose that is still being sought
 
 
 class ScanRows:
-    """Rows of a scan; the arrays have room for more rows than `count`.
+    """Rows of a scan; the columns have room for more rows than `count`.
 
-    points       : (n, 2) in section coordinates
-    height       : (n,) above the plane of the section
-    actual, foot, normal : (n, 2) surface point, nominal point and direction of the deviation; NaN where there is no verdict
-    station, deviation   : (n,) likewise
-    verdicts     : (n,) codes of `Verdict`, NOT_JUDGED where there is none
-    rejection    : (n,) codes of `Rejection`
-    plane        : the plane of the section
+    points    : (n, 2) in section coordinates
+    height    : (n,) above the plane of the section
+    station, deviation : (n,) NaN where there is no verdict
+    verdicts  : (n,) codes of `Verdict`, NOT_JUDGED where there is none
+    rejection : (n,) codes of `Rejection`
+    actual, foot, normal : (w, 2) surface point, nominal point and direction of the deviation of the rows from `base` on; NaN where there
+                is no verdict
+    plane     : the plane of the section
+    settled_at : the pose at which all rows were settled last, None where rows were taken in or judged otherwise since
+    room      : gives the columns, like numpy.empty
     """
 
-    def __init__(self, capacity: int = 4096, plane: SectionPlane = XY_PLANE) -> None:
+    def __init__(self, capacity: int = 4096, plane: SectionPlane = XY_PLANE, room: Room = np.empty) -> None:
         self.count = 0
-        self.points, self.actual, self.foot, self.normal = (np.full((capacity, 2), np.nan) for _ in range(4))
-        self.height = np.zeros(capacity)
-        self.plane = plane
-        self.station, self.deviation = np.full(capacity, np.nan), np.full(capacity, np.nan)
-        self.verdicts = np.full(capacity, NOT_JUDGED, dtype=np.int8)
-        self.rejection = np.zeros(capacity, dtype=np.int8)
+        self.plane, self.room = plane, room
+        self.points, self.height = room((capacity, 2), np.float64), room((capacity,), np.float64)
+        self.station, self.deviation = room((capacity,), np.float64), room((capacity,), np.float64)
+        self.verdicts, self.rejection = room((capacity,), np.int8), room((capacity,), np.int8)
+        self.base = 0
+        self.actual, self.foot, self.normal = _places(0)
+        self._tally = np.zeros(TALLY, dtype=np.int64)
+        self.settled_at: RigidTransform | None = None
+        self._end = 0  # rows taken in, whether they count yet or not
 
     def take_in(self, points_mm: Array, plane: SectionPlane, off_section_max_mm: float) -> None:
         """Write points (m, 2) or (m, 3) behind the rows so far, as section points. They count once `count` is raised."""
-        self._reserve(self.count + len(points_mm))
+        first, self._end, self.settled_at = self.count, self.count + len(points_mm), None
+        self._reserve(self._end)
         self.plane = plane
-        take_in(points_mm, plane.packed, off_section_max_mm, self.points, self.rejection, self.count)
-        self.height[self.count : self.count + len(points_mm)] = plane.heights(points_mm)
+        self._keep_places(first - first % BLOCK, first)
+        take_in(points_mm, plane.packed, off_section_max_mm, self.points, self._columns, self._places, self.base, first)
+        self.height[first : self._end] = plane.heights(points_mm)
 
     def judge(self, first: int, stop: int, pose: RigidTransform, terms: Terms, reserve_mm: float = 0.0) -> None:
-        """Fill in rows first .. stop - 1 as they are with the points at this pose.
+        """Fill in rows first .. stop - 1 as they are with the points at this pose, and keep their places.
 
         reserve_mm : how far a deviation may still move; a verdict on a point is given where that cannot change it
         """
-        place = (math.cos(pose.rotation_rad), math.sin(pose.rotation_rad), *pose.translation_mm.tolist())
-        outward, tip_mm, lower_mm, upper_mm, uncertainty_mm = terms.judgement
-        judgement = (outward, tip_mm, lower_mm, upper_mm, uncertainty_mm + reserve_mm)
-        arrays = (self.actual, self.foot, self.normal, self.station, self.deviation, self.verdicts, self.rejection)
-        judge_rows(self.points, arrays, first, stop, place, partial(feet_on, nominal=terms.nominal, method=terms.method), judgement)
+        self.settled_at = None
+        if first < self.base:
+            self._keep_places(first, first)
+        for rows in row_blocks(stop - first):
+            self._judge(first + rows.start, first + rows.stop, self._places, self.base, pose, terms, reserve_mm)
 
-    def usable_rows(self) -> NDArray[np.int64]:
+    def settle(self, pose: RigidTransform, terms: Terms, reserve_mm: float = 0.0, stop: int | None = None) -> None:
+        """Fill in all rows, or those before `stop`, as they are with the points at this pose. No places are kept."""
+        if not len(self.station):
+            self.station, self.deviation = (self.room((len(self.verdicts),), np.float64) for _ in range(2))
+        self.settled_at = pose if stop is None else None
+        for rows in row_blocks(self.count if stop is None else stop):
+            self._judge(rows.start, rows.stop, _places(rows.stop - rows.start), rows.start, pose, terms, reserve_mm)
+
+    def forget_verdicts(self) -> None:
+        """Give back what the rows were found to be, and the room for more rows; they can only be settled or copied from now on."""
+        self.station = self.deviation = np.empty(0)
+        self.base, (self.actual, self.foot, self.normal) = self.count, _places(0)
+        self._resize(self.count)
+        self.verdicts[:] = NOT_JUDGED
+        self._tally[JUDGED_AS:] = 0
+
+    def rows_at(self, which: slice | Rows, pose: RigidTransform, terms: Terms) -> JudgedRows:
+        """Rows that were settled at this pose, with their places."""
+        points, rejection = np.array(self.points[: self.count][which]), np.array(self.rejection[: self.count][which])
+        m = len(points)
+        some = ScanRows(0, self.plane)
+        some.points, some.rejection, some.count = points, rejection, m
+        some.station, some.deviation, some.verdicts = np.full(m, np.nan), np.full(m, np.nan), np.full(m, NOT_JUDGED, dtype=np.int8)
+        some.actual, some.foot, some.normal = _places(m)
+        some.judge(0, m, pose, terms)
+        return JudgedRows(some.actual, some.foot, some.station, some.deviation, some.verdicts, some.rejection)
+
+    def reject(self, outliers: Rows) -> None:
+        """Reject rows as outliers, until all rows are taken up again."""
+        for code, count in zip(*np.unique(self.rejection[outliers], return_counts=True), strict=True):
+            self._tally[code] -= count
+        self.rejection[outliers] = Rejection.OUTLIER
+        self._tally[Rejection.OUTLIER] += len(outliers)
+
+    @property
+    def judged(self) -> int:
+        """Rows that have a verdict."""
+        return int(self._tally[JUDGED_AS:].sum())
+
+    def count_of(self, verdict: Verdict) -> int:
+        """Rows that have this verdict."""
+        return int(self._tally[JUDGED_AS + verdict])
+
+    @property
+    def rejected_by_reason(self) -> dict[str, int]:
+        """Number of rejected rows for each reason that occurred."""
+        return {each.words: int(self._tally[each]) for each in Rejection if each != Rejection.NONE and self._tally[each]}
+
+    def usable(self) -> Cloud:
+        """The points that a registration may use, where they lie."""
+        if sum(int(self._tally[each]) for each in _USABLE) == self._end:  # the tally knows rows that do not count yet
+            return Cloud(self.points[: self.count], room=self.room)
+        left_out = self.room((self.count,), np.uint8)
+        for rows in row_blocks(self.count):
+            left_out[rows] = ~np.isin(self.rejection[rows], _USABLE)
+        return Cloud(self.points[: self.count], left_out, self.room)
+
+    def usable_rows(self) -> Rows:
         """Rows (k,) of points that a registration may use."""
         return np.flatnonzero(np.isin(self.rejection[: self.count], _USABLE))
 
     def copy(self) -> "ScanRows":
-        """The rows so far, in arrays of just their number."""
-        same = ScanRows(self.count, self.plane)
-        same._take_over(self, same)
+        """The rows so far in columns of their own, as they were when they were taken in: none is judged, and no outlier is rejected."""
+        same = ScanRows(max(self.count, 1), self.plane, self.room)
+        same.count = same._end = self.count
+        for rows in row_blocks(self.count):
+            same.points[rows], same.height[rows] = self.points[rows], self.height[rows]
+            same.station[rows] = same.deviation[rows] = np.nan
+            same.verdicts[rows] = NOT_JUDGED
+            kept = self.rejection[rows]
+            kept = np.where(np.isin(kept, (*_USABLE, Rejection.OUTLIER)), np.int8(Rejection.NONE), kept)
+            same.rejection[rows] = kept
+            same._tally[:JUDGED_AS] += np.bincount(kept, minlength=JUDGED_AS)
+        same.base = same.count - same.count % BLOCK
+        same.actual, same.foot, same.normal = _places(same.count - same.base)
         return same
 
-    def without(self, outliers: NDArray[np.int64]) -> "ScanRows":
-        """The rows so far, with these rejected as outliers; the very same where there are none."""
-        if not len(outliers):
-            return self
-        rest = self.copy()
-        rest.rejection[outliers] = Rejection.OUTLIER
-        return rest
+    @property
+    def _columns(self) -> tuple[Array, Array, NDArray[np.int8], NDArray[np.int8], NDArray[np.int64]]:
+        return self.station, self.deviation, self.verdicts, self.rejection, self._tally
+
+    @property
+    def _places(self) -> Places:
+        return self.actual, self.foot, self.normal
+
+    def _judge(self, first: int, stop: int, places: Places, base: int, pose: RigidTransform, terms: Terms, reserve_mm: float = 0.0) -> None:
+        place = (math.cos(pose.rotation_rad), math.sin(pose.rotation_rad), *pose.translation_mm.tolist())
+        outward, tip_mm, lower_mm, upper_mm, uncertainty_mm = terms.judgement
+        judgement = (outward, tip_mm, lower_mm, upper_mm, uncertainty_mm + reserve_mm)
+        project = partial(feet_on, nominal=terms.nominal, method=terms.method)
+        judge_rows(self.points, self._columns, places, base, first, stop, place, project, judgement)
+
+    def _keep_places(self, base: int, held: int) -> None:
+        """Hold the places of the rows from `base` on: of those up to `held` as they are known, of the others as not judged yet."""
+        known = [array[base - self.base : held - self.base] for array in self._places] if base >= self.base else []
+        if base == self.base and self._end - base <= len(self.actual):
+            return
+        self.actual, self.foot, self.normal = _places(max(self._end - base, BLOCK))
+        for array, before in zip(self._places, known, strict=False):
+            array[: len(before)] = before
+        self.base = base
 
     def _reserve(self, capacity: int) -> None:
-        """Make room for so many rows, at least doubling it."""
-        if capacity > len(self.verdicts):
-            self._take_over(self, ScanRows(max(capacity, 2 * len(self.verdicts)), self.plane))
+        """Make room for so many rows, in larger columns where there is none."""
+        if capacity <= len(self.verdicts):
+            return
+        self._resize(max(capacity, int(_GROWTH * len(self.verdicts))))
 
-    def _take_over(self, old: "ScanRows", larger: "ScanRows") -> None:
-        """Hold the arrays of `larger`, with the rows of `old` in them."""
-        count = old.count
-        for name, array in vars(larger).items():
-            if isinstance(array, np.ndarray):
-                array[:count] = getattr(old, name)[:count]
-                setattr(self, name, array)
-        self.count = count
+    def _resize(self, capacity: int) -> None:
+        """Hold the columns in arrays of so many rows, one after the other."""
+        for name in ("points", "height", "station", "deviation", "verdicts", "rejection"):
+            old = getattr(self, name)
+            if 0 < len(old) != capacity:
+                new = self.room((capacity, *old.shape[1:]), old.dtype.type)
+                for rows in row_blocks(self.count):
+                    new[rows] = old[rows]
+                setattr(self, name, new)
+
+
+def _places(count: int) -> tuple[Array, Array, Array]:
+    """Room for the places of so many rows that are not judged yet."""
+    return np.full((count, 2), np.nan), np.full((count, 2), np.nan), np.full((count, 2), np.nan)

@@ -1,20 +1,27 @@
-"""The end of a scan: all points registered together, every one judged at the settled pose, and the verdict on the part."""
+"""The end of a scan: all points registered together, every one judged at the settled pose, and the verdict on the part.
+
+Nothing of this copies the scan: it is gone through piece by piece, its rows are judged where they lie, and what a fit needs besides is
+given back before the rows are judged.
+"""
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from inspection.cloud import MANY, Cloud, few_of, row_blocks
 from inspection.conclusion import Findings, Missing, Reason, conclude, word_points
 from inspection.fine import register
-from inspection.gaps import coverage, largest_gap
+from inspection.gaps import measure
 from inspection.minimum_zone import fit_minimum_zone
 from inspection.placements import PlacementSearch
 from inspection.registration import Registration, datum_registration
-from inspection.result import NOT_JUDGED, InspectionResult, Rejection, rejections_by_reason, stretches
+from inspection.result import NOT_JUDGED, InspectionResult, Rejection, extent_of, stretches
 from inspection.rigid import RigidTransform
 from inspection.scan_rows import ScanRows
 from inspection.setup_check import check_fit, check_points, shift_reservation
+from inspection.telling_points import telling_rows
 from inspection.terms import Terms
 from inspection.tolerance import Verdict
 
@@ -22,109 +29,146 @@ Array = NDArray[np.float64]
 
 _PLACED = 0.95  # share of the length whose points place the part, where the plan asks for no coverage
 _MOST_BOXES = 200_000  # of placements, before the search for one that passes is given up
+_SHARES = 8192  # of the length, of which the lowest and the highest point tell, where a scan has more than MANY points
+_SAME_MM = 1e-9  # two zones that differ by less are the same
+_ROUNDS = 6  # in which points that are out at a placement found by the telling ones join these
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Settled:
-    """The rows judged at the pose that decides, and how that pose was found.
+    """A pose at which the rows were judged, how it was found, and what they are there.
 
     points, why       : the verdict on the judged points alone, NONCONFORM only where proven, and its reason
-    best_fit_error_mm : zone error at the best fit; minimum_zone_mm : width of the minimum zone; NaN where there was none
+    zone_error_mm     : 2 * max |deviation - middle of the zone| over the judged rows; NaN without any
+    best_fit_error_mm : the same at the best fit; minimum_zone_mm : width of the minimum zone; NaN where there was none
     """
 
-    rows: ScanRows
     registration: Registration
     fit: str
     points: Verdict
     why: Reason | None
+    zone_error_mm: float
     best_fit_error_mm: float = float("nan")
     minimum_zone_mm: float = float("nan")
 
 
 def settle(rows: ScanRows, terms: Terms, complete: bool, missing: Missing) -> InspectionResult:
-    """Register all points of a scan together, judge every one at that pose, and conclude; the rows stay as they are.
+    """Register all points of a scan together, judge every one at that pose, and conclude. The rows belong to the result afterwards.
 
     complete : the scan came to its end; conformity of one that was cut short is not proven
     missing  : points that are known to be missing before the inspection saw them
 
     Raises RegistrationError when the points cannot be brought onto the nominal, NotMeasured when the set-up contradicts them.
     """
-    rows = rows.without(check_points(rows, terms))
-    usable = rows.usable_rows()
+    rows.forget_verdicts()
+    usable = rows.usable()
+    far = check_points(rows, usable, terms)
+    points = usable.without(far)
     if terms.known_pose is not None:
-        registration = datum_registration(terms.known_pose, len(usable))
-        check_fit(rows.points[usable], registration, terms)
-        settled = _judge_at(rows, registration, usable, "none", terms)
+        registration = datum_registration(terms.known_pose, len(points))
+        check_fit(points, registration, terms)
     else:
-        settled = _decide(rows, _register_points(rows.points[usable], terms), usable, terms, complete)
-    return _result(settled, terms, complete, missing)
+        registration = _fit_best(points, terms)
+    _reject_outliers(rows, far, registration)
+    del usable, points  # and what they hold
+    settled = _judge_at(rows, registration, "none", terms) if terms.known_pose is not None else _decide(rows, registration, terms, complete)
+    _stay_at(rows, settled, terms)
+    return _result(rows, settled, terms, complete, missing)
 
 
-def _judge_at(rows: ScanRows, registration: Registration, usable: NDArray[np.int64], fit: str, terms: Terms) -> _Settled:
-    """Every row judged at a pose, and the verdict of its points."""
-    judged = rows.copy()
-    judged.rejection[usable[registration.outliers]] = Rejection.OUTLIER
-    judged.judge(0, judged.count, registration.nominal_from_section, terms)
-    verdicts = judged.verdicts[judged.verdicts != NOT_JUDGED]
-    beyond, within = int(np.count_nonzero(verdicts == Verdict.NONCONFORM)), int(np.count_nonzero(verdicts == Verdict.UNCERTAIN))
-    points = Verdict(int(verdicts.max())) if len(verdicts) else Verdict.UNCERTAIN
-    return _Settled(judged, registration, fit, points, word_points(terms.zone, beyond, within))
+def _reject_outliers(rows: ScanRows, far: NDArray[np.bool_], registration: Registration) -> None:
+    """Reject the points that lie far from all others, and of the rest those that the registration left out."""
+    if far.any() or registration.outliers.any():
+        usable = rows.usable_rows()
+        rows.reject(np.concatenate([usable[far], usable[~far][registration.outliers]]))
 
 
-def _decide(rows: ScanRows, registration: Registration, usable: NDArray[np.int64], terms: Terms, complete: bool) -> _Settled:
+def _judge_at(rows: ScanRows, registration: Registration, fit: str, terms: Terms) -> _Settled:
+    """Judge every row at a pose, and say the verdict of its points."""
+    rows.settle(registration.nominal_from_section, terms)
+    beyond, within = rows.count_of(Verdict.NONCONFORM), rows.count_of(Verdict.UNCERTAIN)
+    worst = next((verdict for verdict in sorted(Verdict, reverse=True) if rows.count_of(verdict)), Verdict.UNCERTAIN)
+    return _Settled(registration, fit, worst, word_points(terms.zone, beyond, within), _zone_error_mm(rows, terms))
+
+
+def _stay_at(rows: ScanRows, settled: _Settled, terms: Terms) -> None:
+    """Judge the rows at the pose that decides once more, where they were judged at another one since."""
+    if rows.settled_at is not settled.registration.nominal_from_section:
+        rows.settle(settled.registration.nominal_from_section, terms)
+
+
+def _decide(rows: ScanRows, registration: Registration, terms: Terms, complete: bool) -> _Settled:
     """Judge at the fit that was asked for; where points are out there, let the rule decide.
 
     By the rule "minimum-zone" a part is out only when no placement at all passes. By the rule "best-fit" it is out when it is out at
     every best fit that the points allow: also at the rivals of a symmetric part, and by more than the pose is still free to move.
     """
-    settled = _judge_at(rows, registration, usable, terms.fit, terms)
-    error = _zone_error_mm(settled.rows, terms)
+    if terms.fit == "minimum-zone":
+        registration = _fit_smallest(rows, registration, terms)
+    settled = _judge_at(rows, _with_pose(registration, registration.nominal_from_section), terms.fit, terms)
+    error = settled.zone_error_mm
     settled = replace(settled, best_fit_error_mm=error) if terms.fit == "best-fit" else replace(settled, minimum_zone_mm=error)
     if settled.points != Verdict.NONCONFORM:
         return settled
     if terms.rule == "best-fit" and terms.fit == "best-fit":
-        return _doubt_free_pose(rows, settled, usable, terms, complete)
-    return _prove_no_placement(rows, settled, usable, terms)
+        return _doubt_free_pose(rows, settled, terms, complete)
+    return _prove_no_placement(rows, settled, terms)
 
 
-def _prove_no_placement(rows: ScanRows, settled: _Settled, usable: NDArray[np.int64], terms: Terms) -> _Settled:
-    """Seek a placement of the judged points that passes: first the minimum zone, then every placement there is."""
-    points = rows.points[np.flatnonzero(settled.rows.verdicts != NOT_JUDGED)]
+def _prove_no_placement(rows: ScanRows, settled: _Settled, terms: Terms) -> _Settled:
+    """Seek a placement of the judged points that passes: first the minimum zone, then every placement there is.
+
+    Of many points the telling ones are asked. What refutes them refutes all; a placement that passes for them is looked at with all,
+    and those that are out there join them.
+    """
+    error_mm, telling = settled.best_fit_error_mm, np.empty(0, dtype=np.int64)
     zone = terms.zone
-    smallest = fit_minimum_zone(points, terms.nominal, settled.registration, terms.method, terms.tip_radius_mm, zone.middle_mm)
-    at_zone = _judge_at(rows, _with_pose(settled.registration, smallest.nominal_from_section), usable, "minimum-zone", terms)
-    settled = replace(settled, minimum_zone_mm=smallest.zone_mm)
-    if at_zone.points != Verdict.NONCONFORM:
-        return replace(at_zone, best_fit_error_mm=settled.best_fit_error_mm, minimum_zone_mm=smallest.zone_mm)
-    half = (zone.upper_mm - zone.lower_mm) / 2 + zone.uncertainty_mm
-    proof = PlacementSearch(terms.nominal, half, zone.middle_mm, terms.tip_radius_mm).look(
-        points, smallest.nominal_from_section, _MOST_BOXES
-    )
-    if proof.outcome == "refuted":
-        return settled
-    if proof.pose is not None:
-        passing = _judge_at(rows, _with_pose(settled.registration, proof.pose), usable, "minimum-zone", terms)
-        if passing.points != Verdict.NONCONFORM:
-            return replace(passing, best_fit_error_mm=settled.best_fit_error_mm, minimum_zone_mm=_zone_error_mm(passing.rows, terms))
+    half_mm = (zone.upper_mm - zone.lower_mm) / 2 + zone.uncertainty_mm
+    for _ in range(_ROUNDS):
+        telling = np.union1d(telling, _telling_rows(rows, terms))
+        points, all_told = rows.points[telling], len(telling) == rows.judged
+        smallest = fit_minimum_zone(points, terms.nominal, settled.registration, terms.method, terms.tip_radius_mm, zone.middle_mm)
+        at_zone = _judge_at(rows, _with_pose(settled.registration, smallest.nominal_from_section), "minimum-zone", terms)
+        width_mm = smallest.zone_mm if all_told else at_zone.zone_error_mm
+        settled = replace(settled, minimum_zone_mm=width_mm)
+        if at_zone.points != Verdict.NONCONFORM:
+            return replace(at_zone, best_fit_error_mm=error_mm, minimum_zone_mm=width_mm)
+        search = PlacementSearch(terms.nominal, half_mm, zone.middle_mm, terms.tip_radius_mm)
+        proof = search.look(points, smallest.nominal_from_section, _MOST_BOXES)
+        if proof.outcome == "refuted":
+            return settled
+        if proof.pose is not None:
+            passing = _judge_at(rows, _with_pose(settled.registration, proof.pose), "minimum-zone", terms)
+            if passing.points != Verdict.NONCONFORM:
+                return replace(passing, best_fit_error_mm=error_mm, minimum_zone_mm=passing.zone_error_mm)
+        if all_told or proof.pose is None:
+            break
     words = "No placement of the part was found that passes, and it was not proven that there is none."
     return replace(settled, points=Verdict.UNCERTAIN, why=Reason("placement", words))
 
 
-def _doubt_free_pose(rows: ScanRows, settled: _Settled, usable: NDArray[np.int64], terms: Terms, complete: bool) -> _Settled:
+def _telling_rows(rows: ScanRows, terms: Terms) -> NDArray[np.int64]:
+    """Rows of the judged points, or of those that tell how far all of them go."""
+    if rows.judged <= MANY:
+        return np.flatnonzero(rows.verdicts[: rows.count] != NOT_JUDGED)
+    return telling_rows(rows.station[: rows.count], rows.deviation[: rows.count], terms.nominal.length_mm, _SHARES)
+
+
+def _doubt_free_pose(rows: ScanRows, settled: _Settled, terms: Terms, complete: bool) -> _Settled:
     """Doubt a part that is out at the best fit, where another pose fits as well or too little was measured to fix the pose.
 
     The points that a scan cut short lacks would move the best fit, and a plan that asks for no coverage does not say that little is
     enough to place the part.
     """
     for rival in settled.registration.rivals:
-        if _judge_at(rows, _with_pose(settled.registration, rival), usable, terms.fit, terms).points != Verdict.NONCONFORM:
+        if _judge_at(rows, _with_pose(settled.registration, rival), terms.fit, terms).points != Verdict.NONCONFORM:
             words = "The part fits the nominal in another pose as well, and there no point is out: only a datum can tell."
             return replace(settled, points=Verdict.UNCERTAIN, why=Reason("placement", words))
-    judged = settled.rows.verdicts != NOT_JUDGED
-    covered = coverage(settled.rows.station[judged], terms.nominal, terms.limits.gap_max_mm)
+    _stay_at(rows, settled, terms)
+    covered = measure(rows.station[: rows.count], terms.nominal, terms.limits.gap_max_mm, rows.room).coverage
     if complete and covered >= (terms.coverage_min or _PLACED):
         return settled
-    proven = _prove_no_placement(rows, settled, usable, terms)
+    proven = _prove_no_placement(rows, settled, terms)
     if proven.points == Verdict.NONCONFORM:
         return replace(settled, minimum_zone_mm=proven.minimum_zone_mm)
     words = f"Too little of the profile was measured ({covered:.1%}) to place the part: in another placement no point is out."
@@ -138,87 +182,115 @@ def _with_pose(registration: Registration, pose: RigidTransform) -> Registration
 
 def _zone_error_mm(rows: ScanRows, terms: Terms) -> float:
     """2 * max |deviation - middle of the zone| over the judged rows; NaN without any."""
-    judged = rows.verdicts != NOT_JUDGED
-    return 2 * float(np.abs(rows.deviation[judged] - terms.target_mm).max()) if judged.any() else float("nan")
+    if not rows.judged:
+        return float("nan")
+    off = [np.fmax.reduce(np.abs(rows.deviation[part] - terms.target_mm), initial=0.0) for part in row_blocks(rows.count)]
+    return 2 * float(max(off))
 
 
-def _register_points(points_mm: Array, terms: Terms) -> Registration:
-    """The pose of points (m, 2) by the fit that the terms name, about the middle of the zone."""
-    nominal, zone, tip_radius_mm = terms.nominal, terms.zone, terms.tip_radius_mm
-    gross_mm = (zone.upper_mm - zone.lower_mm) / 2  # nearer points are form, however exact the others are
+def _fit_best(points: Cloud, terms: Terms) -> Registration:
+    """The best fit of points about the middle of the zone. Raises NotMeasured where they do not fit as the set-up says."""
+    zone = terms.zone
     registration = register(
-        points_mm,
-        nominal,
-        tip_radius_mm=tip_radius_mm,
+        points,
+        terms.nominal,
+        tip_radius_mm=terms.tip_radius_mm,
         robust=terms.reject_outliers,
-        gross_mm=gross_mm,
+        gross_mm=(zone.upper_mm - zone.lower_mm) / 2,  # nearer points are form, however exact the others are
         target_mm=terms.target_mm,
         weights=terms.weights,
     )
-    check_fit(points_mm, registration, terms)
-    if terms.fit == "minimum-zone":
-        kept = points_mm[~registration.outliers]
-        smallest = fit_minimum_zone(kept, nominal, registration, terms.method, tip_radius_mm, zone.middle_mm)
-        pose, programs, converged = smallest.nominal_from_section, smallest.programs, smallest.converged
-        registration = replace(registration, nominal_from_section=pose, iterations=programs, converged=converged)
-    return _with_pose(registration, registration.nominal_from_section)
+    check_fit(points, registration, terms)
+    return registration
 
 
-def _result(settled: _Settled, terms: Terms, complete: bool, missing: Missing) -> InspectionResult:
+def _fit_smallest(rows: ScanRows, registration: Registration, terms: Terms) -> Registration:
+    """The minimum zone from a best fit on: of many points that of the telling ones, which those join that are out of it."""
+    points, telling = rows.usable(), np.empty(0, dtype=np.int64)
+    settings = (registration, terms.method, terms.tip_radius_mm, terms.zone.middle_mm)
+    if len(points) <= MANY:
+        smallest = fit_minimum_zone(points.few(), terms.nominal, *settings)
+    else:
+        rows.settle(registration.nominal_from_section, terms)
+        for _ in range(_ROUNDS):
+            telling = np.union1d(telling, _telling_rows(rows, terms))
+            smallest = fit_minimum_zone(rows.points[telling], terms.nominal, *settings)
+            if _judge_at(rows, replace(registration, nominal_from_section=smallest.nominal_from_section), "", terms).zone_error_mm <= (
+                smallest.zone_mm + _SAME_MM
+            ):
+                break
+    pose, programs, converged = smallest.nominal_from_section, smallest.programs, smallest.converged
+    return replace(registration, nominal_from_section=pose, iterations=programs, converged=converged)
+
+
+def _result(rows: ScanRows, settled: _Settled, terms: Terms, complete: bool, missing: Missing) -> InspectionResult:
     """What the judged rows say about the profile, and the verdict on the part."""
-    rows, nominal, limits = settled.rows, terms.nominal, terms.limits
-    judged = rows.verdicts != NOT_JUDGED
-    station, deviation, verdicts = rows.station[judged], rows.deviation[judged], rows.verdicts[judged]
-    gap = largest_gap(station, nominal)
-    beyond = _beyond_ends_mm(settled, terms)
+    nominal, limits, room, every = terms.nominal, terms.limits, rows.room, slice(0, rows.count)
+    station, deviation, verdicts = rows.station[every], rows.deviation[every], rows.verdicts[every]
+    measured = measure(station, nominal, limits.gap_max_mm, room)
+    beyond_mm, beyond_count = _beyond_ends(rows, settled.registration, terms)
     findings = Findings(
         points=settled.points,
         why=settled.why,
-        judged=len(station),
-        rejected={reason: count for reason, count in rejections_by_reason(rows.rejection).items() if reason != Rejection.BEYOND_END.words},
-        beyond_end_mm=float(beyond.max(initial=0.0)),
-        beyond_end_count=int(np.count_nonzero(beyond > limits.end_allowance_mm)),
-        coverage=coverage(station, nominal, limits.gap_max_mm),
-        gap=gap,
+        judged=rows.judged,
+        rejected={reason: count for reason, count in rows.rejected_by_reason.items() if reason != Rejection.BEYOND_END.words},
+        beyond_end_mm=beyond_mm,
+        beyond_end_count=beyond_count,
+        coverage=measured.coverage,
+        gap=measured.gap,
         converged=settled.registration.converged,
     )
     conclusion = conclude(findings, missing, limits, complete)
     reasons = conclusion.reasons
-    if conclusion.verdict is Verdict.NONCONFORM and (reservation := shift_reservation(deviation, terms)):
+    if conclusion.verdict is Verdict.NONCONFORM and (reservation := shift_reservation(_few_judged(rows), terms)):
         reasons = (*reasons, Reason("shift", reservation))
-    known = terms.known_pose is not None
+    extent = extent_of(deviation, terms.zone.middle_mm, room)
+    out = rows.count_of(Verdict.NONCONFORM)
     return InspectionResult(
-        actual_mm=rows.actual,
-        foot_mm=rows.foot,
-        station_mm=rows.station,
-        deviation_mm=rows.deviation,
-        verdicts=rows.verdicts,
-        rejection=rows.rejection,
+        station_mm=station,
+        deviation_mm=deviation,
+        verdicts=verdicts,
+        rejection=rows.rejection[every],
+        rows_at=partial(rows.rows_at, pose=settled.registration.nominal_from_section, terms=terms),
+        judged=rows.judged,
+        out_of_tolerance=out,
+        rejected_by_reason=rows.rejected_by_reason,
+        worst=extent.worst,
+        rms_mm=extent.rms_mm,
+        max_deviation_mm=extent.max_deviation_mm,
+        min_deviation_mm=extent.min_deviation_mm,
         verdict=conclusion.verdict,
         reasons=reasons,
         coverage=findings.coverage,
-        gap=gap,
+        gap=measured.gap,
         gap_max_mm=limits.gap_max_mm,
         complete=complete,
         zone=terms.zone,
         registration=settled.registration,
-        rule="datum" if known else terms.rule,
+        rule="datum" if terms.known_pose is not None else terms.rule,
         fit=settled.fit,
         weights=terms.weights,
         best_fit_error_mm=settled.best_fit_error_mm,
         minimum_zone_mm=settled.minimum_zone_mm,
         method=terms.method,
-        stretches=stretches(station, deviation, verdicts, terms.zone, nominal, limits.gap_max_mm),
+        stretches=stretches(station, deviation, verdicts, terms.zone, nominal, limits.gap_max_mm, room) if out else (),
     )
 
 
-def _beyond_ends_mm(settled: _Settled, terms: Terms) -> Array:
-    """How far (k,) the surface of the part lies beyond the ends of an open profile, for the points that were rejected for it."""
-    rows = settled.rows
-    beyond = rows.points[np.flatnonzero(rows.rejection == Rejection.BEYOND_END)]
-    if not len(beyond):
-        return np.empty(0)
+def _few_judged(rows: ScanRows) -> Array:
+    """The deviations (k,) of the judged points, or of a choice of them."""
+    judged = (rows.deviation[part][rows.verdicts[part] != NOT_JUDGED] for part in row_blocks(rows.count))
+    return few_of(judged, rows.judged)
+
+
+def _beyond_ends(rows: ScanRows, registration: Registration, terms: Terms) -> tuple[float, int]:
+    """How far the surface of the part lies beyond the ends of an open profile, and how many points farther than is allowed."""
     ends = terms.nominal.curve.point(np.array(terms.nominal.curve.domain))
-    away = settled.registration.nominal_from_section.apply(beyond)[:, None, :] - ends
-    nearest: Array = np.hypot(away[..., 0], away[..., 1]).min(axis=1)
-    return np.maximum(nearest - terms.tip_radius_mm, 0.0)
+    farthest, count = 0.0, 0
+    for part in row_blocks(rows.count):
+        beyond = rows.points[part][rows.rejection[part] == Rejection.BEYOND_END]
+        away = registration.nominal_from_section.apply(beyond)[:, None, :] - ends
+        off = np.maximum(np.hypot(away[..., 0], away[..., 1]).min(axis=1) - terms.tip_radius_mm, 0.0)
+        farthest = max(farthest, float(off.max(initial=0.0)))
+        count += int(np.count_nonzero(off > terms.limits.end_allowance_mm))
+    return farthest, count

@@ -9,29 +9,21 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, KDTree, QhullError
+from scipy.spatial import ConvexHull, QhullError
 
+from inspection.cloud import MANY, Cloud, few_of
 from inspection.coarse import FEWEST_POINTS
 from inspection.deviations import deviations
 from inspection.errors import NotMeasured
+from inspection.far_points import Away, far_points, space_of, words_of_far
 from inspection.fine import MISFIT, register
-from inspection.nominal import NominalProfile
 from inspection.plane_check import STRAIGHT, check_plane, check_section
-from inspection.registration import Registration
+from inspection.registration import Registration, no_outliers
 from inspection.scan_rows import ScanRows
 from inspection.terms import Terms
 
 Array = NDArray[np.float64]
-Rows = NDArray[np.int64]
 
-_FAR_SIZES = 2.0  # of the nominal's size from the middle of the points: no point of the part lies there
-_FAR_SPREADS = 4.0  # and so many times the distance within which nine of ten points lie
-_FEW = 0.1  # of the points: more than these are not a few
-_NAMED_ROWS = 5
-_MARK_SIZES, _MARK_STEPS = 0.03, 5.0  # of the nominal's size, and of the steps between points: nothing measured lies so alone
-_MOST_MARKS = 5  # different values: a device has one or two
-_MOST_OF_ALL = 0.9
-_TYPICAL = 1000  # points that show how near to each other they lie
 _FAR_STRAIGHTER = 0.1  # of the rms at the best fit
 _SIZES_APART = 1.25
 _GROUPS_APART = 0.2  # of the size: no gap of a scan that still goes round is so wide
@@ -56,27 +48,32 @@ _FACTORS = (
 )
 
 
-def check_points(rows: ScanRows, terms: Terms) -> Rows:
-    """Raise NotMeasured where the points cannot be a scan of this section, whatever their pose.
+def check_points(rows: ScanRows, points: Cloud, terms: Terms) -> NDArray[np.bool_]:
+    """Raise NotMeasured where the points cannot be a scan of this section, whatever their pose; what size and plane say of many, few tell.
 
-    Returns the rows of points that lie far from all others; there are none unless outliers are to be rejected.
+    points : the usable ones of the rows
+    Returns which of them (m,) lie far from all others; there are none unless outliers are to be rejected.
     """
-    usable = rows.usable_rows()
-    check_section(rows, len(usable), terms.off_section_max_mm)
-    if len(usable) < FEWEST_POINTS:
-        return usable[:0]
-    space = np.column_stack([rows.points[usable], rows.height[usable]])
-    far = _far_points(space, terms.nominal) | _marks(space, terms.nominal)
+    check_section(rows, len(points), terms.off_section_max_mm)
+    if len(points) < FEWEST_POINTS:
+        return no_outliers(len(points))
+    space = few_of(space_of(rows, points), len(points))
+    away = Away.of(space, terms.nominal)
+    far = far_points(rows, points, away)
     if far.any() and not terms.reject_outliers:
-        raise NotMeasured(_words_of_far(space, usable, far))
-    check_plane(space[~far], rows.plane, terms)
-    _check_size(space[~far, :2], terms)
-    return usable[far]
+        raise NotMeasured(words_of_far(rows, points, far))
+    near = few_of(space_of(rows, points, far), len(points) - int(np.count_nonzero(far))) if far.any() else space
+    check_plane(near, rows.plane, terms)
+    _check_size(near[:, :2], terms)
+    return far
 
 
-def check_fit(points_mm: Array, registration: Registration, terms: Terms) -> None:
-    """Raise NotMeasured where the points (m, 2), at the pose that was found or is known, are not of this part as it was set up."""
-    kept = points_mm[~registration.outliers]
+def check_fit(points: Cloud, registration: Registration, terms: Terms) -> None:
+    """Raise NotMeasured where the points, at the pose that was found or is known, are not of this part as it was set up."""
+    points = points.without(registration.outliers)
+    if len(points) > MANY and all(_is_inside(block, registration, terms) for block in points.blocks()):
+        return
+    kept = points.few()
     found = _Found.at(kept, registration, terms)
     if found is None or found.worst_mm <= terms.zone.uncertainty_mm:
         return
@@ -120,6 +117,11 @@ def _check_straight(points_mm: Array, direct: Registration) -> None:
         )
 
 
+def _is_inside(points_mm: Array, registration: Registration, terms: Terms) -> bool:
+    found = _Found.at(points_mm, registration, terms)
+    return found is None or found.worst_mm <= terms.zone.uncertainty_mm
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Found:
     """What the points are at a pose: deviations (k,) in mm, their rms, and how far the worst lies outside the zone."""
@@ -138,49 +140,6 @@ class _Found:
         middle, half = terms.zone.middle_mm, (terms.zone.upper_mm - terms.zone.lower_mm) / 2
         away = np.abs(deviation - middle)
         return cls(deviation, float(np.sqrt((away**2).mean())), float(away.max()) - half)
-
-
-def _far_points(space_mm: Array, nominal: NominalProfile) -> NDArray[np.bool_]:
-    """Which points (m, 3) are a few that lie far from all others: farther than any point of the part can."""
-    away = np.linalg.norm(space_mm - np.median(space_mm, axis=0), axis=1)
-    far = away > max(_FAR_SIZES * nominal.size_mm, _FAR_SPREADS * float(np.quantile(away, 1 - _FEW)))
-    return far if np.count_nonzero(far) <= _FEW * len(far) else np.zeros(len(far), dtype=bool)
-
-
-def _marks(space_mm: Array, nominal: NominalProfile) -> NDArray[np.bool_]:
-    """Which points (m, 3) are marks for no point: at zero, or several at the very same place, and apart from all others.
-
-    A measured point repeats its digits at most where others lie beside it. The order of the points says nothing here.
-    """
-    _, places, counts = np.unique(space_mm[:, 0], return_inverse=True, return_counts=True)
-    seen = np.flatnonzero((counts[places] > 1) | ~space_mm[:, :2].any(axis=1))
-    marks = np.zeros(len(space_mm), dtype=bool)
-    if not len(seen):
-        return marks
-    same, places, counts = np.unique(space_mm[seen], axis=0, return_inverse=True, return_counts=True)
-    candidates = same[(counts > 1) | ~same[:, :2].any(axis=1)]
-    others = np.unique(space_mm, axis=0)
-    if not len(candidates) or len(others) < FEWEST_POINTS:
-        return marks
-    tree = KDTree(others)
-    away = np.asarray(tree.query(candidates, k=2)[0])[:, 1]
-    typical = float(np.quantile(np.asarray(tree.query(others[:: max(1, len(others) // _TYPICAL)], k=2)[0])[:, 1], 0.95))
-    apart = candidates[away > max(_MARK_SIZES * nominal.size_mm, _MARK_STEPS * typical)]
-    for mark in apart[:_MOST_MARKS]:
-        marks |= (space_mm == mark).all(axis=1)
-    return marks if np.count_nonzero(marks) <= _MOST_OF_ALL * len(marks) else np.zeros(len(marks), dtype=bool)
-
-
-def _words_of_far(space_mm: Array, usable: Rows, far: NDArray[np.bool_]) -> str:
-    which = np.flatnonzero(far)
-    rows = ", ".join(str(row + 1) for row in usable[which[:_NAMED_ROWS]]) + (" ..." if len(which) > _NAMED_ROWS else "")
-    x, y, _ = space_mm[which[0]]
-    few = f"{len(which)} of {len(far)} points lie" if len(which) > 1 else f"1 of {len(far)} points lies"
-    return (
-        f"{few} far from all others (row{'s' if len(which) > 1 else ''} {rows}; the first at x {x:g}, y {y:g} mm): are these samples "
-        "that mean no point? Give the value that marks them (invalid: --invalid V for a file, in the register map for a device), or fit "
-        "without them (--reject-outliers)"
-    )
 
 
 def _check_size(points_mm: Array, terms: Terms) -> None:

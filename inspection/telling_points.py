@@ -11,14 +11,24 @@ Array = NDArray[np.float64]
 
 SHARES = 512
 MANY = 4096  # points above which few stand for all
+_AT_ONCE = 1 << 16  # points looked at together; the others join the few of those before
 
 
-def telling_rows(station_mm: Array, deviation_mm: Array, length_mm: float) -> NDArray[np.int64]:
-    """Rows (k,), in rising order, of the lowest and the highest of points (m,) in each of the shares of the length; k <= 2 * SHARES.
+def telling_rows(station_mm: Array, deviation_mm: Array, length_mm: float, shares: int = SHARES) -> NDArray[np.int64]:
+    """Rows (k,), in rising order, of the lowest and the highest of points (m,) in each of the shares of the length; k <= 2 * shares.
 
-    station_mm, deviation_mm : (m,) at the pose of this moment, m > 0
+    station_mm, deviation_mm : (m,) at the pose of this moment; NaN for points that do not count
     """
-    share = np.minimum((station_mm * (SHARES / length_mm)).astype(np.int64), SHARES - 1)
+    kept = np.empty(0, dtype=np.int64)
+    for first in range(0, len(station_mm), _AT_ONCE):
+        kept = np.concatenate([kept, first + np.flatnonzero(~np.isnan(deviation_mm[first : first + _AT_ONCE]))])
+        if len(kept):
+            kept = kept[_extremes(station_mm[kept], deviation_mm[kept], length_mm, shares)]
+    return kept
+
+
+def _extremes(station_mm: Array, deviation_mm: Array, length_mm: float, shares: int) -> NDArray[np.int64]:
+    share = np.minimum((station_mm * (shares / length_mm)).astype(np.int64), shares - 1)
     order = np.lexsort((deviation_mm, share))
     borders = np.flatnonzero(np.diff(share[order]))
     return np.unique(np.concatenate([order[[0, -1]], order[borders], order[borders + 1]]))

@@ -142,7 +142,7 @@ def _section(plan: CtPlan, outcome: SectionOutcome, plan_name: str) -> Section:
     context = RunContext(
         title, plan_name, outcome.profile, plan.tolerance.zone, plan.registration.coverage_min, CAPACITY_POINTS, now(), "section"
     )
-    ended = Ended(run.ending, str(run.refusal or ""), outcome.result_json(), run.result)
+    ended = Ended(run.ending, str(run.refusal or ""), outcome.result_json(), run.result.blocks if run.result is not None else None)
     return Section(height_mm, context, outcome.started, ended, outcome.warnings)
 
 

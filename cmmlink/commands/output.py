@@ -14,8 +14,9 @@ from typing import Any
 import typer
 from rich.console import Console
 
-from cmmlink.commands.exit_codes import DEVICE_FAILED, EXIT_OF, UNUSABLE
+from cmmlink.commands.exit_codes import DEVICE_FAILED, EXIT_OF, NO_RECORD, UNUSABLE
 from cmmlink.console.launch import graphical_browser
+from cmmlink.errors import StoreError
 from cmmlink.report import print_summary, write_run
 from cmmlink.run import FinishedRun
 from inspection import NotMeasured
@@ -82,7 +83,7 @@ def report_outcome(run: FinishedRun, output: Output) -> int:
     if evidence is not None and not output.as_json:
         typer.echo(f"recorded as run {evidence.run}")
     if outcome.failure is not None:
-        return DEVICE_FAILED
+        return NO_RECORD if isinstance(outcome.failure, StoreError) else DEVICE_FAILED
     return UNUSABLE if outcome.result is None else EXIT_OF[outcome.result.verdict]
 
 

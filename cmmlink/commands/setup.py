@@ -20,6 +20,7 @@ from cmmlink.errors import PlanError
 from cmmlink.from_plan import check_plan, name_place, notes_on_nominal, profile_of
 from cmmlink.nominal_files import NominalFile, load_nominal, material_side
 from cmmlink.plan import load_plan
+from cmmlink.scratch import words_of_room
 from cmmlink.version import __version__
 from drivers import LinkError, UnitName
 from inspection import rehearse
@@ -70,6 +71,7 @@ def check(plan_file: PlanFile) -> int:
         notes = (*notes_on_nominal(plan), *device.notes)
     zone = plan.tolerance.zone
     typer.echo(f"{plan_file} can be run: {plan.part.name}, zone {zone.lower_mm:+g} .. {zone.upper_mm:+g} mm, {words_of(plan.device)}")
+    typer.echo(f"records in {words_of_room(plan.records or records_folder(None))}")
     typer.echo(f"nominal {profile.length_mm:.3f} mm long, {len(profile)} samples, material on the {profile.material}")
     for note in notes:
         typer.echo(f"  note: {note}")
@@ -105,6 +107,8 @@ def _look_after_all(say: Callable[[str], None], records: Path | None) -> int:
     nearest = next(path for path in (folder, *folder.parents) if path.exists())
     writable = os.access(nearest, os.W_OK)
     say(f"records: {folder}" + ("" if writable else f" cannot be written: choose another folder with --records ({nearest})"))
+    if writable:
+        say(f"records in {words_of_room(folder)}")
     say(f"serial ports: {', '.join(name for name, _ in serial_ports()) or 'none found'}")
     whole = look_after_open3d(say)
     return 0 if whole and writable else UNUSABLE

@@ -3,9 +3,10 @@
 import shutil
 import tempfile
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +35,7 @@ from cmmlink.run_state import RunKind
 from cmmlink.run_view import RunContext
 from cmmlink.words import headline_of, local_words, section_words
 from drivers import Decoder
-from inspection import NominalProfile, Verdict
+from inspection import JudgedRows, NominalProfile, Verdict
 
 _MOST_LISTED = 500
 
@@ -82,8 +83,8 @@ class PastRuns:
         """Give one run as it was recorded. Raises StoreError, RunError."""
         with open_to_read(self.folder, self.now) as store:
             recorded = recorded_run(store, find_run(store, run))
-            bodies = [record.body for record in store.records(recorded.run, "deviations")]
             end = recorded.end or end_missing(store, recorded.run)
+            blocks = partial(self._judged_blocks, recorded.run) if recorded.result and "deviations" in store.totals(recorded.run) else None
         received = end["received"] or 0
         counts = Counts(received=received, rejected=received, rejected_by_reason={"not judged": received})
         result = recorded.result or result_json(None, counts)
@@ -93,13 +94,13 @@ class PastRuns:
             recorded_profile(plan, recorded),
             datetime.fromisoformat(recorded.header["started"]).astimezone(),
             RunStarted.from_header(recorded.header),
-            Ended(
-                end["state"],
-                end["message"],
-                result,
-                unpack_judged(bodies) if bodies else None,
-            ),
+            Ended(end["state"], end["message"], result, blocks),
         )
+
+    def _judged_blocks(self, run: str) -> Iterator[JudgedRows]:
+        """Read the judged rows of a run from the records, piece by piece."""
+        with open_to_read(self.folder, self.now) as store:
+            yield from (unpack_judged(record.body) for record in store.records(run, "deviations"))
 
     def replay_run(self, run: str, sinks: Sequence[Sink], stop: threading.Event) -> str:
         """Measure a run again from its record; returns a sentence on the result. Raises StoreError, RunError, PlanError."""

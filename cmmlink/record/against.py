@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from cmmlink.errors import PlanError, RunError
-from cmmlink.record.bodies import pack_document, unpack_judged
+from cmmlink.record.bodies import pack_document
 from cmmlink.record.reader import RecordedRun, recorded_run
 from cmmlink.record.recorder import result_sha256
 from cmmlink.record.store import Store
@@ -52,9 +52,9 @@ def _differences(store: Store, recorded: RecordedRun, result: Mapping[str, Any])
         return
     if recorded.chain_sha256 != result["chain_sha256"]:
         yield f"the chain of run {run} ends with {recorded.chain_sha256 or 'nothing'}, the result says {result['chain_sha256']}"
-    rows = [record.body for record in store.records(run, "deviations")]
+    rows = (record.body for record in store.records(run, "deviations"))
     kept = recorded.result
-    if kept is not None and result_sha256(kept, unpack_judged(rows) if rows else None) != end["result_sha256"]:
+    if kept is not None and result_sha256(kept, rows) != end["result_sha256"]:
         yield f"the result and deviations of run {run} are not those that its end was written for"
     for key, value in (recorded.result or {}).items():
         if key not in result:

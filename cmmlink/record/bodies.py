@@ -22,7 +22,7 @@ from inspection import JudgedRows
 
 POINT_BYTES = 40
 _JUDGED_BYTES = 50
-_JUDGED_ROWS = 20_000  # of a record of deviations: about a megabyte
+JUDGED_ROWS = 20_000  # of a record of deviations: about a megabyte
 _ARRIVALS = {kind.__name__: kind for kind in get_args(Arrival) if kind not in (PointBatch, WireBytes)}
 
 
@@ -114,25 +114,17 @@ def _placed_arrival(entry: Placed) -> PlacedArrival:
     return PlacedArrival(entry.time_s, entry.reads, entry.points, checked(_ARRIVALS[entry.event], entry.values))
 
 
-def pack_judged(result: JudgedRows) -> Iterator[tuple[int, bytes]]:
-    """Pack the rows of a result into bodies. Yields each body with its number of rows."""
-    floats = (result.actual_mm, result.foot_mm, result.station_mm, result.deviation_mm)
-    for first in range(0, result.received, _JUDGED_ROWS):
-        rows = slice(first, first + _JUDGED_ROWS)
-        columns = [column[rows].astype("<f8").tobytes() for column in floats]
-        columns += [column[rows].astype("i1").tobytes() for column in (result.verdicts, result.rejection)]
-        yield len(result.verdicts[rows]), b"".join(columns)
+def pack_judged(blocks: Iterable[JudgedRows]) -> Iterator[tuple[int, bytes]]:
+    """Pack the rows of a result, which come JUDGED_ROWS at a time, into a body each. Yields each body with its number of rows."""
+    for rows in blocks:
+        floats = (rows.actual_mm, rows.foot_mm, rows.station_mm, rows.deviation_mm)
+        columns = [column.astype("<f8").tobytes() for column in floats]
+        columns += [column.astype("i1").tobytes() for column in (rows.verdicts, rows.rejection)]
+        yield rows.received, b"".join(columns)
 
 
-def unpack_judged(bodies: Iterable[bytes]) -> JudgedRows:
-    """Unpack the rows of a result from all its bodies."""
-    parts = [_unpack_rows(body) for body in bodies]
-    if not parts:
-        return _unpack_rows(b"")
-    return JudgedRows(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in dataclasses.fields(JudgedRows)))
-
-
-def _unpack_rows(body: bytes) -> JudgedRows:
+def unpack_judged(body: bytes) -> JudgedRows:
+    """Unpack rows of a result."""
     count, rest = divmod(len(body), _JUDGED_BYTES)
     if rest:
         raise StoreError(f"a record of deviations has {len(body)} bytes, no multiple of {_JUDGED_BYTES}")

@@ -53,13 +53,15 @@ def _documents(store: Store, run: str, folder: Path) -> list[Path]:
 
 
 def _points(store: Store, run: str, folder: Path) -> list[Path]:
-    batches = list(points_of(store, run))
-    rows = np.vstack([np.empty((0, 5)), *(np.column_stack([batch.sequence, batch.time_s, batch.points_mm]) for batch in batches)])
-    np.save(folder / "points.npy", rows)
-    with (folder / "points.csv").open("w", newline="", encoding="utf-8") as file:
+    count = store.totals(run).get("points", (0, 0))[1]
+    with (folder / "points.npy").open("wb") as array, (folder / "points.csv").open("w", newline="", encoding="utf-8") as file:
+        np.lib.format.write_array_header_1_0(array, {"descr": "<f8", "fortran_order": False, "shape": (count, 5)})
         writer = csv.writer(file)
         writer.writerow(POINT_COLUMNS)
-        writer.writerows((int(row[0]), *row[1:]) for row in rows.tolist())
+        for batch in points_of(store, run):
+            rows = np.column_stack([batch.sequence, batch.time_s, batch.points_mm])
+            array.write(rows.astype("<f8").tobytes())
+            writer.writerows((int(row[0]), *row[1:]) for row in rows.tolist())
     return [folder / "points.npy", folder / "points.csv"]
 
 
@@ -79,8 +81,7 @@ def _result(store: Store, run: str, folder: Path) -> list[Path]:
     result = recorded_run(store, run).result
     if result is None:
         return []
-    rows = unpack_judged(record.body for record in store.records(run, "deviations"))
-    write_deviations(rows, folder / "deviations.csv")
+    write_deviations((unpack_judged(record.body) for record in store.records(run, "deviations")), folder / "deviations.csv")
     return [folder / "deviations.csv", _json(folder / "result.json", result)]
 
 

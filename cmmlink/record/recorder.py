@@ -9,27 +9,29 @@ without a verdict.
 import hashlib
 import platform
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from datetime import datetime
 from importlib import metadata
+from itertools import islice
 from typing import Any
 
 from cmmlink.buffer import Buffer
 from cmmlink.errors import PlanError, StoreError
 from cmmlink.events import Arrived, Event, Judged, RunFinished, RunStarted
 from cmmlink.plan import Plan, map_of, with_own_maps
-from cmmlink.record.bodies import PlacedArrival, pack_arrivals, pack_document, pack_judged, pack_points, pack_reads
+from cmmlink.record.bodies import JUDGED_ROWS, PlacedArrival, pack_arrivals, pack_document, pack_judged, pack_points, pack_reads
 from cmmlink.record.chain import Draft, Kind
 from cmmlink.record.store import Store
 from cmmlink.result_json import number, result_json
 from cmmlink.version import __version__
 from cmmlink.words import utc_words
 from drivers import LinkDown, PointBatch, Rejected, WireBytes
-from inspection import JudgedRows
+from inspection import InspectionResult
 
 COMMIT_S = 0.1
 CHUNK_POINTS = 1000
+_JUDGED_BODIES = 8  # of judged rows that are committed together: eight megabytes
 QUEUE_BYTES = 64 << 20
 _SMALL_BYTES = 128  # size in the queue of an event without bytes or points
 _POSE_S = 0.1  # the shortest time between two notes of a pose that still moves
@@ -94,12 +96,17 @@ def software() -> dict[str, str]:
     return system | {package: metadata.version(package) for package in ("numpy", "scipy", "numba")}
 
 
-def result_sha256(result: Mapping[str, Any], rows: JudgedRows | None) -> str:
-    """Hash of everything a result says, every deviation to the last bit."""
-    digest = hashlib.sha256(pack_document(result))
-    for _, body in pack_judged(rows) if rows is not None else ():
+def result_sha256(document: Mapping[str, Any], bodies: Iterable[bytes]) -> str:
+    """Hash of everything a result says, every deviation to the last bit: of its document, and of its rows as they are recorded."""
+    digest = hashlib.sha256(pack_document(document))
+    for body in bodies:
         digest.update(body)
     return digest.hexdigest()
+
+
+def judged_bodies(result: InspectionResult | None) -> Iterator[tuple[int, bytes]]:
+    """The rows of a result as the record holds them, one body after the other, each with its number of rows."""
+    return pack_judged(result.blocks(JUDGED_ROWS) if result is not None else ())
 
 
 class Recorder:
@@ -222,12 +229,10 @@ class Recorder:
         self._stop_writing()
         self.check()
         result = result_json(finished.result, finished.counts)
-        sha256 = result_sha256(result, finished.result)
-        drafts = [self._draft("deviations", body, count) for count, body in (pack_judged(finished.result) if finished.result else ())]
-        if finished.result is not None:
-            drafts.append(self._draft("result", pack_document(result)))
-        drafts.append(self._end_draft(finished.ending, finished.message, result, sha256))
         try:
+            sha256 = self._keep_judged(result, finished.result)
+            drafts = [self._draft("result", pack_document(result))] if finished.result is not None else []
+            drafts.append(self._end_draft(finished.ending, finished.message, result, sha256))
             end = self._store.append(drafts)[-1]
         except StoreError as error:
             self._failure = error
@@ -235,6 +240,16 @@ class Recorder:
         plan_sha256 = hashlib.sha256(self._inputs.plan.encode()).hexdigest()
         nominal_sha256 = hashlib.sha256(self._inputs.nominal).hexdigest()
         self.evidence = RecordReference(self.run, end.sha256.hex(), plan_sha256, nominal_sha256, self._inputs.software)
+
+    def _keep_judged(self, document: Mapping[str, Any], result: InspectionResult | None) -> str:
+        """Write the judged rows, some megabytes at a time, and return the hash of the result. They count once the result follows."""
+        digest = hashlib.sha256(pack_document(document))
+        bodies = judged_bodies(result)
+        while drafts := [self._draft("deviations", body, count) for count, body in islice(bodies, _JUDGED_BODIES)]:
+            for draft in drafts:
+                digest.update(draft.body)
+            self._store.append(drafts)
+        return digest.hexdigest()
 
     def _end_draft(self, state: str, message: str, result: Mapping[str, Any], sha256: str = "") -> Draft:
         return end_draft(self.run, state, message, self._now(), result, sha256)

@@ -21,10 +21,11 @@ from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan import Device, Plan, read_model
 from cmmlink.record.bodies import PlacedArrival
 from cmmlink.record.reader import RecordedRun, arrivals_of, points_of, reads_of
-from cmmlink.record.recorder import result_sha256, software
+from cmmlink.record.recorder import judged_bodies, result_sha256, software
 from cmmlink.record.shapes import plain_name
 from cmmlink.record.store import Store
-from cmmlink.result_json import density_notes, result_json
+from cmmlink.result_json import density_notes, density_of, result_json, stations_of
+from cmmlink.scratch import scratch_in
 from drivers import Arrival, Capture, Decoder, LinkDown, LinkUp, PointBatch
 from inspection import NominalProfile, Reason
 
@@ -84,16 +85,16 @@ def replay_run(
     decoder = _decoder_of(plan.device, recorded, decoder_of)
     source = Capture(_arrivals(store, recorded, decoder, stop), decoder, _failure(recorded))
     started = RunStarted.from_header(recorded.header)
-    live = inspection_of(changed, profile)
+    live = inspection_of(changed, profile, scratch_in(store.path.parent))
     doubt = _doubt_of(recorded)
     outcome = run_inspection(source, live, sinks, started, buffer_points=plan.buffer_points, clock=clock, stop=stop, doubt=doubt)
     replayed = result_json(outcome.result, outcome.counts)
     identical = None
     if recorded.end is not None and recorded.end["result_sha256"]:
-        identical = result_sha256(replayed, outcome.result) == recorded.end["result_sha256"]
+        identical = result_sha256(replayed, (body for _, body in judged_bodies(outcome.result))) == recorded.end["result_sha256"]
     changes = (*_settings_changed(plan, changed), *_software_changed(recorded.header["software"]))
     differs = _differences(recorded.result, replayed) if not identical else ()
-    notes = (*started.notes, *density_notes(outcome.result, profile.length_mm))
+    notes = (*started.notes, *density_notes(density_of(stations_of(outcome.result), profile.length_mm), profile.length_mm))
     return Replay(outcome, profile, replayed, changes, differs, identical, notes)
 
 

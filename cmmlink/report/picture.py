@@ -16,13 +16,14 @@ from numpy.typing import NDArray
 
 from cmmlink.report.heading import draw_heading, heading_of, save_picture
 from cmmlink.words import headline_of
-from inspection import InspectionResult, NominalProfile, ToleranceZone, Verdict
+from inspection import InspectionResult, JudgedRows, NominalProfile, ToleranceZone, Verdict, telling_rows
 
 Array = NDArray[np.float64]
 
 _NOMINAL, _BAND, _GOOD, _UNPROVEN, _ABOVE, _BELOW = "#3a3f45", "#dfe7ee", "#2a7fa5", "#a16207", "#c2410c", "#6d28d9"
 _BAND_SHARE = 0.06  # of the part's size: how wide the magnified tolerance band is drawn
 _MOST_WHISKERS = 1500
+_MOST_POINTS = 65536  # in the strip: more would take minutes and show no more
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,11 +84,10 @@ def _draw_profile(axes: Axes, result: InspectionResult, nominal: NominalProfile)
     # A collection finds its limits by numpy; `fill` goes through every corner of its polygon in Python.
     axes.add_collection(PolyCollection([np.vstack([edges[0], edges[1][::-1]])], facecolors=_BAND, linewidths=0))
     axes.plot(*points.T, color=_NOMINAL, lw=1.0)
-    shown = _rows_to_draw(result)
-    tips = result.foot_mm[shown] + factor * (result.actual_mm - result.foot_mm)[shown]
-    axes.add_collection(
-        LineCollection(list(np.stack([result.foot_mm[shown], tips], axis=1)), colors=_colours(result, shown), linewidths=0.7)
-    )
+    shown = result.rows_at(_rows_to_draw(result, nominal))
+    tips = shown.foot_mm + factor * (shown.actual_mm - shown.foot_mm)
+    whiskers = list(np.stack([shown.foot_mm, tips], axis=1))
+    axes.add_collection(LineCollection(whiskers, colors=_colours(shown, zone.middle_mm), linewidths=0.7))
     _mark_worst(axes, result, factor)
     axes.set_aspect("equal")
     axes.autoscale_view()
@@ -104,14 +104,16 @@ def _draw_strip(axes: Axes, result: InspectionResult, nominal: NominalProfile) -
         along = "center" if own else "bottom" if above else "top"
         axes.annotate(words, place, shift, xycoords=("axes fraction", "data"), textcoords="offset points", va=along, fontsize=8)
     axes.axhline(0, color=_NOMINAL, lw=0.8)
+    shown = result.rows_at(_telling(result, nominal))
     for look in _LOOKS:
-        chosen = _has_look(result, look)
-        axes.scatter(result.station_mm[chosen], result.deviation_mm[chosen], s=look.size, c=look.colour, marker=look.mark, lw=0)
-    index = result.worst
-    if index is not None:
-        text = f"worst {result.deviation_mm[index]:+.4f} mm at station {result.station_mm[index]:.2f} mm"
-        place, outside = (result.station_mm[index], result.deviation_mm[index]), 8 if result.deviation_mm[index] >= 0 else -16
-        axes.annotate(text, place, (0, outside), textcoords="offset points", ha="center")  # clear of the neighbouring points
+        chosen = _has_look(shown, look, zone.middle_mm)
+        axes.scatter(shown.station_mm[chosen], shown.deviation_mm[chosen], s=look.size, c=look.colour, marker=look.mark, lw=0)
+    worst = result.worst_row
+    if worst is not None:
+        station, deviation = float(worst.station_mm[0]), float(worst.deviation_mm[0])
+        text = f"worst {deviation:+.4f} mm at station {station:.2f} mm"
+        outside = 8 if deviation >= 0 else -16
+        axes.annotate(text, (station, deviation), (0, outside), textcoords="offset points", ha="center")  # clear of the neighbouring points
     axes.margins(y=0.2)
     axes.set(xlim=(0, nominal.length_mm), xlabel="station (mm)", ylabel="deviation (mm)")
     basis = f"coverage {result.coverage:.1%}   fit {result.fit}   method {result.method}   out of tolerance {result.out_of_tolerance}"
@@ -131,35 +133,40 @@ def names_of_limits(zone: ToleranceZone) -> list[tuple[float, str]]:
 
 
 def _mark_worst(axes: Axes, result: InspectionResult, factor: float) -> None:
-    index = result.worst
-    if index is not None:
-        tip = result.foot_mm[index] + factor * (result.actual_mm[index] - result.foot_mm[index])
+    worst = result.worst_row
+    if worst is not None:
+        tip = worst.foot_mm[0] + factor * (worst.actual_mm[0] - worst.foot_mm[0])
         axes.plot(*tip, "o", ms=9, mfc="none", mec=_ABOVE, mew=1.5)
 
 
-def _rows_to_draw(result: InspectionResult) -> NDArray[np.int64]:
+def _telling(result: InspectionResult, nominal: NominalProfile) -> NDArray[np.int64]:
+    """Rows (k,) of the points: of a long scan the lowest and the highest in every few hundredths of a pixel, which hide the others."""
+    return telling_rows(result.station_mm, result.deviation_mm, nominal.length_mm, _MOST_POINTS // 2)
+
+
+def _rows_to_draw(result: InspectionResult, nominal: NominalProfile) -> NDArray[np.int64]:
     """Rows (k,) of the points to draw: thinned, but with every point out of tolerance and the worst one."""
-    judged = np.flatnonzero(np.isfinite(result.deviation_mm))
+    judged = _telling(result, nominal)
     kept = judged[:: max(1, len(judged) // _MOST_WHISKERS)]
-    out = np.flatnonzero(result.verdicts == Verdict.NONCONFORM)
+    out = judged[result.verdicts[judged] == Verdict.NONCONFORM]
     worst = [] if result.worst is None else [result.worst]
     return np.unique(np.concatenate([kept, out, worst]).astype(np.int64))
 
 
-def _has_look(result: InspectionResult, look: _Look) -> NDArray[np.bool_]:
-    """Which points (m,) are drawn so: those of a verdict, above or below the middle of the zone."""
-    of_verdict = np.equal(result.verdicts, look.verdict)
-    above = np.greater(result.deviation_mm, result.zone.middle_mm)
+def _has_look(rows: JudgedRows, look: _Look, middle_mm: float) -> NDArray[np.bool_]:
+    """Which of the rows (m,) are drawn so: those of a verdict, above or below the middle of the zone."""
+    of_verdict = np.equal(rows.verdicts, look.verdict)
+    above = np.greater(rows.deviation_mm, middle_mm)
     if look.side == "both":
         return of_verdict
     return of_verdict & above if look.side == "above" else of_verdict & ~above
 
 
-def _colours(result: InspectionResult, rows: NDArray[np.int64]) -> list[str]:
-    colours = np.full(result.received, _GOOD)
+def _colours(rows: JudgedRows, middle_mm: float) -> list[str]:
+    colours = np.full(rows.received, _GOOD)
     for look in _LOOKS:
-        colours[_has_look(result, look)] = look.colour
-    return [str(colour) for colour in colours[rows]]
+        colours[_has_look(rows, look, middle_mm)] = look.colour
+    return [str(colour) for colour in colours]
 
 
 def _loop(points: Array, nominal: NominalProfile) -> Array:

@@ -107,7 +107,7 @@ def _reservations(result: InspectionResult | None) -> Iterator[str]:
 
 
 def _print_numbers(console: Console, result: InspectionResult) -> None:
-    worst = result.worst
+    worst = result.worst_row
     assert worst is not None
     zone = result.zone
     console.print(
@@ -120,8 +120,8 @@ def _print_numbers(console: Console, result: InspectionResult) -> None:
     )
     _print_rule(console, result)
     console.print(
-        f"worst {result.deviation_mm[worst]:+.4f} mm at station {result.station_mm[worst]:.2f} mm "
-        f"(x {result.actual_mm[worst, 0]:.3f}, y {result.actual_mm[worst, 1]:.3f})"
+        f"worst {worst.deviation_mm[0]:+.4f} mm at station {worst.station_mm[0]:.2f} mm "
+        f"(x {worst.actual_mm[0, 0]:.3f}, y {worst.actual_mm[0, 1]:.3f})"
     )
     _print_stretches(console, result)
     registration = result.registration

@@ -9,24 +9,31 @@ What the rest of the project may call stands here; the files behind it are this 
 
 from inspection.kernels.blocks import CurveTables, project
 from inspection.kernels.compiling import compiled_code_folder, while_compiling
-from inspection.kernels.feet import Feet
+from inspection.kernels.feet import Feet, Marks, Room
 from inspection.kernels.growing import GrowingSums
 from inspection.kernels.layout import SAMPLE_METHODS
 from inspection.kernels.on_samples import SampleTables, project_on_samples
-from inspection.kernels.pose import OutlierLimit, PoseEstimate, PoseFit
-from inspection.kernels.rows import Judgement, RowArrays, judge_rows, take_in
+from inspection.kernels.pose import AT_ONCE, NONE_LEFT_OUT, OutlierLimit, PoseEstimate, PoseFit
+from inspection.kernels.rows import JUDGED_AS, TALLY, Columns, Judgement, Places, judge_rows, take_in
 from inspection.kernels.thinning import strides
 
 __all__ = [
+    "AT_ONCE",
+    "JUDGED_AS",
+    "NONE_LEFT_OUT",
     "SAMPLE_METHODS",
+    "TALLY",
+    "Columns",
     "CurveTables",
     "Feet",
     "GrowingSums",
     "Judgement",
+    "Marks",
     "OutlierLimit",
+    "Places",
     "PoseEstimate",
     "PoseFit",
-    "RowArrays",
+    "Room",
     "SampleTables",
     "compiled_code_folder",
     "judge_rows",

@@ -23,6 +23,9 @@ from inspection.kernels.layout import (
 )
 
 Array = NDArray[np.float64]
+Marks = NDArray[np.uint8]
+Room = Callable[[tuple[int, ...], type[np.generic]], NDArray[Any]]
+"""Gives an array of a shape and a type, whose values are not set: numpy.empty, or what keeps the arrays of a long scan on a disk."""
 
 _SHARED = 65_536  # points from which a batch is worth waking other threads
 _HELPERS = ThreadPoolExecutor(max(1, (os.cpu_count() or 1) - 1), "projection")  # started when first needed: a start takes 0.1 ms

@@ -36,11 +36,30 @@ class GrowingSums:
     def __init__(self, centre_mm: Array, reach_mm: float, length_mm: float) -> None:
         self.motion = np.zeros(3)  # shift in mm, rotation in rad
         self._frame = (np.array([*centre_mm, reach_mm, length_mm]), self.motion)
-        self._sums, self._change, self._marks = np.zeros(SUMS), np.zeros(1), np.zeros(64)
+        self._sums, self._change, self._marks = np.zeros(SUMS), np.array([0.0, np.nan]), np.zeros(64)
 
-    def add(self, foot_mm: Array, normal: Array, deviation_mm: Array, station_mm: Array, verdicts: NDArray[np.int8]) -> None:
-        """Take in points (m,) judged at the motion so far; those without a verdict (negative) take no part."""
+    def add(
+        self,
+        foot_mm: Array,
+        normal: Array,
+        deviation_mm: Array,
+        station_mm: Array,
+        verdicts: NDArray[np.int8],
+        follows: bool = False,
+    ) -> None:
+        """Take in points (m,) judged at the motion so far; those without a verdict (negative) take no part.
+
+        follows : they follow those of the last call without a break
+        """
+        if not follows:
+            self._change[1] = np.nan
         _grow(foot_mm, normal, deviation_mm, station_mm, verdicts, *self._frame, self._sums, self._change, self._marks)
+
+    def count_as(self, points: int) -> None:
+        """Let the points so far count as so many, for which they stand."""
+        share = points / max(self.count, 1.0)
+        self._sums *= share
+        self._change[0] *= share
 
     def move(self) -> None:
         """Set the motion to the minimum."""
@@ -89,7 +108,7 @@ def _grow(
     change: Any,
     marks: Any,
 ) -> None:
-    previous = np.nan
+    previous = change[1]
     for i in range(len(verdicts)):
         if verdicts[i] < 0:
             continue
@@ -111,6 +130,7 @@ def _grow(
             change[0] += (e - previous) * (e - previous)
         previous = e
         marks[min(max(int(station[i] / frame[3] * len(marks)), 0), len(marks) - 1)] = 1.0
+    change[1] = previous
 
 
 @kernel

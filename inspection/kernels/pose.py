@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from inspection.kernels.blocks import CurveTables, project_points
 from inspection.kernels.compiling import array_at, inlined_kernel, kernel, stack_reals
-from inspection.kernels.feet import empty_feet, flatten
+from inspection.kernels.feet import Feet, Marks, Room, empty_feet, flatten
 from inspection.kernels.layout import (
     BENDING_TT,
     BENDING_XT,
@@ -39,6 +39,9 @@ from inspection.kernels.on_samples import SampleTables, project_points_on_sample
 
 Array = NDArray[np.float64]
 
+NONE_LEFT_OUT: Marks = np.empty(0, dtype=np.uint8)
+AT_ONCE = 32 * BLOCK  # points projected together: their feet stay in the cache
+MANY = 1 << 20  # points from which on a median is taken of a choice of them
 _STANDSTILL_MM = 1e-9  # Gauss-Newton ends when no point moves further
 _HALVINGS = 12
 _HOVERING_STEPS = 3  # after them points that come and go at an open end in small steps are left out: no pose suits both
@@ -79,17 +82,36 @@ class OutlierLimit(NamedTuple):
 
 
 class PoseFit:
-    """Gauss-Newton on the pose of points (m, 2), and the memory it works in.
+    """Gauss-Newton on the pose of points (n, 2), and the memory it works in: nine bytes a point, and two more for an open profile's ends.
 
-    weights : (m,) share of each point in the sums; a settled fit has set those of points that hover at an open end to 0
+    left_out : (n,) 1 for points that take no part, as if they were not there; (0,) where all do
+    room     : gives arrays of the length of the scan, like numpy.empty
+    at_once  : points that are projected together, a multiple of BLOCK; the result is the same
+    weights  : (m,) share of each point in the sums that is not left out; a settled fit has set those that hover at an open end to 0
     """
 
-    def __init__(self, points_mm: Array, grid: CurveTables, table: SampleTables, method: str, outward: float, tip_radius_mm: float) -> None:
-        m = len(points_mm)
-        self.weights = np.ones(m)
-        self._problem = (flatten(points_mm), self.weights, grid.reals, grid.integers, float(outward), float(tip_radius_mm))
+    def __init__(
+        self,
+        points_mm: Array,
+        grid: CurveTables,
+        table: SampleTables,
+        method: str,
+        outward: float,
+        tip_radius_mm: float,
+        left_out: Marks = NONE_LEFT_OUT,
+        room: Room = np.empty,
+        at_once: int = AT_ONCE,
+    ) -> None:
+        m = len(points_mm) - int(np.count_nonzero(left_out))
+        self.weights = room((m,), np.float64)
+        self.weights[:] = 1.0
+        curve = (grid.reals, grid.integers, float(outward), float(tip_radius_mm))
+        self._problem = (flatten(points_mm), left_out, self.weights, *curve)
         self._samples = (*table.flat, SAMPLE_METHODS.index(method)) if method in SAMPLE_METHODS else None
-        self._memory = (np.empty(2 * m), np.ones(m), np.empty(m), empty_feet(m))
+        chunk = min(m, at_once)
+        before, after = room((m,), np.uint8), room((m,), np.uint8)
+        before[:] = 1
+        self._room, self._memory = room, (before, after, np.empty(2 * chunk), empty_feet(chunk))
 
     def settle(self, pose: tuple[float, float, float], most_steps: int) -> PoseEstimate:
         """Go from a pose to the least mean square of the deviations, by at most so many steps."""
@@ -100,18 +122,20 @@ class PoseFit:
 
     def find_outliers(self, pose: tuple[float, float, float], limit: OutlierLimit, most_steps: int) -> NDArray[np.bool_]:
         """Mark the points (m,) that are beyond the limit once the fit by Tukey's weights has settled."""
-        found = np.zeros(len(self.weights), dtype=np.bool_)
-        _find_outliers(self._problem, self._samples, self._memory, pose, limit, most_steps, found)
+        m = len(self.weights)
+        found, off = self._room((m,), np.bool_), self._room((m,), np.float64)
+        found[:] = False
+        _find_outliers(self._problem, self._samples, self._memory, pose, limit, most_steps, found, off)
         return found
 
 
 @kernel
 def _settle_pose(problem: Any, samples: Any, memory: Any, state: Any, covariance: Any, most_steps: int) -> tuple[int, bool]:
     """Make Newton steps, each halved until the mean square falls. Returns their number and whether the pose has settled."""
-    points, weights, _, _, outward, tip = problem
-    moved, takes_part, new_part, feet = memory
-    span, pose, here, trial = _span(points), (state[0], state[1], state[2]), np.empty(SUMS), np.empty(SUMS)
-    _evaluate(problem, samples, pose, span, moved, takes_part, takes_part, feet, here)
+    weights = problem[2]
+    takes_part, new_part, moved, feet = memory
+    span, pose, here, trial = _span(problem[0], problem[1], len(weights)), (state[0], state[1], state[2]), np.empty(SUMS), np.empty(SUMS)
+    _evaluate(problem, samples, pose, span, moved, takes_part, takes_part, feet, False, here)
     steps, settled, lower = 0, False, True
     while lower and not settled and steps < most_steps:
         steps += 1
@@ -122,14 +146,14 @@ def _settle_pose(problem: Any, samples: Any, memory: Any, state: Any, covariance
             settled = share * step[3] <= _STANDSTILL_MM and here[COUNT] > 0.0
             if settled:
                 break
-            _evaluate(problem, samples, next_pose, span, moved, takes_part, new_part, feet, trial)
+            _evaluate(problem, samples, next_pose, span, moved, takes_part, new_part, feet, False, trial)
             lower = trial[SQUARE_BEFORE] <= here[SQUARE] * (1.0 + 1e-12)
             if lower:
                 break
             share *= 0.5
         if lower and steps >= _HOVERING_STEPS and share * step[3] < _HOVERING_MM and trial[COUNT] != here[COUNT]:
             _leave_out_hovering(weights, takes_part, new_part)
-            _add_up(weights, takes_part, new_part, outward, tip, next_pose, span, moved, feet, trial)
+            _evaluate(problem, samples, next_pose, span, moved, takes_part, new_part, feet, True, trial)
         if lower:
             here, trial = trial, here
             takes_part, new_part = new_part, takes_part
@@ -156,25 +180,21 @@ def _report(sums: Any, pose: Any, span: Any, state: Any, covariance: Any) -> Non
 
 
 @kernel
-def _find_outliers(problem: Any, samples: Any, memory: Any, pose: Any, wanted: Any, most_steps: int, found: Any) -> None:
+def _find_outliers(problem: Any, samples: Any, memory: Any, pose: Any, wanted: Any, most_steps: int, found: Any, off: Any) -> None:
     """Make weighted steps, the weights following from the deviations at every pose, and mark the points beyond the limit."""
-    points, weights, _, _, outward, tip = problem
-    moved, takes_part, off, feet = memory
-    span, sums, m = _span(points), np.empty(SUMS), len(weights)
+    weights = problem[2]
+    takes_part, _, moved, feet = memory
+    span, sums, m = _span(problem[0], problem[1], len(weights)), np.empty(SUMS), len(weights)
     for _ in range(most_steps):
-        for i in range(m):
-            weights[i] = 1.0
-        _evaluate(problem, samples, pose, span, moved, takes_part, takes_part, feet, sums)
-        for i in range(m):
-            off[i] = abs(outward * feet.distance_mm[i] - tip)
+        count = _look_at_distances(problem, samples, pose, moved, takes_part, feet, off)
         limit = np.inf
-        if sums[COUNT] > 0.0:
-            limit = max(wanted.mads * np.median(off[takes_part > 0.0]), wanted.least_mm, _STANDSTILL_MM)
+        if count > 0:
+            limit = max(wanted.mads * _median(off, takes_part), wanted.least_mm, _STANDSTILL_MM)
         for i in range(m):
             share = off[i] / limit
             weights[i] = (1.0 - share * share) ** 2 if off[i] < limit else 0.0
-            found[i] = off[i] >= limit and takes_part[i] > 0.0
-        _add_up(weights, takes_part, takes_part, outward, tip, pose, span, moved, feet, sums)
+            found[i] = off[i] >= limit and takes_part[i] > 0
+        _evaluate(problem, samples, pose, span, moved, takes_part, takes_part, feet, True, sums)
         step = newton_step(sums, span[2])
         pose = _move_pose(pose, span, step, 1.0)
         if step[3] <= wanted.settled_mm:
@@ -182,17 +202,49 @@ def _find_outliers(problem: Any, samples: Any, memory: Any, pose: Any, wanted: A
 
 
 @kernel
-def _span(points: Any) -> tuple[float, float, float]:
+def _look_at_distances(problem: Any, samples: Any, pose: Any, moved: Any, takes_part: Any, feet: Any, off: Any) -> int:
+    """Enter how far each point is from the target, and which take part, at a pose. Returns how many do."""
+    points, left_out, weights, reals, integers, outward, tip = problem
+    m, row, count = len(weights), 0, 0
+    for begin in range(0, m, len(feet.vertex)):
+        stop = min(begin + len(feet.vertex), m)
+        row = _place(points, left_out, row, stop - begin, pose, moved)
+        _project(moved[: 2 * (stop - begin)], samples, reals, integers, _first_feet(feet, stop - begin))
+        for j in range(stop - begin):
+            off[begin + j] = abs(outward * feet.distance_mm[j] - tip)
+            takes_part[begin + j] = feet.vertex[j] != OPEN_END
+            count += takes_part[begin + j]
+    return count
+
+
+@kernel
+def _median(off: Any, takes_part: Any) -> float:
+    """The median of the values of points that take part: of many points, of a choice in every stretch of the scan."""
+    step = max(1.0, len(off) / MANY)
+    chosen, count, at = np.empty(min(len(off), MANY)), 0, 0.0
+    while at < len(off) and count < len(chosen):
+        shift = (0.6180339887498949 * (at / step)) % 1.0 if step > 1.0 else 0.0  # no rhythm of the scan is in step with it
+        i = min(int(at + shift * step), len(off) - 1)
+        if takes_part[i] > 0:
+            chosen[count] = off[i]
+            count += 1
+        at += step
+    return float(np.median(chosen[:count])) if count > 0 else np.inf
+
+
+@kernel
+def _span(points: Any, left_out: Any, m: int) -> tuple[float, float, float]:
     """Mean of the flat points (x, y), and the distance of the farthest from it: a motion does not change it."""
     x = y = square = 0.0
-    m = len(points) // 2
-    for i in range(m):
-        x += points[2 * i]
-        y += points[2 * i + 1]
+    for row in range(len(points) // 2):
+        if len(left_out) == 0 or left_out[row] == 0:
+            x += points[2 * row]
+            y += points[2 * row + 1]
     x, y = x / m, y / m
-    for i in range(m):
-        dx, dy = points[2 * i] - x, points[2 * i + 1] - y
-        square = max(square, dx * dx + dy * dy)
+    for row in range(len(points) // 2):
+        if len(left_out) == 0 or left_out[row] == 0:
+            dx, dy = points[2 * row] - x, points[2 * row + 1] - y
+            square = max(square, dx * dx + dy * dy)
     return x, y, max(np.sqrt(square), _LEAST_REACH_MM)
 
 
@@ -214,39 +266,74 @@ def _move_pose(pose: Any, span: Any, step: Any, share: float) -> tuple[float, fl
 
 
 @kernel
-def _evaluate(problem: Any, samples: Any, pose: Any, span: Any, moved: Any, before: Any, takes_part: Any, feet: Any, sums: Any) -> None:
-    """Move the points to a pose, project them, and add up the sums over them.
-
-    samples : tables and number of a method that looks at samples only, or None for the exact feet
-    """
-    points, weights, reals, integers, outward, tip = problem
-    c, s, m = np.cos(pose[0]), np.sin(pose[0]), len(weights)
-    for i in range(m):
-        x, y = points[2 * i], points[2 * i + 1]
+def _place(points: Any, left_out: Any, row: int, count: int, pose: Any, moved: Any) -> int:
+    """Move the next points that are not left out, from a row on, to a pose. Returns the row after the last."""
+    c, s = np.cos(pose[0]), np.sin(pose[0])
+    for i in range(count):
+        if len(left_out) > 0:
+            while left_out[row] != 0:
+                row += 1
+        x, y = points[2 * row], points[2 * row + 1]
         moved[2 * i] = c * x - s * y + pose[1]
         moved[2 * i + 1] = s * x + c * y + pose[2]
-    project_points(moved, reals, integers, feet, np.zeros(1, dtype=np.int64))
-    if samples is not None:
-        project_points_on_samples(moved, samples, feet, np.zeros(1, dtype=np.int64))
-    _add_up(weights, before, takes_part, outward, tip, pose, span, moved, feet, sums)
+        row += 1
+    return row
 
 
 @kernel
-def _add_up(
-    weights: Any, before: Any, takes_part: Any, outward: float, tip: float, pose: Any, span: Any, moved: Any, feet: Any, sums: Any
+def _first_feet(feet: Any, count: int) -> Any:
+    """The memory for the first feet of a chunk."""
+    return Feet(
+        feet.parameter[:count],
+        feet.foot_mm[:count],
+        feet.distance_mm[:count],
+        feet.gradient[:count],
+        feet.curvature[:count],
+        feet.station_mm[:count],
+        feet.vertex[:count],
+    )
+
+
+@kernel
+def _project(moved: Any, samples: Any, reals: Any, integers: Any, feet: Any) -> None:
+    """Project moved points.
+
+    samples : tables and number of a method that looks at samples only, or None for the exact feet
+    """
+    project_points(moved, reals, integers, feet, np.zeros(1, dtype=np.int64))
+    if samples is not None:
+        project_points_on_samples(moved, samples, feet, np.zeros(1, dtype=np.int64))
+
+
+@kernel
+def _evaluate(
+    problem: Any, samples: Any, pose: Any, span: Any, moved: Any, before: Any, takes_part: Any, feet: Any, known: bool, sums: Any
 ) -> None:
-    """Add up the sums, always in the same order: first for each place in a block, so that the loop vectorises, then in halves."""
+    """Add up the sums over the points at a pose, chunk by chunk and always in the same order.
+
+    They are added first for each place in a block, so that the loop vectorises, then in halves.
+
+    known : the points were looked at there before, so that their feet are still known where one chunk holds them all
+    """
+    points, left_out, weights, reals, integers, outward, tip = problem
+    m, row = len(weights), 0
     lanes = array_at(stack_reals(), REALS)
     for i in range(SUMS * BLOCK):
         lanes[i] = 0.0
     x0, y0 = _centre(pose, span)
-    for block in range(0, len(weights), BLOCK):
-        end = min(block + BLOCK, len(weights))
-        points, gradient = moved[2 * block : 2 * end], feet.gradient.reshape(-1)[2 * block : 2 * end]
-        distance, curvature, vertex = feet.distance_mm[block:end], feet.curvature[block:end], feet.vertex[block:end]
-        weight, part_before, part = weights[block:end], before[block:end], takes_part[block:end]
-        for j in range(end - block):
-            _add_point(lanes, points, gradient, distance, curvature, vertex, weight, part_before, part, outward, tip, x0, y0, j)
+    for begin in range(0, m, len(feet.vertex)):
+        stop = min(begin + len(feet.vertex), m)
+        if not known or m > len(feet.vertex):
+            row = _place(points, left_out, row, stop - begin, pose, moved)
+            _project(moved[: 2 * (stop - begin)], samples, reals, integers, _first_feet(feet, stop - begin))
+        for block in range(begin, stop, BLOCK):
+            end = min(block + BLOCK, stop)
+            near, far = block - begin, end - begin
+            xy, gradient = moved[2 * near : 2 * far], feet.gradient.reshape(-1)[2 * near : 2 * far]
+            distance, curvature, vertex = feet.distance_mm[near:far], feet.curvature[near:far], feet.vertex[near:far]
+            weight, part_before, part = weights[block:end], before[block:end], takes_part[block:end]
+            for j in range(end - block):
+                _add_point(lanes, xy, gradient, distance, curvature, vertex, weight, part_before, part, outward, tip, x0, y0, j)
     half = BLOCK // 2
     while half > 0:
         for column in range(0, SUMS * BLOCK, BLOCK):

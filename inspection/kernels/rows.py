@@ -27,13 +27,19 @@ from inspection.kernels.layout import (
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int8]
-RowArrays = tuple[Array, Array, Array, Array, Array, Codes, Codes]  # plain tuples: a named one takes numba a microsecond a call
+Columns = tuple[Array, Array, Codes, Codes, NDArray[np.int64]]  # plain tuples: a named one takes numba a microsecond a call
+Places = tuple[Array, Array, Array]
 Judgement = tuple[float, float, float, float, float]
+
+JUDGED_AS = 8  # place in the tally of the verdict 0; before it come the rejections
+TALLY = JUDGED_AS + NONCONFORM + 1
 
 
 def judge_rows(
     section_mm: Array,
-    rows: RowArrays,
+    columns: Columns,
+    places: Places,
+    base: int,
     first: int,
     stop: int,
     pose: tuple[float, float, float, float],
@@ -42,27 +48,34 @@ def judge_rows(
 ) -> None:
     """Place rows first .. stop - 1 of the section points (n, 2), project them, and enter what they are found to be.
 
-    rows      : surface points, nominal points and directions of the deviation (n, 2 each), station and deviation in mm (n,), codes of the
-                verdict and of the rejection (n,); NaN and NOT_JUDGED where there is no verdict
+    columns   : station and deviation in mm (n,), codes of the verdict and of the rejection (n,), NaN and NOT_JUDGED where there is no
+                verdict; and how many rows have each rejection and, from JUDGED_AS on, each verdict (TALLY,)
+    places    : surface points, nominal points and directions of the deviation, (w, 2) each, of the rows from `base` on
     pose      : cosine and sine of the rotation, then the shift in mm (x, y)
     project   : feet of points (m, 2) in nominal coordinates; a row that cannot be used comes as NaN
     judgement : 1.0 where left of the curve is out of material, else -1.0; tip radius, lower and upper limit, uncertainty in mm
     """
-    feet = project(place_rows(section_mm, rows[-1], first, stop, pose))
-    _judge(feet.foot_mm, feet.distance_mm, feet.gradient, feet.curvature, feet.station_mm, feet.vertex, judgement, first, rows)
+    feet = project(place_rows(section_mm, columns[3], first, stop, pose))
+    _judge(
+        feet.foot_mm, feet.distance_mm, feet.gradient, feet.curvature, feet.station_mm, feet.vertex, judgement, first, base, columns, places
+    )
 
 
-def take_in(points_mm: Array, plane: Array, off_section_max_mm: float, section_mm: Array, rejection: NDArray[np.int8], at: int) -> None:
-    """Enter points (m, 2) or (m, 3) as section points from row `at` on, and why any cannot be used.
+def take_in(
+    points_mm: Array, plane: Array, off_section_max_mm: float, section_mm: Array, columns: Columns, places: Places, base: int, at: int
+) -> None:
+    """Enter points (m, 2) or (m, 3) as section points from row `at` on, not judged yet, and why any cannot be used.
 
     plane : (12,) origin, x axis, y axis and normal of the section in machine coordinates
+    columns, places, base : see judge_rows
     """
-    _take_in(points_mm, plane, off_section_max_mm, section_mm, rejection, at)
+    _take_in(points_mm, plane, off_section_max_mm, section_mm, columns, places, base, at)
 
 
 @kernel
-def _take_in(points: Any, plane: Any, off_section_max: float, section: Any, rejection: Any, at: int) -> None:
+def _take_in(points: Any, plane: Any, off_section_max: float, section: Any, columns: Any, places: Any, base: int, at: int) -> None:
     flat = points.shape[1] == 2
+    stations, deviations, verdicts, rejection, tally = columns
     for i in range(len(points)):
         row = at + i
         x, y, height = points[i, 0], points[i, 1], 0.0
@@ -78,6 +91,11 @@ def _take_in(points: Any, plane: Any, off_section_max: float, section: Any, reje
             rejection[row] = OFF_SECTION
         else:
             rejection[row] = NOT_REJECTED
+        verdicts[row] = NOT_JUDGED
+        stations[row] = deviations[row] = np.nan
+        tally[rejection[row]] += 1
+        for place in places:
+            place[row - base, 0] = place[row - base, 1] = np.nan
 
 
 def place_rows(section_mm: Array, rejection: Codes, first: int, stop: int, pose: tuple[float, float, float, float]) -> Array:
@@ -102,27 +120,44 @@ def _place(section: Any, rejection: Any, first: int, pose: Any, moved: Any) -> N
 
 @kernel
 def _judge(
-    foot: Any, distance: Any, gradient: Any, curvature: Any, station: Any, vertex: Any, judgement: Any, first: int, rows: Any
+    foot: Any,
+    distance: Any,
+    gradient: Any,
+    curvature: Any,
+    station: Any,
+    vertex: Any,
+    judgement: Any,
+    first: int,
+    base: int,
+    columns: Any,
+    places: Any,
 ) -> None:
     outward, tip, lower, upper, uncertainty = judgement
-    actual, feet, normals, stations, deviations, verdicts, rejection = rows
+    stations, deviations, verdicts, rejection, tally = columns
+    actual, feet, normals = places
     for i in range(len(distance)):
-        row = first + i
+        row, place = first + i, first + i - base
+        tally[rejection[row]] -= 1
+        if verdicts[row] != NOT_JUDGED:
+            tally[JUDGED_AS + verdicts[row]] -= 1
         if rejection[row] == BEYOND_END or rejection[row] == IN_HOLLOW:
             rejection[row] = NOT_REJECTED  # at an earlier pose
         too_tight = outward * curvature[i] * tip >= 1.0  # the ball does not reach the foot
         if np.isnan(distance[i]) or vertex[i] == OPEN_END or too_tight or rejection[row] != NOT_REJECTED:
             if rejection[row] == NOT_REJECTED:
                 rejection[row] = IN_HOLLOW if too_tight else BEYOND_END
-            actual[row, 0] = actual[row, 1] = feet[row, 0] = feet[row, 1] = normals[row, 0] = normals[row, 1] = np.nan
+            actual[place, 0] = actual[place, 1] = feet[place, 0] = feet[place, 1] = normals[place, 0] = normals[place, 1] = np.nan
             stations[row] = deviations[row] = np.nan
             verdicts[row] = NOT_JUDGED
+            tally[rejection[row]] += 1
             continue
         e = outward * distance[i] - tip
         nx, ny = outward * gradient[i, 0], outward * gradient[i, 1]
-        actual[row, 0], actual[row, 1] = foot[i, 0] + e * nx, foot[i, 1] + e * ny
-        feet[row, 0], feet[row, 1] = foot[i, 0], foot[i, 1]
-        normals[row, 0], normals[row, 1] = nx, ny
+        actual[place, 0], actual[place, 1] = foot[i, 0] + e * nx, foot[i, 1] + e * ny
+        feet[place, 0], feet[place, 1] = foot[i, 0], foot[i, 1]
+        normals[place, 0], normals[place, 1] = nx, ny
         stations[row], deviations[row] = station[i], e
         beyond = max(lower - e, e - upper)
         verdicts[row] = NONCONFORM if beyond > uncertainty else CONFORM if beyond <= -uncertainty else UNCERTAIN
+        tally[rejection[row]] += 1
+        tally[JUDGED_AS + verdicts[row]] += 1

@@ -19,7 +19,7 @@ def rows_of(path: Path) -> list[dict[str, str]]:
 
 def test_deviations_csv_has_a_row_for_every_point(profile: NominalProfile, tmp_path: Path) -> None:
     result = inspect_oval(profile, bumped())
-    write_deviations(result, tmp_path / "deviations.csv")
+    write_deviations(result.blocks(), tmp_path / "deviations.csv")
     rows = rows_of(tmp_path / "deviations.csv")
     assert tuple(rows[0]) == tuple(COLUMNS)
     assert tuple(COLUMNS) == ("index", "x_mm", "y_mm", "station_mm", "foot_x_mm", "foot_y_mm", "deviation_mm", "verdict")
@@ -33,7 +33,7 @@ def test_deviations_csv_has_a_row_for_every_point(profile: NominalProfile, tmp_p
 def test_a_rejected_point_keeps_its_row_and_says_why(profile: NominalProfile, tmp_path: Path) -> None:
     live = LiveInspection(profile, ToleranceZone(-0.05, 0.05), datum=RigidTransform.identity())
     live.add([[10.0, 0.0], [np.nan, 1.0], [0.0, 8.3]])
-    write_deviations(live.finish(), tmp_path / "deviations.csv")
+    write_deviations(live.finish().blocks(), tmp_path / "deviations.csv")
     rows = rows_of(tmp_path / "deviations.csv")
     assert [row["verdict"] for row in rows] == ["conform", "rejected: not finite", "nonconform"]
     assert [rows[1][name] for name in list(COLUMNS)[1:7]] == [""] * 6

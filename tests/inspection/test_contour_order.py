@@ -3,9 +3,13 @@
 import numpy as np
 import pytest
 
-from inspection.contour_order import trace_contour
+from inspection.contour_order import Contour, trace_contour
 from tests.inspection import profiles
-from tests.inspection.profiles import curve_of
+from tests.inspection.profiles import Array, curve_of
+
+
+def trace(points: Array, step_mm: float) -> Contour:
+    return trace_contour(lambda: [points], step_mm)
 
 
 @pytest.mark.parametrize("name", ["P1", "P3", "GOE404"])
@@ -13,9 +17,9 @@ def test_the_contour_does_not_depend_on_order_and_repetition(name: str) -> None:
     curve, rng = curve_of(name), np.random.default_rng(1)
     points = curve.point(profiles.even_in_arc_length(curve, 800))
     step = curve.length_mm / 400
-    first = trace_contour(points, step)
+    first = trace(points, step)
     for other in (points[::-1], rng.permutation(points), rng.permutation(np.concatenate([points, points]))):
-        again = trace_contour(other, step)
+        again = trace(other, step)
         assert np.abs(again.points_mm - first.points_mm).max() < 1e-8 * step
         assert (again.walk == first.walk).all()
 
@@ -24,7 +28,7 @@ def test_the_walk_follows_the_contour() -> None:
     """An open curve: its walk visits the stations in rising or falling order, from end to end."""
     curve = curve_of("P1")
     points = np.random.default_rng(2).permutation(curve.point(profiles.even_in_arc_length(curve, 900)))
-    walk = trace_contour(points, curve.length_mm / 300).walk_mm
+    walk = trace(points, curve.length_mm / 300).walk_mm
     dense = curve.point(np.linspace(*curve.domain, 20_001))
     nearest = np.array([((dense - place) ** 2).sum(axis=1).argmin() for place in walk])
     assert (np.diff(nearest) > 0).all() or (np.diff(nearest) < 0).all()
@@ -33,13 +37,13 @@ def test_the_walk_follows_the_contour() -> None:
 
 def test_weights_are_the_length_that_each_place_stands_for() -> None:
     curve = curve_of("P3")
-    contour = trace_contour(curve.point(profiles.even_in_arc_length(curve, 2000)), curve.length_mm / 500)
+    contour = trace(curve.point(profiles.even_in_arc_length(curve, 2000)), curve.length_mm / 500)
     assert contour.weights_mm.sum() == pytest.approx(curve.length_mm, rel=0.01)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 50])
 def test_points_on_a_line_have_a_walk(count: int) -> None:
     points = np.column_stack([np.linspace(0, 10, count), np.linspace(0, 5, count)])
-    contour = trace_contour(np.random.default_rng(3).permutation(points), 0.01)
+    contour = trace(np.random.default_rng(3).permutation(points), 0.01)
     assert len(contour.walk) == count
     assert (np.diff(contour.walk_mm[:, 0]) > 0).all() or (np.diff(contour.walk_mm[:, 0]) < 0).all()

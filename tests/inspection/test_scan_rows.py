@@ -2,13 +2,14 @@
 
 import numpy as np
 
-from inspection import NOT_JUDGED, Rejection, RigidTransform, SectionPlane, ToleranceZone
+from inspection import NOT_JUDGED, Rejection, RigidTransform, SectionPlane, ToleranceZone, Verdict
 from inspection.scan_rows import ScanRows
 from inspection.terms import Terms
 from tests.inspection.profiles import Array, curve_of, even_in_arc_length, nominal_of, offset_points
 
 PLANE = SectionPlane(np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
-FIELDS = ("points", "actual", "foot", "normal", "station", "deviation", "verdicts", "rejection")
+FIELDS = ("points", "height", "station", "deviation", "verdicts", "rejection")
+PLACES = ("actual", "foot", "normal")
 
 
 def rows_of(points: Array, capacity: int = 4096) -> ScanRows:
@@ -41,17 +42,64 @@ def test_rows_survive_growing() -> None:
     assert np.isfinite(grown.deviation[:300]).all()
 
 
-def test_a_copy_has_just_the_rows_so_far_and_lives_on_its_own() -> None:
-    rows = rows_of(scan_of(50))
-    rows.judge(0, 50, RigidTransform.identity(), terms())
+def test_places_are_kept_of_the_newest_rows_and_worked_out_again_for_the_others() -> None:
+    points = scan_of(300)
+    grown, whole = ScanRows(4), rows_of(points)
+    whole.judge(0, 300, RigidTransform.identity(), terms())
+    for k in range(0, 300, 7):
+        part = points[k : k + 7]
+        grown.take_in(part, PLANE, np.inf)
+        grown.count += len(part)
+        grown.judge(k, grown.count, RigidTransform.identity(), terms())
+        assert grown.base == k - k % 64, "the block that is being filled, and what came last"
+        for name in PLACES:
+            kept = getattr(grown, name)[: grown.count - grown.base]
+            assert np.array_equal(kept, getattr(whole, name)[grown.base : grown.count]), name
+    grown.judge(0, 300, RigidTransform.identity(), terms())
+    for name in PLACES:
+        assert np.array_equal(getattr(grown, name), getattr(whole, name)), name
+    for which in (slice(17, 250), np.array([299, 3, 3, 150])):
+        rows = whole.rows_at(which, RigidTransform.identity(), terms())
+        assert np.array_equal(rows.actual_mm, whole.actual[which])
+        assert np.array_equal(rows.foot_mm, whole.foot[which])
+        assert np.array_equal(rows.deviation_mm, whole.deviation[which])
+        assert np.array_equal(rows.verdicts, whole.verdicts[which])
+
+
+def test_a_copy_is_as_the_rows_were_taken_in_and_lives_on_its_own() -> None:
+    points = scan_of(50)
+    points[[3, 4]] = np.nan
+    rows = rows_of(points)
+    rows.reject(np.array([7, 8]))
+    rows.settle(RigidTransform.identity(), terms())
     before = {field: getattr(rows, field)[:50].copy() for field in FIELDS}
     same = rows.copy()
+    assert np.array_equal(same.points, before["points"], equal_nan=True)
+    assert not same.judged
+    assert np.isnan(same.deviation).all()
+    assert same.rejected_by_reason == {"not finite": 2}
+    assert rows.rejected_by_reason == {"not finite": 2, "outlier": 2}
+    assert rows.judged == 46
+    same.settle(RigidTransform(0.1, np.zeros(2)), terms())
     for field in FIELDS:
-        assert np.array_equal(getattr(same, field), before[field]), field
-    same.judge(0, 50, RigidTransform(0.1, np.zeros(2)), terms())
-    for field in FIELDS:
-        assert np.array_equal(getattr(rows, field)[:50], before[field]), field
+        assert np.array_equal(getattr(rows, field)[:50], before[field], equal_nan=True), field
     assert not np.array_equal(same.deviation, before["deviation"])
+
+
+def test_the_rows_know_how_many_have_which_verdict_and_why_the_others_have_none() -> None:
+    points = scan_of(200)
+    points[::50] = np.nan
+    rows = rows_of(points)
+    for pose in (RigidTransform.identity(), RigidTransform(0.02, np.array([0.03, 0.0])), RigidTransform.identity()):
+        rows.settle(pose, terms())
+        found = rows.verdicts[:200]
+        assert [rows.count_of(verdict) for verdict in Verdict] == [int((found == verdict).sum()) for verdict in Verdict]
+        assert rows.judged == int((found != NOT_JUDGED).sum()) == 196
+        assert rows.rejected_by_reason == {"not finite": 4}
+    rows.forget_verdicts()
+    assert rows.judged == 0
+    rows.settle(RigidTransform.identity(), terms())
+    assert np.array_equal(rows.verdicts, found)
 
 
 def test_rows_outside_the_range_are_not_judged() -> None:

@@ -35,7 +35,7 @@ def test_a_run_that_is_being_recorded_is_listed_as_running_and_later_as_what_it_
     outcome, _ = record(past.folder, Script(*scan_arrivals()), before=[look])
     row, opened = during[0]
     assert (row.state, row.verdict, row.worst_mm) == ("running", None, None)
-    assert (opened.ended.ending, opened.ended.rows) == ("running", None)
+    assert (opened.ended.ending, opened.ended.blocks) == ("running", None)
     assert opened.ended.result["verdict"] == "uncertain"
     after = past.runs()[0]
     assert (after.run, after.state, after.received) == (row.run, "complete", outcome.counts.received)

@@ -33,7 +33,7 @@ def test_everything_that_arrived_is_kept_as_it_was(tmp_path: Path) -> None:
         reads = list(reads_of(store, recorder.run))
         batches = list(points_of(store, recorder.run))
         moments = list(arrivals_of(store, recorder.run))
-        rows = unpack_judged(record.body for record in store.records(recorder.run, "deviations"))
+        (rows,) = (unpack_judged(record.body) for record in store.records(recorder.run, "deviations"))
         told = describe(store, recorder.run)
     assert reads == [arrival for arrival in arrivals if isinstance(arrival, WireBytes)]
     sent = [arrival for arrival in arrivals if isinstance(arrival, PointBatch)]

@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import ArrayLike, NDArray
 
 from inspection import Rejection, SectionPlane, ToleranceZone
-from inspection.kernels import Feet, Judgement, judge_rows, take_in
+from inspection.kernels import JUDGED_AS, TALLY, Columns, Feet, Judgement, judge_rows, take_in
 from inspection.result import NOT_JUDGED
 from tests.inspection.profiles import Array
 
@@ -16,7 +16,12 @@ PLANE = SectionPlane(np.array([10.0, -4.0, 7.0]), np.array([0.0, 1.0, 0.0]), np.
 def test_points_are_taken_into_the_plane_and_rejected_for_what_they_are() -> None:
     points = np.array([(10.0, -4.0, 7.0), (10.2, -3.0, 9.0), (10.6, 0.0, 0.0), (9.4, 0.0, 0.0), (np.nan, 0.0, 0.0), (10.0, 0.0, np.inf)])
     section, rejection = np.full((8, 2), -1.0), np.full(8, 77, dtype=np.int8)
-    take_in(points, PLANE.packed, 0.5, section, rejection, 1)
+    columns, places = columns_of(rejection), (np.zeros((9, 2)), np.zeros((9, 2)), np.zeros((9, 2)))
+    take_in(points, PLANE.packed, 0.5, section, columns, places, -1, 1)
+    station, deviation, verdicts, _, tally = columns
+    assert np.isnan(station).tolist() == np.isnan(deviation).tolist() == (verdicts == NOT_JUDGED).tolist() == [False, *[True] * 6, False]
+    assert [np.isnan(place[:, 0]).tolist() for place in places] == [[False, False, *[True] * 6, False]] * 3
+    assert tally.tolist() == [2, 2, 2, *[0] * (TALLY - 3)]
     assert rejection.tolist() == [77, 0, 0, Rejection.OFF_SECTION, Rejection.OFF_SECTION, Rejection.NOT_FINITE, Rejection.NOT_FINITE, 77]
     assert np.array_equal(section[[1, 2]], [(0.0, 0.0), (1.0, 2.0)])
     assert np.array_equal(section[[0, 7]], np.full((2, 2), -1.0))
@@ -30,10 +35,22 @@ def judged(deviation: Array, zone: ToleranceZone, rejection: ArrayLike, vertex: 
     foot, gradient = np.column_stack([x, zero]), np.column_stack([zero, zero + 1.0])
     feet = Feet(x, foot, deviation + 0.25, gradient, zero, x, np.asarray(vertex, dtype=np.uint8))
     codes = np.array(rejection, dtype=np.int8)
-    rows = (np.zeros((m, 2)), np.zeros((m, 2)), np.zeros((m, 2)), np.zeros(m), np.zeros(m), np.zeros(m, dtype=np.int8), codes)
+    columns, places = columns_of(codes), (np.zeros((m, 2)), np.zeros((m, 2)), np.zeros((m, 2)))
+    tally = columns[4]
+    tally[:JUDGED_AS] = np.bincount(codes, minlength=JUDGED_AS)
+    tally[JUDGED_AS] = m  # the verdict 0, until they are judged
     limits: Judgement = (1.0, 0.25, zone.lower_mm, zone.upper_mm, zone.uncertainty_mm)
-    judge_rows(foot, rows, 0, m, (1.0, 0.0, 0.0, 0.0), lambda _: feet, limits)
-    return rows[4], rows[5], rows[6]
+    judge_rows(foot, columns, places, 0, 0, m, (1.0, 0.0, 0.0, 0.0), lambda _: feet, limits)
+    _, found, verdicts, rejections, _ = columns
+    assert tally[:JUDGED_AS].tolist() == np.bincount(rejections, minlength=JUDGED_AS).tolist()
+    assert tally[JUDGED_AS:].tolist() == np.bincount(verdicts[verdicts != NOT_JUDGED], minlength=TALLY - JUDGED_AS).tolist()
+    return found, verdicts, rejections
+
+
+def columns_of(rejection: Codes) -> Columns:
+    """Columns of rows that are not judged yet, and an empty tally."""
+    m = len(rejection)
+    return np.zeros(m), np.zeros(m), np.zeros(m, dtype=np.int8), rejection, np.zeros(TALLY, dtype=np.int64)
 
 
 @pytest.mark.parametrize("uncertainty", [0.0, 0.125])
@@ -70,7 +87,9 @@ def test_rows_are_placed_by_the_pose_and_those_that_cannot_be_used_come_as_nan()
 
     section = np.array([(1.0, 0.0), (2.0, 1.0), (3.0, 0.0), (4.0, 0.0), (5.0, 0.0)])
     rejection = np.array([0, 0, Rejection.NOT_FINITE, Rejection.OFF_SECTION, Rejection.BEYOND_END], dtype=np.int8)
-    rows = (np.zeros((5, 2)), np.zeros((5, 2)), np.zeros((5, 2)), np.zeros(5), np.zeros(5), np.full(5, 55, dtype=np.int8), rejection)
-    judge_rows(section, rows, 1, 5, (0.0, 1.0, 10.0, 20.0), project, (1.0, 0.0, -1.0, 1.0, 0.0))  # a quarter turn, then a shift
+    columns, places = columns_of(rejection), (np.zeros((4, 2)), np.zeros((4, 2)), np.zeros((4, 2)))
+    columns[2][0] = NOT_JUDGED
+    turned = (0.0, 1.0, 10.0, 20.0)  # a quarter turn, then a shift
+    judge_rows(section, columns, places, 1, 1, 5, turned, project, (1.0, 0.0, -1.0, 1.0, 0.0))
     assert np.array_equal(seen[0], [(9.0, 22.0), (np.nan, np.nan), (np.nan, np.nan), (10.0, 25.0)], equal_nan=True)
-    assert rows[5].tolist() == [55, 0, NOT_JUDGED, NOT_JUDGED, 0]
+    assert columns[2].tolist() == [NOT_JUDGED, 0, NOT_JUDGED, NOT_JUDGED, 0]

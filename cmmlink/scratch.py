@@ -1,0 +1,93 @@
+"""Arrays of a long scan on a disk instead of in memory: constant memory beyond `ROWS_IN_MEMORY` points, and room told beforehand.
+
+A long array lies in a file without a name, which is gone with the array or with the program, and is mapped into memory, so that the
+operating system may write it out and read it back. The file is written before it is mapped: a full disk is an error here, and never a
+signal in the middle of a loop.
+"""
+
+import mmap
+import os
+import shutil
+import tempfile
+import weakref
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmmlink.errors import StoreError
+
+ROWS_IN_MEMORY = 1 << 20  # points of a scan that are kept in memory
+RUNNING_BYTES = 170  # of disk that a point may need while it is measured: raw bytes and point in the record, its row and room to grow
+FINISHING_BYTES = 110  # and at the end: its verdict in the record, and what the fits work with
+RESERVE_BYTES = 256 << 20  # of disk that stays free
+_PIECE = bytes(1 << 20)
+_MEND = "Free some space, or keep the records elsewhere with --records DIR"
+
+
+class Scratch:
+    """Gives arrays like numpy.empty; those of more than `rows_in_memory` rows lie in the folder's file system.
+
+    folder : None takes the system's folder for temporary files
+    """
+
+    def __init__(self, folder: Path | None = None, rows_in_memory: int = ROWS_IN_MEMORY) -> None:
+        self.folder = folder if folder is not None else Path(tempfile.gettempdir())
+        self._rows_in_memory = rows_in_memory
+        self._mapped: weakref.WeakSet[mmap.mmap] = weakref.WeakSet()
+
+    def __call__(self, shape: tuple[int, ...], kind: type[np.generic]) -> NDArray[Any]:
+        """An array whose values are not set. Raises StoreError where the disk has no room for it."""
+        if shape[0] <= self._rows_in_memory:
+            return np.empty(shape, kind)
+        self._let_go()
+        try:
+            memory = _mapped_file(self.folder, int(np.prod(shape)) * np.dtype(kind).itemsize)
+        except OSError as error:
+            raise StoreError(f"{self.folder}: a scan of {shape[0]} points does not fit there ({error.strerror}); {_MEND}") from None
+        self._mapped.add(memory)
+        return np.frombuffer(memory, kind).reshape(shape)
+
+    def refusal(self, received: int, announced: int | None = None) -> str:
+        """Why a run cannot go on after so many points, where its disk has no room for the rest of it; nothing where it has."""
+        free = shutil.disk_usage(self.folder).free
+        if free < RESERVE_BYTES + FINISHING_BYTES * received:
+            told = f"only {free / 1e6:.0f} MB are free after {received:,} points; the run ends here so that it can be kept"
+        elif (announced or 0) - received > (fit := points_that_fit(self.folder, received)):
+            told = f"the device announces {announced:,} points and there is room for {received + fit:,}"
+        else:
+            return ""
+        return f"{self.folder}: {told}. {_MEND}"
+
+    def _let_go(self) -> None:
+        """Let the system have the memory of what was mapped so far; what was written stays in the files."""
+        if hasattr(mmap, "MADV_DONTNEED"):
+            for memory in self._mapped:
+                memory.madvise(mmap.MADV_DONTNEED)
+
+
+def points_that_fit(folder: Path, received: int = 0) -> int:
+    """How many more points a run can measure before the disk of a folder, or of the nearest one above it that exists, is full."""
+    nearest = next(path for path in (folder, *folder.parents) if path.exists())
+    free = shutil.disk_usage(nearest).free - RESERVE_BYTES - FINISHING_BYTES * received
+    return max(0, free) // (RUNNING_BYTES + FINISHING_BYTES)
+
+
+def words_of_room(folder: Path) -> str:
+    """How many points fit on the disk of a folder, for people."""
+    fit = points_that_fit(folder)
+    return f"{folder}: room for {fit:,} points, {fit / 36_000_000:.1f} hours at 10,000 points/s"
+
+
+def scratch_in(folder: Path | None) -> Scratch:
+    """Room on the disk of a folder, or with the system's temporary files where nothing can be written there."""
+    return Scratch(folder if folder is not None and folder.is_dir() and os.access(folder, os.W_OK) else None)
+
+
+def _mapped_file(folder: Path, size: int) -> mmap.mmap:
+    with tempfile.TemporaryFile(dir=folder, prefix="cmmlink-") as file:
+        for left in range(size, 0, -len(_PIECE)):
+            file.write(_PIECE[: min(left, len(_PIECE))])
+        file.flush()
+        return mmap.mmap(file.fileno(), size)
