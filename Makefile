@@ -7,7 +7,7 @@ INSTALL := $(PIP) --no-build-isolation --editable
 # The tests start a hundred processes; where Python may keep no compiled files, each of them compiles every file anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo install test lowest platforms upgrade bench paper faults powercuts kills fuzz damage proofs laws audit
+.PHONY: demo install test lowest platforms upgrade bench paper faults powercuts kills fuzz soak damage proofs laws audit
 demo: .venv/installed
 	$(BIN)/cmmlink demo --out demo-result
 
@@ -55,6 +55,11 @@ powercuts: .venv/test-installed
 MINUTES ?= 10
 fuzz: .venv/test-installed
 	$(BIN)/python -m tests.fuzz.grow $(MINUTES) $(TARGETS)
+
+# A station for an hour: a scanner at 10,000 points/s, the console, its record and a page; memory, losses and latency are printed.
+SECONDS ?= 3600
+soak: .venv/test-installed
+	$(BIN)/python -m tests.integration.soak $(SECONDS)
 
 # A hundred recording processes killed at random moments; every acknowledged point must be there.
 kills: .venv/test-installed
