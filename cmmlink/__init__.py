@@ -5,15 +5,30 @@ profile = profile_of(plan)
 with connect(plan) as device:
 run = carry_out(plan, profile, device, records=None, clock=time.monotonic, now=datetime.now, stop=threading.Event())
 run.result_json()["verdict"]
+
+A name is loaded when it is used: the command line begins before its libraries are there.
 """
 
-from cmmlink.devices import Connected, connect
-from cmmlink.errors import PlanError, RunError, StoreError
-from cmmlink.from_plan import profile_of
-from cmmlink.plan import CtPlan, Plan, load_ct_plan, load_plan
-from cmmlink.run import FinishedRun, carry_out
-from cmmlink.stack import StackOutcome, inspect_stack
-from cmmlink.version import __version__
+TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer to load than all of this
+
+if TYPE_CHECKING:
+    from cmmlink.devices import Connected, connect
+    from cmmlink.errors import PlanError, RunError, StoreError
+    from cmmlink.from_plan import profile_of
+    from cmmlink.plan import CtPlan, Plan, load_ct_plan, load_plan
+    from cmmlink.run import FinishedRun, carry_out
+    from cmmlink.stack import StackOutcome, inspect_stack
+    from cmmlink.version import __version__
+
+_PLACES = {
+    "cmmlink.devices": ("Connected", "connect"),
+    "cmmlink.errors": ("PlanError", "RunError", "StoreError"),
+    "cmmlink.from_plan": ("profile_of",),
+    "cmmlink.plan": ("CtPlan", "Plan", "load_ct_plan", "load_plan"),
+    "cmmlink.run": ("FinishedRun", "carry_out"),
+    "cmmlink.stack": ("StackOutcome", "inspect_stack"),
+    "cmmlink.version": ("__version__",),
+}
 
 __all__ = [
     "Connected",
@@ -32,3 +47,12 @@ __all__ = [
     "load_plan",
     "profile_of",
 ]
+
+
+def __getattr__(name: str) -> object:
+    from importlib import import_module  # noqa: PLC0415 - nothing is loaded before a name is used
+
+    for place, names in _PLACES.items():
+        if name in names:
+            return getattr(import_module(place), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,5 +1,54 @@
-"""`python -m cmmlink` is the command `cmmlink`."""
+"""The command `cmmlink`, also as `python -m cmmlink`: what the signals of the system do to it, from its first moment to its last.
 
-from cmmlink.commands import main
+Ctrl-C ends it with exit status 130 and one line, also while libraries are being loaded. A request to end (SIGTERM, a terminal that is
+closed, Ctrl-Break) leaves as an error does: temporary folders are removed, and processes that were started are ended.
+"""
 
-main()
+import os
+import signal
+import sys
+
+_STOPPED = 130
+_REQUESTS = ("SIGTERM", "SIGHUP", "SIGBREAK")  # as far as the system has them
+
+
+def main() -> None:
+    """Run the command line."""
+    interruptible = signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    if interruptible:
+        signal.signal(signal.SIGINT, _end_at_once)
+    from cmmlink.commands import main as run  # noqa: PLC0415 - this takes a second, in which Ctrl-C has to work
+
+    if interruptible:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    for request in (getattr(signal, name) for name in _REQUESTS if hasattr(signal, name)):
+        if signal.getsignal(request) is signal.SIG_DFL:  # else somebody wants it ignored, as nohup does
+            signal.signal(request, _leave)
+    try:
+        run()
+    except KeyboardInterrupt:
+        _say_stopped()
+        sys.exit(_STOPPED)
+    finally:
+        if interruptible:
+            signal.signal(signal.SIGINT, signal.SIG_DFL)  # all is done; what is left is Python's own end
+
+
+def _end_at_once(*_: object) -> None:
+    """Stop while nothing is there yet that would have to be left in order."""
+    _say_stopped()
+    os._exit(_STOPPED)
+
+
+def _leave(number: int, _: object) -> None:
+    raise SystemExit(128 + number)
+
+
+def _say_stopped() -> None:
+    if sys.stderr is not None:
+        sys.stderr.write("cmmlink: stopped by the operator\n")
+        sys.stderr.flush()
+
+
+if __name__ == "__main__":
+    main()

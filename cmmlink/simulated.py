@@ -55,12 +55,24 @@ def _motion(plan: Plan, profile: NominalProfile, seed: int, defect: tuple[float,
 def _simulator(device: str, arguments: Sequence[str]) -> Iterator[str]:
     """Run a simulated device as a process of its own and yield the address that it serves."""
     address = "127.0.0.1:0" if sys.platform == "win32" else "pty"
-    command = [sys.executable, "-m", "simulators", device, "--address", address, *arguments]  # a tenth of what `cmmlink simulate` loads
+    command = [
+        sys.executable,
+        "-m",
+        "simulators",
+        device,
+        "--address",
+        address,
+        *arguments,
+        "--until-stdin-ends",
+    ]  # a tenth of what `cmmlink simulate` loads
     # In a session of its own, so that Ctrl-C reaches only the run, which then stops the device.
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    # It ends with the pipe to its standard input, so that it does not outlive a run that was killed.
+    pipe = subprocess.PIPE
+    process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True, start_new_session=True)
+    assert process.stdin is not None
     assert process.stdout is not None
     assert process.stderr is not None
-    with process.stdout, process.stderr:
+    with process.stdin, process.stdout, process.stderr:
         try:
             served_address = process.stdout.readline().strip()
             if not served_address:

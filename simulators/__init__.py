@@ -7,7 +7,7 @@ with `drivers`, so that a mistake in one is not hidden by the same mistake in th
 from simulators.devices import known_devices
 from simulators.faults import CATALOGUE, Fault, Injector
 from simulators.motion import Motion, Walk, read_path, walk
-from simulators.settings import SimulatorSettings, say, settings_from
+from simulators.settings import SimulatorSettings, end_with_stdin, say, settings_from
 
 __all__ = [
     "CATALOGUE",
@@ -16,6 +16,7 @@ __all__ = [
     "Motion",
     "SimulatorSettings",
     "Walk",
+    "end_with_stdin",
     "known_devices",
     "read_path",
     "say",

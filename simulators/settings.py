@@ -1,7 +1,11 @@
 """What a simulated device is told, from Python or from a command line, and how its parent process hears of it."""
 
 import argparse
+import os
 import sys
+import threading
+import time
+from _thread import interrupt_main
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -14,6 +18,8 @@ from numpy.typing import NDArray
 from simulators.faults import CATALOGUE, Fault
 from simulators.motion import Motion, read_path
 
+_ENDS_WITHIN_S = 0.5
+
 
 @dataclass(frozen=True, slots=True)
 class SimulatorSettings:
@@ -21,6 +27,7 @@ class SimulatorSettings:
 
     address    `pty` or `host:port`; port 0 takes any free one
     path_mm    (k, 2) or (k, 3) points of the path on the part
+    bound      end when standard input does
     paced      take points when they are due by `motion.rate_hz`; otherwise as fast as the client fetches them
     """
 
@@ -29,6 +36,7 @@ class SimulatorSettings:
     motion: Motion
     faults: tuple[Fault, ...] = ()
     paced: bool = True
+    bound: bool = False
 
 
 Announce = Callable[[str], None]
@@ -44,7 +52,9 @@ def settings_from(arguments: Sequence[str], program: str | None = None) -> Simul
     try:
         motion = Motion(**{field.name: given[field.name] for field in fields(Motion) if field.name in given})
         faults = tuple(Fault.parse(text) for text in given["fault"])
-        return SimulatorSettings(given["address"], read_path(given["path"]), motion, faults, not given["unpaced"])
+        return SimulatorSettings(
+            given["address"], read_path(given["path"]), motion, faults, not given["unpaced"], given["until_stdin_ends"]
+        )
     except FileNotFoundError:
         parser.error(f"{given['path']}: no such file")
     except (ValueError, OSError) as error:
@@ -70,6 +80,7 @@ def _parser(program: str | None) -> argparse.ArgumentParser:
     parser.add_argument("--address", required=True, metavar="A", help="pty, or host:port (port 0: any free one)")
     parser.add_argument("--path", required=True, type=Path, metavar="POINTS", help="points of the path on the part, mm")
     parser.add_argument("--fault", action="append", default=[], metavar="NAME[:VALUE][@POINT[-STOP]]", help="may be given several times")
+    parser.add_argument("--until-stdin-ends", action="store_true", help="end when standard input does: with whoever started it")
     parser.add_argument("--unpaced", action="store_true", help="as fast as the client takes the points")
     parser.add_argument("--rate", dest="rate_hz", type=float, default=1000.0, metavar="HZ", help="points per second [%(default)g]")
     parser.add_argument("--speed", dest="speed_mm_s", type=float, default=50.0, metavar="MM_S", help="mm per second [%(default)g]")
@@ -94,6 +105,19 @@ _MILLIMETRES: Mapping[str, str] = MappingProxyType(
         "start": "where along the path the scan begins",
     }
 )
+
+
+def end_with_stdin() -> None:
+    """Interrupt this program once nobody holds the other end of standard input any more; end it at once where that takes long."""
+
+    def wait_for_end() -> None:
+        while os.read(0, 4096):
+            pass
+        interrupt_main()
+        time.sleep(_ENDS_WITHIN_S)
+        os._exit(130)
+
+    threading.Thread(target=wait_for_end, name="parent", daemon=True).start()
 
 
 def say(text: str) -> None:

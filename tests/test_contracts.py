@@ -134,7 +134,7 @@ def test_the_version_stands_in_one_place() -> None:
     assert project["dynamic"] == ["version"]
     assert settings["tool"]["hatch"]["version"]["path"] == "cmmlink/version.py"
     assert re.fullmatch(r"\d+\.\d+\.\d+", cmmlink.__version__)
-    assert project["scripts"] == {"cmmlink": "cmmlink.commands:main"}
+    assert project["scripts"] == {"cmmlink": "cmmlink.__main__:main"}
 
 
 def test_every_library_that_is_imported_is_declared() -> None:

@@ -21,6 +21,8 @@ from cmmlink.report import print_summary, write_run
 from cmmlink.run import FinishedRun
 from inspection import NotMeasured
 
+_STOPPING = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")  # as far as the system has them
+
 
 @dataclass(frozen=True, slots=True)
 class Output:
@@ -89,15 +91,22 @@ def report_outcome(run: FinishedRun, output: Output) -> int:
 
 @contextmanager
 def stop_on_ctrl_c() -> Iterator[threading.Event]:
-    """Yield an event that the first Ctrl-C sets; the second one interrupts as usual."""
+    """Yield an event that the first Ctrl-C sets, or the first request to end; the second one does what it does outside."""
     stop = threading.Event()
 
     def interrupt(*_: object) -> None:
         stop.set()
-        signal.signal(signal.SIGINT, before)
+        restore()
 
-    before = signal.signal(signal.SIGINT, interrupt)
+    def restore() -> None:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+    numbers = [getattr(signal, name) for name in _STOPPING if hasattr(signal, name)]
+    before = {number: signal.getsignal(number) for number in numbers if signal.getsignal(number) != signal.SIG_IGN}
+    for number in before:
+        signal.signal(number, interrupt)
     try:
         yield stop
     finally:
-        signal.signal(signal.SIGINT, before)
+        restore()

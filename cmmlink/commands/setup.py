@@ -126,7 +126,7 @@ def list_ports() -> int:
 
 def simulate(context: typer.Context, device: Annotated[str, typer.Argument(metavar="DEVICE")] = "") -> int:
     """Serve a simulated device."""
-    from simulators import known_devices, say, settings_from  # noqa: PLC0415 - only this command knows simulators
+    from simulators import end_with_stdin, known_devices, say, settings_from  # noqa: PLC0415 - only this command knows simulators
 
     known = known_devices()
     if device in ("-h", "--help"):
@@ -136,6 +136,8 @@ def simulate(context: typer.Context, device: Annotated[str, typer.Argument(metav
         problem = f"no simulated device is called {device}" if device else "name the device to simulate"
         raise PlanError(f"{problem}; known: {', '.join(sorted(known))}; `cmmlink simulate --help` shows their options")
     settings = settings_from(context.args, f"cmmlink simulate {device}")
+    if settings.bound:
+        end_with_stdin()
     try:
         known[device](settings, say)
     except (ValueError, OSError) as error:

@@ -19,7 +19,8 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from threading import Lock
+from queue import SimpleQueue
+from threading import Lock, Thread
 from types import ModuleType, TracebackType
 from typing import IO, Any, Final, Self
 
@@ -262,9 +263,11 @@ def _read_message(pipe: IO[bytes]) -> tuple[dict[str, Any], list[NDArray[Any]]] 
 
 
 def serve() -> None:
-    """Run as the child: load Open3D, say hello, answer until the pipe closes."""
+    """Run as the child: load Open3D, say hello, answer until the pipe closes, and end with it."""
     pipe_in, pipe_out = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what libraries print must not get among the answers
+    questions: SimpleQueue[tuple[dict[str, Any], list[NDArray[Any]]]] = SimpleQueue()
+    Thread(target=_listen, args=(pipe_in, questions), name="questions", daemon=True).start()
     try:
         open3d = load_open3d()
     except Exception as error:
@@ -272,10 +275,17 @@ def serve() -> None:
         _send(pipe_out, {"error": str(error), "installed": installed, "missing": _missing_libraries()}, [])
         return
     _send(pipe_out, {"version": open3d.__version__}, [])
-    while (message := _read_message(pipe_in)) is not None:
-        request, arrays = message
+    while True:
+        request, arrays = questions.get()
         answer, results = _cut(open3d, arrays[0]) if request["do"] == "cut" else _read(open3d, request["path"])
         _send(pipe_out, answer, results)
+
+
+def _listen(pipe: IO[bytes], questions: "SimpleQueue[tuple[dict[str, Any], list[NDArray[Any]]]]") -> None:
+    """Hand on questions. Where the pipe ends nobody waits for an answer: the process ends at once, whatever it works on."""
+    while (message := _read_message(pipe)) is not None:
+        questions.put(message)
+    os._exit(0)
 
 
 def load_open3d() -> ModuleType:
