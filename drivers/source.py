@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 FRAME_REPEATED = "frame repeated"
 POINT_REPEATED = "point repeated"
 VALUE_REPEATED = "value repeated"
+ANOTHER_CONTENT = "number of an earlier point, but not known to be the same point"
 OLDER_THAN_THE_SCAN = "older than the scan"
 HARMLESS_REASONS = frozenset({FRAME_REPEATED, POINT_REPEATED, VALUE_REPEATED, OLDER_THAN_THE_SCAN})
-"""Reasons of `Rejected` by which no point of this scan is missing: repetitions, and what was provably taken before it."""
+"""Reasons of `Rejected` by which no point of this scan is missing: exact repetitions, and what was provably taken before it."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,7 +26,7 @@ import numpy as np
 from drivers.codecs.outbox import Outbox
 from drivers.codecs.sequence import SequenceCounter, WrappingClock
 from drivers.errors import ProtocolError
-from drivers.source import FRAME_REPEATED, Arrival, Damaged, Heartbeat, PointBatch, Rejected, ScanClosed, ScanOpened
+from drivers.source import ANOTHER_CONTENT, FRAME_REPEATED, Arrival, Damaged, Heartbeat, PointBatch, Rejected, ScanClosed, ScanOpened
 
 MM_PER_UNIT = {"mm": 1.0, "um": 1e-3, "cm": 10.0, "m": 1000.0, "inch": 25.4}
 LONGEST_LINE = 256  # bytes before the line feed; anything longer is garbage
@@ -88,7 +88,7 @@ class AsciiDecoder:
     def _take_lines(self, lines: list[bytes]) -> None:
         """Take whole lines: points in sequence here, where speed counts, everything else elsewhere."""
         counter = self._counter
-        expected = counter.expected
+        expected, contents = counter.expected, list[int]()
         for line in lines:
             body = line[:-6]
             found = POINT.fullmatch(body)
@@ -98,15 +98,16 @@ class AsciiDecoder:
                     self._sequence.append(expected)
                     self._raw_us.append(int(raw_us))
                     self._xyz += (float(x), float(y), float(z))
+                    contents.append(hash(body))
                     expected += 1
                     continue
-            counter.expected = expected
+            counter.take(contents)
             self._take_other_line(line)
             if self._out.closed:
                 return
             counter = self._counter
-            expected = counter.expected
-        counter.expected = expected
+            expected, contents = counter.expected, []
+        counter.take(contents)
 
     def _take_other_line(self, line: bytes) -> None:
         """Take a line that is not simply the next good point."""
@@ -142,9 +143,9 @@ class AsciiDecoder:
 
     def _take_point(self, found: re.Match[bytes]) -> None:
         sequence, raw_us, x, y, z, flags = found.groups()
-        place = self._counter.place(int(sequence))
+        place = self._counter.place(int(sequence), content=hash(found[0]))
         if place.repeated:
-            self._out.append(Rejected(1, FRAME_REPEATED))
+            self._out.append(Rejected(1, FRAME_REPEATED if place.same else ANOTHER_CONTENT))
             return
         self._out.append_loss(place.lost)
         if int(flags) & INVALID:

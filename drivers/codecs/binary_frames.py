@@ -27,8 +27,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.codecs.outbox import Outbox
-from drivers.codecs.sequence import MOST_POINTS, SequenceCounter, WrappingClock
-from drivers.source import FRAME_REPEATED, Arrival, Damaged, Heartbeat, PointBatch, Rejected, ScanClosed, ScanOpened
+from drivers.codecs.sequence import MOST_POINTS, SequenceCounter, WrappingClock, contents_of
+from drivers.source import ANOTHER_CONTENT, FRAME_REPEATED, Arrival, Damaged, Heartbeat, PointBatch, Rejected, ScanClosed, ScanOpened
 
 FRAME = np.dtype([("sync", "<u2"), ("type", "u1"), ("flags", "u1"), ("seq", "<u2"), ("t_us", "<u4"), ("xyz", "<i4", 3), ("crc", "<u2")])
 HEAD = np.dtype([("sync", "<u2"), ("n", "<u2"), ("seq", "<u4"), ("t_us", "<u8"), ("crc", "<u2")])
@@ -105,7 +105,7 @@ class BinaryDecoder:
             return 0
         frames = frames[:count]
         self._append_batch(self._counter.expected + np.arange(count), frames["t_us"].astype(np.int64), frames["xyz"])
-        self._counter.expected += count
+        self._counter.take(frames["crc"].astype(np.int64))
         return count * SIZE
 
     def _take_one(self, data: bytes, at: int) -> int:
@@ -149,15 +149,15 @@ class BinaryDecoder:
         near = self._counter.expected + (self._estimate_missed(raw_us) if self._away else 0)
         self._away = False
         sequence = self._hear_counter(int(fields["seq"]), self._counter.unwrap(int(fields["seq"]), near), near)
-        if self._account_for(sequence, int(fields["flags"])):
+        if self._account_for(sequence, int(fields["flags"]), int(fields["crc"])):
             self._append_batch(np.array([self._placed]), np.array([raw_us]), fields["xyz"][None])
 
-    def _account_for(self, sequence: int, flags: int) -> bool:
+    def _account_for(self, sequence: int, flags: int, content: int) -> bool:
         """Account for one frame; tell whether it is a point to hand on."""
-        place = self._counter.place(sequence, near=sequence)
+        place = self._counter.place(sequence, near=sequence, content=content)
         self._placed = place.sequence
         if place.repeated:
-            self._out.append(Rejected(1, FRAME_REPEATED))
+            self._out.append(Rejected(1, FRAME_REPEATED if place.same else ANOTHER_CONTENT))
             return False
         self._out.append_loss(place.lost)
         if flags & INVALID:
@@ -185,13 +185,13 @@ class BinaryDecoder:
 
     def _take_block_points(self, first: int, t_us: NDArray[np.int64], points: NDArray[np.void]) -> None:
         self._away, self._in_blocks = False, True  # the clock of blocks does not wrap
-        count = len(points)
+        count, contents = len(points), contents_of(t_us, *points["xyz"].T, points["flags"])
         if first >= self._counter.expected and not points["flags"].any():
-            self._out.append_loss(self._counter.place(first, near=first).lost)
-            self._counter.expected = first + count
+            self._out.append_loss(self._counter.place(first, near=first, content=int(contents[0])).lost)
+            self._counter.take(contents[1:])
             self._append_batch(first + np.arange(count), t_us, points["xyz"])
             return
-        keep = np.array([self._account_for(first + i, int(flags)) for i, flags in enumerate(points["flags"])])
+        keep = np.array([self._account_for(first + i, int(points["flags"][i]), int(contents[i])) for i in range(count)])
         if keep.any():
             self._append_batch((first + np.arange(count))[keep], t_us[keep], points["xyz"][keep])
 

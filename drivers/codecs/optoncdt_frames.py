@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from drivers.codecs.distances import Distances
 from drivers.codecs.sequence import SequenceCounter, WrappingClock
 from drivers.errors import DeviceRefused, ProtocolError
-from drivers.source import OLDER_THAN_THE_SCAN, VALUE_REPEATED, Arrival, Damaged, Rejected, ScanOpened
+from drivers.source import ANOTHER_CONTENT, OLDER_THAN_THE_SCAN, VALUE_REPEATED, Arrival, Damaged, Rejected, ScanOpened
 
 ERRORS = {
     262075: "too much data for the baud rate",
@@ -156,7 +156,7 @@ class OptoncdtDecoder:
         self._most = min(RUN, max(SHORTEST_RUN, 2 * count))
         if count:
             self._distances.take_many(np.asarray(blocks.ticks)[:count], distance_mm[:count])
-            self._counter.expected += count
+            self._counter.take(np.asarray(blocks.distance)[:count])
             self._last = self._block_of(values[count - 1].tolist())
         return int(count * 3 * values.shape[1])
 
@@ -283,8 +283,9 @@ class OptoncdtDecoder:
         if self._counter is None:
             self._first = counter
             self._counter = SequenceCounter(COUNTER_RANGE, self._first)
-        place = self._counter.place(counter)
-        refusal = VALUE_REPEATED if place.repeated else self._refusal(block)
+        place = self._counter.place(counter, content=value)
+        repeated = VALUE_REPEATED if place.same else ANOTHER_CONTENT
+        refusal = repeated if place.repeated else self._refusal(block)
         distance_mm = None if refusal else self._distance_mm(float(value))
         self._distances.take(place.sequence - self._first, ticks, distance_mm, lost=place.lost, refusal=refusal)
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from drivers.codecs.outbox import LARGEST_MM, NO_PART, Outbox
 from drivers.codecs.register_map import Entries, RegisterField, RegisterMap, equals_pattern
 from drivers.codecs.sequence import MOST_POINTS, SequenceCounter, WrappingClock
-from drivers.source import OLDER_THAN_THE_SCAN, POINT_REPEATED, Heartbeat, PointBatch, Rejected, ScanClosed
+from drivers.source import ANOTHER_CONTENT, OLDER_THAN_THE_SCAN, POINT_REPEATED, Heartbeat, PointBatch, Rejected, ScanClosed
 
 AS_IT_BEGAN = "came as the scan began: whether they are of it or older is not known"
 PATIENCE = 3  # answers in a row that contradict what was read before, until the device is believed to have begun anew
@@ -116,11 +116,13 @@ class RegisterAccount:
             self._first = self._first or 0
             self._counter.expected += count
             return expected
-        counters = values["sequence"].astype(np.int64)
+        counters, contents = values["sequence"].astype(np.int64), _contents(values, count)
         if self._first is not None and np.array_equal(counters, expected % self._counter.modulus):
-            self._counter.expected += count
+            self._counter.take(contents)
             return expected
-        return np.array([self._number_of(int(counter)) for counter in counters], dtype=np.int64)
+        return np.array(
+            [self._number_of(int(counter), content) for counter, content in zip(counters, contents, strict=True)], dtype=np.int64
+        )
 
     def hand_over(self, values: Columns, numbers: NDArray[np.int64]) -> None:
         """Hand over the points that are no repetitions and that the device does not mark invalid."""
@@ -167,8 +169,8 @@ class RegisterAccount:
             self._out.append_loss(self._counter.reach(self._sent))
         self._out.append(ScanClosed(self._sent))
 
-    def _number_of(self, counter: int) -> int:
-        """Account for one point by its counter; return its number, or -1 if it is a repetition."""
+    def _number_of(self, counter: int, content: int) -> int:
+        """Account for one point by its counter and what it holds; return its number, or -1 if it is a repetition."""
         if self._first is None:
             # a device that tells how many it sent begins with 0
             self._first = 0 if self._sent is not None else counter % self._counter.modulus
@@ -177,9 +179,9 @@ class RegisterAccount:
         if self._counter.expected + ahead - self._first > MOST_POINTS:
             self._out.append(Rejected(1, "number that no scan reaches"))
             return -1
-        place = self._counter.place(counter)
+        place = self._counter.place(counter, content=content)
         if place.repeated:
-            self._out.append(Rejected(1, POINT_REPEATED))
+            self._out.append(Rejected(1, POINT_REPEATED if place.same else ANOTHER_CONTENT))
             return -1
         self._out.append_loss(place.lost)
         return place.sequence
@@ -224,6 +226,13 @@ def _makes_sense(field: RegisterField, column: NDArray[np.generic]) -> NDArray[n
         value_mm = np.abs(field.to_unit(column.astype(np.float64)))
         tiny = (column != 0) & (np.abs(column.astype(np.float64)) < TINIEST) if field.type.startswith("float") else np.False_
         return np.asarray((value_mm <= LARGEST_MM) & ~tiny)
+
+
+def _contents(values: Columns, count: int) -> list[int]:
+    """Return of each of `count` points a number that points which differ in a coordinate do not share, but for a rare chance."""
+    raw = [values[name].tobytes() for name in "xyz" if name in values]
+    sizes = [len(data) // count for data in raw] if count else []
+    return [hash(b"".join(data[i * size : (i + 1) * size] for data, size in zip(raw, sizes, strict=True))) for i in range(count)]
 
 
 def _swapped(column: NDArray[np.generic]) -> NDArray[np.generic]:

@@ -1,26 +1,34 @@
 """What a device's running counters say: which frame is new, behind a gap, late or repeated, and at what time it was.
 
 Counters wrap; here they are unwrapped. Every number between the first and the last one seen is either received
-or lost, and a number counted as lost that comes late after all is taken back.
+or lost, and a number counted as lost that comes late after all is taken back. What came with the newest numbers is remembered, so
+that a repetition is told from another point under an old number, as a device sends it that counts anew without saying so.
 """
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 GAPS_REMEMBERED = 4096  # bounds the memory; a frame later than that many gaps counts as repeated
+CONTENTS_REMEMBERED = 512  # of the newest frames; nobody repeats an older one
 MOST_POINTS = 1 << 48  # of a scan: at a million points a second it would last nine years
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a frame stands. `lost` counts the frames missing before it, and is -1 for a late frame."""
+    """Where a frame stands. `lost` counts the frames missing before it, and is -1 for a late frame.
+
+    repeated : its number has been
+    same     : it is known to be the very frame that came under this number; of a frame that is not repeated this says nothing
+    """
 
     sequence: int
     lost: int
     repeated: bool
+    same: bool = True
 
 
 class SequenceCounter:
@@ -31,20 +39,33 @@ class SequenceCounter:
         self.expected = first
         self._lost = first  # what is not received of the numbers below the expected one
         self._gaps: deque[range] = deque(maxlen=GAPS_REMEMBERED)
+        self._numbers = np.full(CONTENTS_REMEMBERED, -1, dtype=np.int64)
+        self._contents = np.zeros(CONTENTS_REMEMBERED, dtype=np.int64)
 
-    def place(self, counter: int, near: int | None = None) -> Place:
-        """Unwrap `counter` to the number closest to `near` (default: the expected one) and account for it."""
+    def place(self, counter: int, near: int | None = None, content: int = 0) -> Place:
+        """Unwrap `counter` to the number closest to `near` (default: the expected one) and account for it.
+
+        content : a number below 2**63 that frames which differ do not share
+        """
         sequence = self.unwrap(counter, near)
         ahead = sequence - self.expected
         if ahead >= 0:
             self._remember(range(self.expected, sequence))
             self._lost += ahead
             self.expected = sequence + 1
+            self._note(sequence, np.array([content], dtype=np.int64))
             return Place(sequence, ahead, repeated=False)
         if self._fill(sequence):
             self._lost -= 1
+            self._note(sequence, np.array([content], dtype=np.int64))
             return Place(sequence, -1, repeated=False)
-        return Place(sequence, 0, repeated=True)
+        at = sequence % CONTENTS_REMEMBERED
+        return Place(sequence, 0, repeated=True, same=bool(self._numbers[at] == sequence and self._contents[at] == content))
+
+    def take(self, contents: Sequence[int] | NDArray[np.int64]) -> None:
+        """Take (m,) frames that are the next ones in order, given by their contents."""
+        self._note(self.expected, np.asarray(contents[-CONTENTS_REMEMBERED:], dtype=np.int64), len(contents))
+        self.expected += len(contents)
 
     def reach(self, counter: int, near: int | None = None) -> int:
         """Take the device's word that `counter` is the next number; return how many frames are newly lost."""
@@ -71,6 +92,12 @@ class SequenceCounter:
         half = self.modulus // 2
         return anchor + (counter - anchor + half) % self.modulus - half
 
+    def _note(self, first: int, contents: NDArray[np.int64], count: int = 1) -> None:
+        """Remember what the last of `count` frames from the number `first` on hold."""
+        numbers = first + count - len(contents) + np.arange(len(contents))
+        self._numbers[numbers % CONTENTS_REMEMBERED] = numbers
+        self._contents[numbers % CONTENTS_REMEMBERED] = contents
+
     def _remember(self, gap: range) -> None:
         if gap:
             self._gaps.append(gap)
@@ -83,6 +110,14 @@ class SequenceCounter:
                 self._remember(range(sequence + 1, gap.stop))
                 return True
         return False
+
+
+def contents_of(*columns: NDArray[np.integer]) -> NDArray[np.int64]:
+    """Return of each of m frames a number that frames which differ in a column (m,) do not share, but for a rare chance."""
+    contents = np.zeros(len(columns[0]), dtype=np.int64)
+    for column in columns:
+        contents = contents * 1_000_003 + column.astype(np.int64)  # an overflow wraps, which is as good
+    return contents
 
 
 class WrappingClock:

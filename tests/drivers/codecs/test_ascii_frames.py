@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from drivers.codecs.ascii_frames import LONGEST_LINE, AsciiDecoder
 from drivers.errors import ProtocolError
-from drivers.source import Damaged, Heartbeat, ScanClosed, ScanOpened
+from drivers.source import ANOTHER_CONTENT, FRAME_REPEATED, Damaged, Heartbeat, ScanClosed, ScanOpened
 from simulators.devices.ascii_scanner import AsciiDevice
 from simulators.stream import Sample
 from tests.drivers.codecs.streams import account, any_cut_is_the_same, crc_bitwise, decoded, flipped, only_sent_points
@@ -239,3 +239,10 @@ def test_an_opening_behind_points_of_an_older_scan_begins_anew() -> None:
     book = any_cut_is_the_same(lambda: AsciiDecoder("mm"), b"".join([*older, data]))
     assert book.sequence == [*range(4, 8), *range(8)]
     assert book.others[-2:] == [ScanOpened("dev", "1", 8), ScanClosed(8)]
+
+
+def test_another_point_under_an_old_number_is_no_repetition() -> None:
+    lines = stream(8)[0].splitlines(keepends=True)
+    book = any_cut_is_the_same(AsciiDecoder, b"".join([*lines[:6], lines[3], line("P,2,1000,1,2,3,0"), *lines[6:]]))
+    assert (book.sequence, book.lost) == (list(range(8)), 0)
+    assert book.counts == {("Rejected", FRAME_REPEATED): 1, ("Rejected", ANOTHER_CONTENT): 1}

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.codecs.sequence import Place, SequenceCounter
+from drivers.codecs.sequence import CONTENTS_REMEMBERED, Place, SequenceCounter
 
 
 def test_in_order_nothing_is_lost() -> None:
@@ -33,6 +33,26 @@ def test_reach_counts_the_tail_once() -> None:
     assert counter.reach(5) == 4
     assert counter.reach(5) == 0
     assert counter.place(3) == Place(3, -1, repeated=False)
+
+
+def test_a_repetition_is_told_from_another_frame_with_an_old_number() -> None:
+    counter = SequenceCounter(65536)
+    counter.take([10, 11, 12])
+    assert counter.place(5, content=15) == Place(5, 2, repeated=False)
+    assert counter.place(4, content=14) == Place(4, -1, repeated=False)
+    for number, content in ((0, 10), (2, 12), (4, 14), (5, 15)):
+        assert counter.place(number, content=content) == Place(number, 0, repeated=True, same=True)
+        assert counter.place(number, content=99) == Place(number, 0, repeated=True, same=False)
+    counter.take(range(2 * CONTENTS_REMEMBERED))
+    assert counter.place(0, content=10) == Place(0, 0, repeated=True, same=False)  # too old to be known
+    newest = counter.expected - 1
+    assert counter.place(newest, content=2 * CONTENTS_REMEMBERED - 1).same
+
+
+def test_a_late_frame_from_before_the_first_one_is_no_repetition() -> None:
+    counter = SequenceCounter(256, first=18)
+    counter.place(18, content=7)
+    assert not counter.place(17, content=7).same
 
 
 @given(st.lists(st.tuples(st.booleans(), st.booleans(), st.booleans()), max_size=300))
