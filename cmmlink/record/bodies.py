@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from cmmlink.errors import StoreError
 from cmmlink.record.shapes import Placed, checked, read_document
 from drivers import Arrival, PointBatch, WireBytes
-from inspection import JudgedRows
+from inspection import NOT_JUDGED, JudgedRows, Rejection, Verdict
 
 POINT_BYTES = 40
 _JUDGED_BYTES = 50
@@ -134,4 +134,7 @@ def unpack_judged(body: bytes) -> JudgedRows:
         return values.reshape(count, width) if width > 1 else values
 
     codes = np.frombuffer(body, np.int8, 2 * count, 48 * count)
-    return JudgedRows(floats(0, 2), floats(2, 2), floats(4, 1), floats(5, 1), codes[:count], codes[count:])
+    verdicts, rejection = codes[:count], codes[count:]
+    if not (np.isin(verdicts, [NOT_JUDGED, *Verdict]).all() and np.isin(rejection, list(Rejection)).all()):
+        raise StoreError("a record of deviations has verdicts or reasons that this version of cmmlink does not know")
+    return JudgedRows(floats(0, 2), floats(2, 2), floats(4, 1), floats(5, 1), verdicts, rejection)

@@ -30,6 +30,7 @@ _NPY_ERRORS = (
     MemoryError,
     RecursionError,
     OverflowError,
+    FloatingPointError,
     tokenize.TokenError,
 )
 _LARGEST_MM = 1e6  # a kilometre: beyond it the unit or the scale is wrong, and a float64 no longer resolves a tenth of a nanometre
@@ -242,7 +243,8 @@ def _read_npy(path: Path, asked: _Asked) -> PointFile:
     The file is mapped first, so that a header that promises too much costs no memory.
     """
     try:
-        array = np.lib.format.open_memmap(path, mode="r")
+        with np.errstate(over="raise"):  # of a size that the header claims
+            array = np.lib.format.open_memmap(path, mode="r")
     except _NPY_ERRORS:
         raise PointFileError("not a readable npy file of numbers; expected an array (m, 2) or (m, 3)") from None
     columns = asked.columns
@@ -251,7 +253,8 @@ def _read_npy(path: Path, asked: _Asked) -> PointFile:
         found = f"{array.dtype} array of shape {array.shape}" if isinstance(array, np.ndarray) else "an archive"
         raise PointFileError(f"{found}; expected numbers of shape (m, 2) or (m, 3)")
     refuse_places(columns, array.shape[1])
-    values = np.array(array, dtype=np.float64)
+    with np.errstate(invalid="ignore", over="ignore"):  # what is no number stays none
+        values = np.array(array, dtype=np.float64)
     _refuse_fewer_than_two(values)
     chosen = axes_of(columns) or dict(zip(("x", "y", "z"), range(values.shape[1]), strict=False))
     kept, marked = _without_marks(values, chosen, asked.invalid)

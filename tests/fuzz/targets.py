@@ -266,6 +266,7 @@ def change_body(data: bytes, rng: Random) -> bytes:
 def _read_bodies(data: bytes, folder: Path) -> None:
     """Put the body into the file and compute the chain anew, as whoever alters a record on purpose would."""
     number, _, digits = data.partition(b" ")
+    altered = int(number) if number.isdigit() else 0
     path = folder / "station.sqlite"
     path.write_bytes(_recorded())
     with closing(sqlite3.connect(path)) as connection, connection:
@@ -274,7 +275,7 @@ def _read_bodies(data: bytes, folder: Path) -> None:
             "SELECT number, run, kind, time_s, count, body, crc32, sha256 FROM record ORDER BY number"
         ).fetchall():
             old = Record(*row)
-            body = bytes.fromhex(digits.decode()) if old.number == int(number) else old.body
+            body = bytes.fromhex(digits.decode()) if old.number == altered else old.body
             new = chain_record(Draft(old.run, old.kind, body, old.count), old.number, old.time_s, previous)  # type: ignore[arg-type]
             connection.execute(
                 "UPDATE record SET body = ?, crc32 = ?, sha256 = ? WHERE number = ?", (new.body, new.crc32, new.sha256, new.number)
