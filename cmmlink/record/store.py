@@ -147,7 +147,7 @@ class Store:
                 found = Alteration(stopped, "", "", f"is missing, as is all up to record {number}: deleted from the end")
             if found is None and run is None:
                 found = self._unsound_file(number)
-        except sqlite3.DatabaseError as error:
+        except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
             return Alteration(0, "", "", f"cannot be read: the file is damaged ({error})"), 0, b""
         return found, stopped - first, last
 
@@ -259,6 +259,8 @@ def _translate_errors(path: Path) -> Iterator[None]:
         yield
     except sqlite3.Error as error:
         raise StoreError(f"{path}: {_reason(error, path)}") from error
+    except UnicodeDecodeError as error:  # where even the names in the file are damaged, its library cannot say what is
+        raise StoreError(f"{path}: the file is damaged; keep it as it is and choose another folder with --records DIR") from error
     except MemoryError as error:
         raise StoreError(f"{path}: this computer has too little memory left; close other programs") from error
 

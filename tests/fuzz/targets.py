@@ -257,16 +257,23 @@ def _bodies() -> list[bytes]:
 
 def change_body(data: bytes, rng: Random) -> bytes:
     """Change the body of one record, as a text or as bytes."""
-    number, _, digits = data.partition(b" ")
-    body = bytes.fromhex(digits.decode()) if digits and not len(digits) % 2 else b""
+    number, body = _body_of(data)
     changed = rng.choice(TREE if body[:1] in b"{[p" else ANY)(body, rng)
-    return number + b" " + changed.hex().encode()
+    return b"%d %s" % (number, changed.hex().encode())
+
+
+def _body_of(data: bytes) -> tuple[int, bytes]:
+    """The number of a record and its body; 0 and all bytes where the input is no such line."""
+    number, _, digits = data.partition(b" ")
+    try:
+        return int(number), bytes.fromhex(digits.decode("ascii"))
+    except ValueError:
+        return 0, data
 
 
 def _read_bodies(data: bytes, folder: Path) -> None:
     """Put the body into the file and compute the chain anew, as whoever alters a record on purpose would."""
-    number, _, digits = data.partition(b" ")
-    altered = int(number) if number.isdigit() else 0
+    altered, changed = _body_of(data)
     path = folder / "station.sqlite"
     path.write_bytes(_recorded())
     with closing(sqlite3.connect(path)) as connection, connection:
@@ -275,7 +282,7 @@ def _read_bodies(data: bytes, folder: Path) -> None:
             "SELECT number, run, kind, time_s, count, body, crc32, sha256 FROM record ORDER BY number"
         ).fetchall():
             old = Record(*row)
-            body = bytes.fromhex(digits.decode()) if old.number == altered else old.body
+            body = changed if old.number == altered else old.body
             new = chain_record(Draft(old.run, old.kind, body, old.count), old.number, old.time_s, previous)  # type: ignore[arg-type]
             connection.execute(
                 "UPDATE record SET body = ?, crc32 = ?, sha256 = ? WHERE number = ?", (new.body, new.crc32, new.sha256, new.number)
