@@ -1,4 +1,4 @@
-"""deviations.csv: one line for every received point."""
+"""deviations.csv: one line for every received point. That of a run that did not come to its end says so in every line."""
 
 import csv
 import math
@@ -22,17 +22,24 @@ COLUMNS = {
 
 _WORDS = {int(verdict): verdict.word for verdict in Verdict}
 
+EARLY_COLUMNS = {
+    **COLUMNS,
+    "ending": "aborted or interrupted: the part has no verdict, and the verdicts on points may be those of a pose that had not settled",
+}
 
-def write_deviations(blocks: Iterable[JudgedRows], path: Path) -> None:
+
+def write_deviations(blocks: Iterable[JudgedRows], path: Path, ending: str = "complete") -> None:
     """Write the actual points in nominal coordinates, their feet, deviations and verdicts; rejected points say why.
 
     blocks : the rows of a result piece by piece, as `InspectionResult.blocks` gives them
+    ending : how the run ended; of one that did not come to its end a last column says so
     """
+    early = () if ending == "complete" else (ending,)
     with path.open("w", newline="", encoding="utf-8") as file:
         writer, index = csv.writer(file), 0
-        writer.writerow(COLUMNS)
+        writer.writerow(EARLY_COLUMNS if early else COLUMNS)
         for rows in blocks:
-            writer.writerows(_lines(rows, index))
+            writer.writerows((*line, *early) for line in _lines(rows, index))
             index += rows.received
 
 

@@ -120,7 +120,10 @@ OBJECTS: tuple[tuple[str, type[BaseModel], type[BaseModel] | None], ...] = (
 )
 
 TABLES: tuple[tuple[str, Mapping[str, str]], ...] = (
-    ("`deviations.csv`: a line for every received point", deviations_csv.COLUMNS),
+    (
+        "`deviations.csv`: a line for every received point (`ending` only of a run that did not come to its end)",
+        deviations_csv.EARLY_COLUMNS,
+    ),
     ("`sections.csv` of `ct`: a line for every section", stack_folder.SECTION_COLUMNS),
     ("`contours.csv` of a section: a line for every contour point", stack_folder.CONTOUR_COLUMNS),
     ("`points.csv` and `points.npy` of `export`: a line for every point", export.POINT_COLUMNS),

@@ -19,8 +19,13 @@ _log = logging.getLogger(__name__)
 def fail(message: str, code: int) -> int:
     """Write a message to standard error, and to the log together with the error being handled. Returns the code."""
     _log.error("%s", message, exc_info=sys.exc_info()[0] is not None)
-    sys.stderr.write(f"cmmlink: {printable(message)}\n")
+    say(message)
     return code
+
+
+def say(message: str) -> None:
+    """Write a message to standard error, whatever signs of a file or a device are quoted in it."""
+    sys.stderr.write(f"cmmlink: {printable(message)}\n")
 
 
 def fail_as_asked(error: Exception, code: int) -> int:

@@ -49,6 +49,7 @@ from cmmlink.report import LiveTable, prepare
 from cmmlink.run import carry_out
 from cmmlink.run_view import RunContext, RunView
 from cmmlink.simulated import connect_demo_device
+from cmmlink.words import printable
 from inspection import FitName, Material, Method, NominalProfile
 
 _PATIENCE_S = 60.0  # files are inspected side by side, and each waits for its turn to be recorded
@@ -170,7 +171,7 @@ def inspect(
 ) -> int:
     """Inspect a file of points, and record it as a run."""
     settings = {
-        "part": {"name": points.stem.strip() or points.name},
+        "part": {"name": printable((points.stem.strip() or points.name).replace("\n", " "))},
         "nominal": {"file": nominal, "scale": scale, "unit": nominal_unit, "closed": closed, "material": material},
         "tolerance": {"lower_mm": tolerance[0], "upper_mm": tolerance[1], "uncertainty_mm": uncertainty},
         "device": {"type": "file", "file": points, "unit": unit, "columns": columns_from(columns), "invalid": invalid or ()},

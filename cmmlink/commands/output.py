@@ -14,7 +14,7 @@ from typing import Any
 import typer
 from rich.console import Console
 
-from cmmlink.commands.exit_codes import DEVICE_FAILED, EXIT_OF, NO_RECORD, UNUSABLE
+from cmmlink.commands.exit_codes import DEVICE_FAILED, EXIT_OF, NO_RECORD, UNUSABLE, say
 from cmmlink.console.launch import graphical_browser
 from cmmlink.errors import StoreError
 from cmmlink.report import print_summary, write_run
@@ -68,7 +68,7 @@ def report_outcome(run: FinishedRun, output: Output) -> int:
     if outcome.ending == "aborted":
         message = message or "stopped by the operator: the scan is not complete"
     if message:
-        sys.stderr.write(f"cmmlink: {message}\n")
+        say(message)
     written: Sequence[str] = ()
     folder: Path | None = None
     try:

@@ -38,7 +38,7 @@ from cmmlink.errors import PlanError
 from cmmlink.plan import CtPlan, CutterName, NominalAt, load_ct_plan
 from cmmlink.report import STYLE_OF, STYLES, prepare, write_stack
 from cmmlink.stack import SectionOutcome, StackOutcome, inspect_stack
-from cmmlink.words import VERDICT_WORDS, headline_of
+from cmmlink.words import VERDICT_WORDS, headline_of, printable
 from drivers import UnitName
 from inspection import FitName, Material, Method
 
@@ -137,7 +137,7 @@ def ct(
     if nominal is None or tolerance is None:
         raise PlanError(f"{mesh}: a surface needs --nominal FILE and --tolerance LO HI")
     settings: dict[str, object] = {
-        "part": {"name": mesh.stem},
+        "part": {"name": printable(mesh.stem.replace("\n", " "))},
         "mesh": {"file": mesh, "scale": mesh_scale, "unit": mesh_unit},
         "nominal": {"file": nominal, "scale": scale, "unit": nominal_unit, "closed": closed, "material": material},
         "tolerance": {"lower_mm": tolerance[0], "upper_mm": tolerance[1], "uncertainty_mm": uncertainty},

@@ -20,7 +20,15 @@ from drivers import AxisName, PointFileError, UnitName, device_address, read_tex
 from inspection import FitName, Material, Method, RuleName, ToleranceZone, WeightName
 
 Vector = tuple[float, float, float]
-Text = Annotated[str, Field(min_length=1)]
+
+
+def _on_one_line(text: str) -> str:
+    if not text.isprintable():
+        raise ValueError("printable text on one line")
+    return text
+
+
+Text = Annotated[str, Field(min_length=1), AfterValidator(_on_one_line)]
 
 
 def _with_known_placeholders(folder: Path) -> Path:

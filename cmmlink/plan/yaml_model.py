@@ -261,5 +261,5 @@ def _shorten(value: Any) -> str:
         return "a mapping"
     if isinstance(value, (list, tuple)):
         return f"a list of {len(value)}"
-    text = str(value)
+    text = str(value).replace("\n", "\\n")
     return f"'{text if len(text) <= 40 else text[:37] + '...'}'"

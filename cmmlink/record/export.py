@@ -78,11 +78,13 @@ def _wire(store: Store, run: str, folder: Path) -> list[Path]:
 
 
 def _result(store: Store, run: str, folder: Path) -> list[Path]:
-    result = recorded_run(store, run).result
-    if result is None:
+    recorded = recorded_run(store, run)
+    if recorded.result is None or recorded.end is None:
         return []
-    write_deviations((unpack_judged(record.body) for record in store.records(run, "deviations")), folder / "deviations.csv")
-    return [folder / "deviations.csv", _json(folder / "result.json", result)]
+    ending = str(recorded.end["state"])
+    blocks = (unpack_judged(record.body) for record in store.records(run, "deviations"))
+    write_deviations(blocks, folder / "deviations.csv", ending)
+    return [folder / "deviations.csv", _json(folder / "result.json", recorded.result | {"ending": ending})]
 
 
 def _json(path: Path, document: Any) -> Path:

@@ -45,8 +45,9 @@ def write_results(
             return ["result.json"]
         from cmmlink.report.picture import write_picture  # noqa: PLC0415 - matplotlib takes half a second that other commands need not pay
 
-        write_deviations(result.blocks(), folder / "deviations.csv")
-        write_picture(result, profile, title, folder / "profile.png", document.get("ending", "complete"), _said_at_foot(document))
+        ending = document.get("ending", "complete")
+        write_deviations(result.blocks(), folder / "deviations.csv", ending)
+        write_picture(result, profile, title, folder / "profile.png", ending, _said_at_foot(document))
     return ["result.json", "deviations.csv", "profile.png"]
 
 

@@ -59,7 +59,7 @@ def write_stack(
             write_contours(section.slice, own / "contours.csv")
             result = section.run.result
             if result is not None and result.judged:
-                write_deviations(result.blocks(), own / "deviations.csv")
+                write_deviations(result.blocks(), own / "deviations.csv", section.run.ending)
                 if pictures:
                     heading = f"{title}, height {section.slice.height_mm:g} mm"
                     write_picture(result, section.profile, heading, own / "profile.png", section.run.ending)

@@ -82,12 +82,12 @@ def print_summary(
     headline = headline_of(verdict, ending if counts.received else "complete", share)
     console.print(f"[{STYLE_OF[headline.shape]}]{headline.words}[/]   {escape(heading)}".rstrip())
     for reason in _reservations(result):
-        console.print(f"  {reason}", style="yellow")
+        console.print(f"  {reason}", style="yellow", markup=False)
     for note in notes:
         console.print(f"  note: {escape(note)}")
     console.print(f"received {counts.received} = judged {counts.judged} + rejected {counts.rejected}; lost {counts.lost} points")
     for reason, count in counts.rejected_by_reason.items():
-        console.print(f"  rejected: {count} {reason}")
+        console.print(f"  rejected: {count} {reason}", markup=False)
     if counts.damaged_bytes:
         console.print(f"  damaged: {counts.damaged_bytes} bytes on the line")
     if result is not None and result.worst is not None:

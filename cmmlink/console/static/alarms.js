@@ -1,6 +1,6 @@
 // The alarms: the most urgent one at the foot of the page, all of them in a list.
 
-import { byId, make, put, showSymbol, within } from "./dom.js";
+import { apart, byId, make, put, showSymbol, within } from "./dom.js";
 import { count } from "./numbers.js";
 
 /** @import { AlarmRow, RunState } from "./protocol.js" */
@@ -39,7 +39,7 @@ function itemOf(alarm) {
  * Which run an alarm belongs to, and when it was raised.
  * @param {AlarmRow} alarm
  */
-export const whose = ({ run, since, current }) => [current ? "" : "earlier run", run, since].filter(Boolean).join(" ");
+export const whose = ({ run, since, current }) => [current ? "" : "earlier run", apart(run), since].filter(Boolean).join(" ");
 
 /** @param {AlarmRow} alarm */
 export function alarmWords({ what, count: times, detail }) {

@@ -1,5 +1,6 @@
 // The card at the right of the page: whose verdict it is, the verdict, and what it rests on.
 
+import { apart } from "./dom.js";
 import { classOf, toleranceUse } from "./points.js";
 import { CODE_OF } from "./verdicts.js";
 
@@ -88,7 +89,7 @@ function cardOfRun(run) {
  * @returns {Card}
  */
 function cardOfNextPart(run, station) {
-  const choice = station?.choice, last = run && [run.serial_number || run.part, run.verdict.word, run.began];
+  const choice = station?.choice, last = run && [apart(run.serial_number || run.part), run.verdict.word, run.began];
   return {
     ...NO_CARD, ...readiness(station), part: choice?.part ?? "", serial: station?.serial_number ?? "",
     names: [choice?.name, station?.operator], before: last ? `Before: ${last.filter(Boolean).join("  \u00b7  ")}` : "",

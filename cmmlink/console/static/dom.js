@@ -1,5 +1,13 @@
 // Elements of the page, and words put into them only where they changed.
 
+const RIGHT_TO_LEFT = /[\u0590-\u08ff\ufb1d-\ufdff\ufe70-\ufefc]/;
+
+/**
+ * A name among other words. One that is read from right to left is set apart, so that it does not turn round what stands beside it.
+ * @param {string} name
+ */
+export const apart = (name) => (RIGHT_TO_LEFT.test(name) ? `\u2068${name}\u2069` : name);
+
 /** @param {string} id */
 export const byId = (id) => elementOf(id, HTMLElement);
 

@@ -567,6 +567,27 @@ def test_no_screen_shows_two_opposite_verdicts(make_bench: MakeBench, tmp_path: 
     keep(second, "replay-on-a-second-page")
 
 
+def test_names_that_look_like_markup_are_shown_as_they_are(make_bench: MakeBench, tmp_path: Path, keep: Keep) -> None:
+    part, serial = "a$_$ [/] <b>x</b> " + "x" * 300, "<i>\u05d7\u05dc\u05e7</i> 7"
+    bench = make_bench(PastRuns(tmp_path / "records", lambda _: None, monotonic, lambda: datetime.now().astimezone()))
+    (plan,) = bench.station._setup.plans().values()
+    text = PLAN.replace("name: blade 7, serial_number: B-0041", f"name: '{part}', serial_number: '{serial}'")
+    plan.write_text(text, encoding="utf-8")
+    page = bench.started()
+    bench.device.source.put(opened(2000), *batches(measured(bench.profile, 2000, seed=1), 200), CLOSED)
+    expect(page.locator("#verdict[data-final=true] .word")).to_have_text("CONFORM")
+    expect(page.locator("#part")).to_have_text(part)
+    expect(page.locator("#serial-number")).to_have_text(serial)
+    assert overflowing(page) == []
+    keep(page, "names")
+    page.keyboard.press("2")
+    expect(page.locator("#before")).to_contain_text(f"Before: \u2068{serial}\u2069")
+    page.keyboard.press("3")
+    expect(page.locator("#runs tbody td").nth(1)).to_have_text(part)
+    expect(page.locator("#runs tbody td").nth(2)).to_have_text(serial)
+    keep(page, "names-history")
+
+
 def test_surface_is_imported_with_progress_and_its_sections_opened(make_bench: MakeBench, tmp_path: Path, keep: Keep) -> None:
     """A tube of the nominal section, 0.1 mm too thick over 20 mm of its outline above height 10 mm."""
     plan = tmp_path / "ct.yaml"
