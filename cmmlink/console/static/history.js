@@ -50,7 +50,7 @@ export class History {
 export function chartWords(runs) {
   const parts = runs.filter((run) => run.counted), bad = parts.filter((run) => run.verdict === "nonconform").length;
   const early = runs.length - parts.length, beside = early ? `; \u00d7 ${early} aborted, interrupted or not measured, not counted` : "";
-  return `${parts.length} parts, ${bad} NOT CONFORM${beside}; newest at the right`;
+  return `${parts.length} part${parts.length === 1 ? "" : "s"}, ${bad} NOT CONFORM${beside}; newest at the right`;
 }
 
 /** @param {RunRow} run */
