@@ -318,7 +318,9 @@ class Exported(_Json):
     """The answer of `export`."""
 
     run: str = Field(description="the id of the run")
-    files: list[str] = Field(description="the files that were written")
+    files: list[str] = Field(
+        description="the files that were written; result.json of a run that did not come to its end has the key `ending` as well"
+    )
 
 
 class Alteration(_Json):

@@ -84,7 +84,10 @@ def _result(store: Store, run: str, folder: Path) -> list[Path]:
     ending = str(recorded.end["state"])
     blocks = (unpack_judged(record.body) for record in store.records(run, "deviations"))
     write_deviations(blocks, folder / "deviations.csv", ending)
-    return [folder / "deviations.csv", _json(folder / "result.json", recorded.result | {"ending": ending})]
+    return [
+        folder / "deviations.csv",
+        _json(folder / "result.json", recorded.result | ({} if ending == "complete" else {"ending": ending})),
+    ]
 
 
 def _json(path: Path, document: Any) -> Path:

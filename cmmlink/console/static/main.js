@@ -22,7 +22,6 @@ import { Timing } from "./timing.js";
 const VIEWS = ["live", "part", "history", "ct"];
 const MOST_MAGNIFICATION = 5000;
 const SLIDER_STEPS = 1000;
-const LONG_AGE = 14; // signs of an age that has a date
 const SAID_MS = 8000; // so long the answer to a command stays
 const SILENT = ["enter", "devices"]; // commands whose success is not worth a word
 
@@ -163,9 +162,7 @@ function paintWords() {
 }
 
 function showAge() {
-  const words = ageWords(cardOf(heard).run, clock.nowMs + performance.now() - clock.at);
-  put("age", words);
-  byId("age").dataset.long = String(words.length > LONG_AGE);
+  put("age", ageWords(cardOf(heard).run, clock.nowMs + performance.now() - clock.at));
 }
 
 /** @param {number} magnification */

@@ -39,12 +39,18 @@ export function showRun(heard) {
   showRemarks(card);
   put("rule", run?.zone.decision_rule ?? "");
   byId("rule").title = run?.zone.decision_rule ?? ""; // a long one is cut
-  document.body.dataset.card = run ? "run" : "summary";
+  document.body.dataset.card = run ? cardKind(run) : "summary";
   showWorst(card);
   showRegistration(run);
   showCoverage(run?.coverage ?? 0, run?.coverage_min ?? 0);
   showNumbers(run);
 }
+
+/**
+ * Of a run of another day nothing goes on now: it has no rate, and the badge says when it was.
+ * @param {RunState} run
+ */
+const cardKind = ({ kind }) => (kind === "replay" || kind === "recorded" ? "past" : "run");
 
 /** @param {Card} shown */
 function showVerdict({ word, shape, final, why, phase }) {
