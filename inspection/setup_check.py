@@ -15,7 +15,7 @@ from inspection.cloud import MANY, Cloud, few_of
 from inspection.coarse import FEWEST_POINTS
 from inspection.deviations import deviations
 from inspection.errors import NotMeasured
-from inspection.far_points import Away, far_points, space_of, words_of_far
+from inspection.far_points import Away, far_points, refuse_beyond_a_kilometre, space_of, words_of_far
 from inspection.fine import MISFIT, register
 from inspection.plane_check import STRAIGHT, check_plane, check_section
 from inspection.registration import Registration, no_outliers
@@ -58,6 +58,7 @@ def check_points(rows: ScanRows, points: Cloud, terms: Terms) -> NDArray[np.bool
     if len(points) < FEWEST_POINTS:
         return no_outliers(len(points))
     space = few_of(space_of(rows, points), len(points))
+    refuse_beyond_a_kilometre(space, len(points))
     away = Away.of(space, terms.nominal)
     far = far_points(rows, points, away)
     if far.any() and not terms.reject_outliers:

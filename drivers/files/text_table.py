@@ -81,7 +81,7 @@ def read_bytes(path: Path) -> bytes:
             raise PointFileError(f"{path}: is a folder; expected a file")
         if path.exists() and not path.is_file():
             raise PointFileError(f"{path}: is not a regular file")
-        return path.read_bytes()
+        return path.read_bytes() if path.stat().st_size else b""  # what the system makes while it is read has no size, and may have no end
     except FileNotFoundError:
         raise PointFileError(f"{path}: no such file") from None
     except (OSError, ValueError) as error:  # ValueError: a NUL in the path, and PointFileError

@@ -91,6 +91,8 @@ def refuse_endless(path: Path) -> None:
     """Raise `MeshError` for what is there and is no file on disk: opening a pipe waits for ever, a device never ends."""
     if path.exists() and not path.is_file() and not path.is_dir():
         raise MeshError(f"{path}: a pipe or a device, not a file; copy the surface into a file first")
+    if path.is_file() and not path.stat().st_size:  # what the system makes while it is read has no size, and may have no end
+        raise MeshError(f"{path}: the file is empty (0 bytes); export the surface again")
 
 
 def read_whole(path: Path) -> bytes:

@@ -1,6 +1,8 @@
 """Coarse poses: every direction without a flip, and what cannot be registered at all."""
 
+import tracemalloc
 from collections.abc import Callable
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -29,6 +31,18 @@ def test_all_360_one_degree_rotations_register_without_a_flip(name: str) -> None
             assert farthest_mm(fine.nominal_from_section, points, best) < 1e-9, degree
         if degree % 60 == 0:
             assert farthest_mm(register(points, nominal).nominal_from_section, points, best) < 1e-9, degree
+
+
+@pytest.mark.parametrize("ratio", [1e3, 1e5, 1e7])
+def test_a_scan_far_larger_than_the_nominal_costs_no_memory(ratio: float) -> None:
+    nominal, points = nominal_of("P1"), measured("P1", 250, 3) * ratio
+    points[1::2] *= -1.0  # to and fro
+    tracemalloc.start()
+    with suppress(RegistrationError):
+        register_coarse(points, nominal)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 30e6
 
 
 CANNOT_BE: dict[str, tuple[Array, str]] = {

@@ -187,6 +187,17 @@ def test_an_uneven_table_is_no_other_plane(nominal: NominalProfile) -> None:
     assert judge(np.column_stack([points, height]), nominal).verdict == Verdict.CONFORM
 
 
+@pytest.mark.parametrize("value", [1e9, 3.4e38])
+@pytest.mark.parametrize("rows", [slice(None), slice(8, None), slice(0, None, 2), slice(0, 200)])
+@pytest.mark.parametrize("columns", [1, 2])
+def test_coordinates_beyond_a_kilometre_are_called_so(nominal: NominalProfile, value: float, rows: slice, columns: int) -> None:
+    points = scan(nominal)
+    points[rows, :columns] = value
+    told = refusal(points, nominal)
+    assert f"{len(points[rows])} of 400 points have coordinates that no part can have" in told
+    assert "word_order" in told
+
+
 @pytest.mark.parametrize("value", [-9999.0, 32767.0, 1e6])
 @pytest.mark.parametrize("fit", ["best-fit", "none"])
 def test_samples_that_mean_no_point_are_named_by_row(nominal: NominalProfile, value: float, fit: str) -> None:
