@@ -7,7 +7,7 @@ INSTALL := $(PIP) --no-build-isolation --editable
 # The tests start a hundred processes; where Python may keep no compiled files, each of them compiles every file anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo install test lowest platforms upgrade bench paper faults powercuts kills fuzz soak damage proofs laws audit
+.PHONY: demo install test lowest platforms upgrade bench paper faults powercuts kills fuzz soak damage proofs laws audit supply-chain
 demo: .venv/installed
 	$(BIN)/cmmlink demo --out demo-result
 
@@ -64,6 +64,10 @@ soak: .venv/test-installed
 # A hundred recording processes killed at random moments; every acknowledged point must be there.
 kills: .venv/test-installed
 	$(BIN)/python -m tests.integration.killed soak 100
+
+# Licences of all that is installed, and known vulnerabilities of what is pinned, as far as the package index can be asked.
+supply-chain: .venv/test-installed
+	.ci/supply-chain $(BIN)
 
 # The file of records damaged in thousands of ways: every command answers in words, and verify calls none of them sound.
 damage: .venv/test-installed
