@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from cmmlink.errors import PlanError
 from cmmlink.plan import Device, FileDevice, ModbusDevice, Plan, SerialDevice, map_of
-from drivers import Decoder, PointFileSource, RegisterDecoder, ScanSource, decoder
+from drivers import Decoder, PointFileSource, RegisterDecoder, ScanSource, decoder, unseen_in
 from drivers.links.axis import Beam, ConstantFeed, FollowedAxis
 from drivers.links.link_settings import LinkSettings
 
@@ -29,10 +29,25 @@ Connect = Callable[[Plan], AbstractContextManager[Connected]]
 def connect(plan: Plan) -> Iterator[Connected]:
     """Make the real device of a plan ready for one scan. Raises PlanError where the plan describes none."""
     source, device = source_of(plan), plan.device
-    notes: tuple[str, ...] = ()
     if isinstance(source, PointFileSource) and isinstance(device, FileDevice):
         notes = tuple(f"{device.file.name}: {note}" for note in source.notes)
+    else:
+        notes = tuple(notes_on(device))
     yield Connected(source, words_of(device), simulated=False, notes=notes)
+
+
+def notes_on(device: Device) -> Iterator[str]:
+    """Say what a device's format cannot show, and what is taken for granted of the axis that moves it."""
+    if isinstance(device, FileDevice):
+        return
+    if isinstance(device, SerialDevice):
+        yield from (f"{device.format}: {words}" for words in unseen_in(device.format))
+    elif not (registers := map_of(device.map)).counts_points:
+        yield f"{registers.device}: the device counts no points, so what lay between two readings is not seen"
+    if device.axis is not None and device.axis.feed_mm_s is not None:
+        yield f"the axis is taken to move at {device.axis.feed_mm_s:g} mm/s all the time, and to stand at zero at the first point that arrives"
+    if device.axis is not None and device.axis.follow is not None:
+        yield from (f"axis: {note}" for note in notes_on(device.axis.follow))
 
 
 def words_of(device: Device) -> str:

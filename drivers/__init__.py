@@ -5,7 +5,7 @@ files of points. What opens a link stays in `drivers.links`, and what cuts surfa
 scipy and Open3D are loaded only by those who import from there.
 """
 
-from drivers.codecs import decoder, decoders
+from drivers.codecs import decoder, decoders, unseen_in
 from drivers.codecs.register_decoder import RegisterDecoder
 from drivers.codecs.register_map import RegisterMap, register_map
 from drivers.errors import DeviceError, DeviceRefused, LinkError, MeshError, PointFileError, ProtocolError
@@ -77,4 +77,5 @@ __all__ = [
     "shipped_map",
     "shipped_maps",
     "shorten",
+    "unseen_in",
 ]

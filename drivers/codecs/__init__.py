@@ -1,10 +1,14 @@
-"""Which wire formats there are: every `*_frames.py` of this package that says `DECODERS`. A new one needs no entry here."""
+"""Which wire formats there are: every `*_frames.py` of this package that says `DECODERS`. A new one needs no entry here.
+
+A format that cannot show every loss or every damage says so in `UNSEEN`, by its name.
+"""
 
 import importlib
 import inspect
 import pkgutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from math import isfinite
+from types import ModuleType
 from typing import get_args
 
 from drivers.source import Decoder
@@ -13,10 +17,20 @@ from drivers.source import Decoder
 def decoders() -> Mapping[str, Callable[..., Decoder]]:
     """Return what makes a decoder, by the name of its format."""
     found: dict[str, Callable[..., Decoder]] = {}
+    for module in _modules():
+        found.update(module.DECODERS)
+    return found
+
+
+def unseen_in(name: str) -> tuple[str, ...]:
+    """Return what the format of this name cannot show, in sentences that belong beside a verdict; none where all shows."""
+    return tuple(getattr(module, "UNSEEN", {})[name] for module in _modules() if name in getattr(module, "UNSEEN", {}))
+
+
+def _modules() -> Iterator[ModuleType]:
     for module in pkgutil.iter_modules(__path__):
         if module.name.endswith("_frames"):
-            found.update(importlib.import_module(f"{__name__}.{module.name}").DECODERS)
-    return found
+            yield importlib.import_module(f"{__name__}.{module.name}")
 
 
 def _require_kind(name: str, option: inspect.Parameter, given: object) -> None:

@@ -185,7 +185,7 @@ class BinaryDecoder:
 
     def _take_block_points(self, first: int, t_us: NDArray[np.int64], points: NDArray[np.void]) -> None:
         self._away, self._in_blocks = False, True  # the clock of blocks does not wrap
-        count, contents = len(points), contents_of(t_us, *points["xyz"].T, points["flags"])
+        count, contents = len(points), contents_of(t_us, points["xyz"])
         if first >= self._counter.expected and not points["flags"].any():
             self._out.append_loss(self._counter.place(first, near=first, content=int(contents[0])).lost)
             self._counter.take(contents[1:])

@@ -296,4 +296,5 @@ class OptoncdtDecoder:
         return "" if block.is_in_range() else "outside the measuring range"
 
 
+UNSEEN = {"optoncdt": "values carry no checksum: a flipped bit shows only as a jump (largest_step_mm)"}
 DECODERS = {"optoncdt": OptoncdtDecoder}

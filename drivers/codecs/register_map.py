@@ -212,6 +212,11 @@ class RegisterMap(_Part):
     pop: PopBlock | None = Field(default=None, description="what takes the oldest message out of a queue")
     points: PointsBlock = Field(description="the points")
 
+    @property
+    def counts_points(self) -> bool:
+        """Whether the points carry a counter, without which a loss does not show."""
+        return "sequence" in self.points.fields or (self.pop is not None and "sequence" in self.pop.fields)
+
     @model_validator(mode="after")
     def _refuse_what_is_missing(self) -> "RegisterMap":
         named = set(self.points.fields) | (set(self.pop.fields) if self.pop else set())

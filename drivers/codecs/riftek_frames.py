@@ -167,4 +167,10 @@ class RiftekAsciiDecoder:
         return self._out.hand_over()
 
 
+UNSEEN = {
+    "riftek": "values are counted modulo 4 and carry no checksum: a loss of 4, 8, ... in a row does not show and shifts those behind it, "
+    "and a flipped bit shows only as a jump (largest_step_mm)",
+    "riftek-ascii": "values carry neither counter nor checksum: one that is lost whole does not show, a flipped digit only as a jump "
+    "(largest_step_mm)",
+}
 DECODERS = {"riftek": RiftekDecoder, "riftek-ascii": RiftekAsciiDecoder}

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 GAPS_REMEMBERED = 4096  # bounds the memory; a frame later than that many gaps counts as repeated
 CONTENTS_REMEMBERED = 512  # of the newest frames; nobody repeats an older one
+_MIXED = np.array([0x9E3779B97F4A7C1, 0x5851F42D4C957F2D, 0x2545F4914F6CDD1D])  # odd multipliers that spread over 64 bits
 MOST_POINTS = 1 << 48  # of a scan: at a million points a second it would last nine years
 
 
@@ -112,12 +113,9 @@ class SequenceCounter:
         return False
 
 
-def contents_of(*columns: NDArray[np.integer]) -> NDArray[np.int64]:
-    """Return of each of m frames a number that frames which differ in a column (m,) do not share, but for a rare chance."""
-    contents = np.zeros(len(columns[0]), dtype=np.int64)
-    for column in columns:
-        contents = contents * 1_000_003 + column.astype(np.int64)  # an overflow wraps, which is as good
-    return contents
+def contents_of(ticks: NDArray[np.int64], xyz: NDArray[np.integer]) -> NDArray[np.int64]:
+    """Return of each of m points a number that points which differ in their time (m,) or place (m, 3) do not share, but for a rare chance."""
+    return np.asarray(xyz.astype(np.int64) @ _MIXED + ticks)  # an overflow wraps, which is as good
 
 
 class WrappingClock:

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from cmmlink.devices import connect, decoder_of, source_of, words_of
+from cmmlink.devices import connect, decoder_of, notes_on, source_of, words_of
 from cmmlink.errors import PlanError
 from cmmlink.plan.scan import Plan
 from drivers import PointFileError, PointFileSource, RegisterDecoder
@@ -55,6 +55,19 @@ def test_a_device_is_called_by_its_type_and_where_it_is(points: dict[str, Any]) 
     ]
     with connect(plan_with(points)) as device:
         assert (device.device, device.simulated) == ("file p.csv", False)
+
+
+def test_what_a_format_cannot_show_and_what_is_taken_of_an_axis_is_noted() -> None:
+    riftek = {"type": "serial", "address": "COM9", "format": "riftek", "options": {"range_mm": 50, "rate_hz": 1000}}
+    uncounted = REGISTERS | {"map": "riftek-rf60x"}
+    assert list(notes_on(plan_with(POSITION).device)) == list(notes_on(plan_with(REGISTERS).device)) == []
+    [modulo, moves] = notes_on(plan_with(riftek | {"axis": {"feed_mm_s": 10}}).device)
+    assert "a loss of 4, 8, ... in a row does not show" in modulo
+    assert moves.startswith("the axis is taken to move at 10 mm/s all the time")
+    [told] = notes_on(plan_with(uncounted | {"axis": {"follow": POSITION}}).device)
+    assert "counts no points" in told
+    with connect(plan_with(SENSOR | {"axis": {"follow": riftek}})) as device:
+        assert [note.partition(":")[0] for note in device.notes] == ["optoncdt", "axis"]
 
 
 def test_a_device_that_cannot_be_is_a_wrong_plan() -> None:
