@@ -45,7 +45,7 @@ def notes_on(device: Device) -> Iterator[str]:
     elif not (registers := map_of(device.map)).counts_points:
         yield f"{registers.device}: the device counts no points, so what lay between two readings is not seen"
     if device.axis is not None and device.axis.feed_mm_s is not None:
-        yield f"the axis is taken to move at {device.axis.feed_mm_s:g} mm/s all the time, and to stand at zero at the first point that arrives"
+        yield f"the axis is taken to move at {device.axis.feed_mm_s:g} mm/s all the time, and to begin at zero with the first point"
     if device.axis is not None and device.axis.follow is not None:
         yield from (f"axis: {note}" for note in notes_on(device.axis.follow))
 

@@ -114,7 +114,7 @@ class SequenceCounter:
 
 
 def contents_of(ticks: NDArray[np.int64], xyz: NDArray[np.integer]) -> NDArray[np.int64]:
-    """Return of each of m points a number that points which differ in their time (m,) or place (m, 3) do not share, but for a rare chance."""
+    """Return a number for each of m points that points with another time (m,) or place (m, 3) do not share, but for a rare chance."""
     return np.asarray(xyz.astype(np.int64) @ _MIXED + ticks)  # an overflow wraps, which is as good
 
 
