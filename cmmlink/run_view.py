@@ -337,7 +337,7 @@ class RunView:
         if not self._counts.judged:
             seeking = self._update is not None and self._update.state == "seeking"
             return _state_of(unproven, False, "seeking the part" if seeking else "waiting for points")
-        return _state_of(unproven, False, f"{self._coverage:.0%} measured, none out so far")
+        return _state_of(unproven, False, f"{math.floor(100 * self._coverage)} % measured, none out so far")
 
 
 def _state_of(headline: Headline, final: bool, why: str, further: Sequence[str] = ()) -> VerdictState:
