@@ -36,7 +36,7 @@ class Closest:
     gap_mm: Array
 
 
-def closest_point(curve: NurbsCurve, points_mm: Array, chunk: int = 200) -> Closest:
+def closest_point(curve: NurbsCurve, points_mm: Array, chunk: int = 400) -> Closest:
     points = np.asarray(points_mm, dtype=float)
     start, end = _intervals(curve)
     parts = [_closest(curve, start, end, points[k : k + chunk]) for k in range(0, len(points), chunk)]
@@ -96,16 +96,18 @@ def _roots(curve: NurbsCurve, points: Array, row: Index, a: Array, b: Array) -> 
     at_start, at_end = _tangential(curve, points[row], a)[0], _tangential(curve, points[row], inside)[0]
     turn = (at_start <= 0) & (at_end >= 0)
     row, low, high = row[turn], a[turn].copy(), inside[turn].copy()
-    u = (low + high) / 2
+    u, open_ones = (low + high) / 2, np.arange(len(row))
     for _ in range(80):
-        value, slope = _tangential(curve, points[row], u)
-        low, high = np.where(value <= 0, u, low), np.where(value >= 0, u, high)
+        at = u[open_ones]
+        value, slope = _tangential(curve, points[row[open_ones]], at)
+        low[open_ones], high[open_ones] = np.where(value <= 0, at, low[open_ones]), np.where(value >= 0, at, high[open_ones])
+        least, most = low[open_ones], high[open_ones]
         with np.errstate(divide="ignore", invalid="ignore"):
-            step = u - value / slope
-        new = np.where((step >= low) & (step <= high) & (slope > 0), step, (low + high) / 2)
-        if np.array_equal(new, u):
+            step = at - value / slope
+        u[open_ones] = np.where((step >= least) & (step <= most) & (slope > 0), step, (least + most) / 2)
+        open_ones = open_ones[(u[open_ones] != at) & (np.nextafter(least, most) < most)]
+        if not len(open_ones):
             break
-        u = new
     return row, u
 
 

@@ -7,7 +7,7 @@ The other airfoils are read from coordinate files beside the checkout, because s
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -211,10 +211,14 @@ def offset_points(curve: NurbsCurve, u: Array, offset_mm: ArrayLike) -> Array:
 
 def even_in_arc_length(curve: NurbsCurve, count: int) -> Array:
     """Parameters of points even in arc length, the seam or the ends left out by half a step."""
-    first, last = curve.domain
-    u = np.linspace(first, last, 20_001)
-    wanted = (np.arange(count) + 0.5) / count * curve.length_mm
-    return np.asarray(np.interp(wanted, curve.station_mm(u), u))
+    u, station_mm = _stations(curve)
+    return np.asarray(np.interp((np.arange(count) + 0.5) / count * curve.length_mm, station_mm, u))
+
+
+@lru_cache(maxsize=64)
+def _stations(curve: NurbsCurve) -> tuple[Array, Array]:
+    u = np.linspace(*curve.domain, 20_001)
+    return u, curve.station_mm(u)
 
 
 def rotated(points_mm: Array, rotation_deg: float, translation_mm: ArrayLike = (0.0, 0.0)) -> Array:

@@ -45,7 +45,7 @@ class Neighbourhood:
     """Pieces with the ones before and after them, which are the only places where a foot is accepted without a search."""
 
     def __init__(self, curve: NurbsCurve) -> None:
-        self.curve, self.pieces = curve, cut_into_pieces(curve)
+        self.curve, self.pieces, self.samples = curve, cut_into_pieces(curve), dict[int, Array]()
         rows = self.pieces.rows
         self.first = rows[:, layout.PIECE_U] + rows[:, layout.PIECE_U_PER_T] * rows[:, layout.PIECE_FIRST]
         self.last = rows[:, layout.PIECE_U] + rows[:, layout.PIECE_U_PER_T] * rows[:, layout.PIECE_LAST]
@@ -62,8 +62,9 @@ class Neighbourhood:
     def has_foot(self, piece: int, place: Array) -> bool:
         """Whether the distance of the place has a local minimum on the piece or beside it, a vertex included."""
         for p in self.of(piece):
-            u = np.clip(np.linspace(self.first[p], self.last[p], 200), *self.curve.domain)
-            point, velocity = self.curve.derivatives(u, 1)
+            if p not in self.samples:
+                self.samples[p] = self.curve.derivatives(np.clip(np.linspace(self.first[p], self.last[p], 200), *self.curve.domain), 1)
+            point, velocity = self.samples[p]
             along = ((point - place) * velocity).sum(axis=1)
             ends_first, ends_last = self.pieces.before[p] < 0 and along[0] >= 0, self.pieces.after[p] < 0 and along[-1] <= 0
             if ends_first or ends_last or ((along[:-1] < 0) & (along[1:] >= 0)).any():
