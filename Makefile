@@ -7,7 +7,7 @@ INSTALL := $(PIP) --no-build-isolation --editable
 # The tests start a hundred processes; where Python may keep no compiled files, each of them compiles every file anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo install test lowest platforms upgrade bench paper faults powercuts kills fuzz soak damage proofs laws audit supply-chain
+.PHONY: demo install test checks compiled lowest platforms upgrade bench paper faults powercuts kills fuzz soak damage proofs laws audit supply-chain
 demo: .venv/installed
 	$(BIN)/cmmlink demo --out demo-result
 
@@ -16,13 +16,19 @@ install: .venv/all-installed
 # A file stays with one process, which so prepares its nominals and its browser once; tests/conftest.py has the order.
 TWO_AT_ONCE := -n 2 --dist loadfile --no-loadscope-reorder
 
-test: .venv/test-installed
+test: checks compiled
+	$(BIN)/pytest $(TWO_AT_ONCE) $(PYTEST_OPTIONS)
+	@tests/page/check $(PAGE_OPTIONS)
+
+checks: .venv/test-installed
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/pytest $(TWO_AT_ONCE) $(PYTEST_OPTIONS)
-	@tests/page/check $(PAGE_OPTIONS)
+
+# Tests have a time limit each, and the first one would have to compile the inspection; `make -j 2` does it beside the checks.
+compiled: .venv/test-installed
+	$(BIN)/python -m tests.benchmarks.warm_up
 
 # The lowest versions that pyproject.toml allows, on Python 3.11 and without the extras, must pass the fast tests: the first case of
 # every test of the four packages, but for the files that are about processes: browser, console, streams of a command, compiled code.
@@ -30,6 +36,7 @@ LOWEST_PYTHON ?= python3.11
 PACKAGES := inspection drivers simulators cmmlink
 OF_PROCESSES := cmmlink/console/test_console_browser.py cmmlink/console/test_launch.py cmmlink/commands/test_main.py inspection/kernels/test_compiling.py
 lowest: .venv/lowest/installed
+	.venv/lowest/bin/python -m tests.benchmarks.warm_up
 	.venv/lowest/bin/python -m pytest $(TWO_AT_ONCE) --first-case $(PACKAGES:%=tests/%) $(OF_PROCESSES:%=--ignore=tests/%)
 
 # For every system of the README the versions of constraints.txt must exist as wheels.

@@ -1,4 +1,4 @@
-"""Compiles what a benchmark measures before it measures."""
+"""Compiles the inspection before a benchmark measures it, or before tests that have a time limit. `python -m tests.benchmarks.warm_up`"""
 
 from typing import get_args
 
@@ -12,3 +12,7 @@ def compile_kernels() -> None:
     nominal = discretize(profiles.p3(), samples=400)
     for method in get_args(Method):
         rehearse(nominal, method, reject_outliers=True)
+
+
+if __name__ == "__main__":
+    compile_kernels()
