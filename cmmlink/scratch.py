@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from cmmlink.errors import StoreError
 
-ROWS_IN_MEMORY = 1 << 20  # points of a scan that are kept in memory
+ROWS_IN_MEMORY = 1 << 18  # points of a scan that are kept in memory: 26 s at 10,000 points/s
 RUNNING_BYTES = 170  # of disk that a point may need while it is measured: raw bytes and point in the record, its row and room to grow
 FINISHING_BYTES = 110  # and at the end: its verdict in the record, and what the fits work with
 RESERVE_BYTES = 256 << 20  # of disk that stays free

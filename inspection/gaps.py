@@ -122,7 +122,8 @@ def weigh_by_station(station_mm: Array, weights: Array, nominal: NominalProfile,
     in one place share what that place stands for, so that neither dwelling nor a dense side draws the fit to itself. Points that
     take no part have no station, but NaN: they get weight 1 where their weight is not 0.
     """
-    np.copyto(weights, 1.0, where=weights > 0)
+    for part in row_blocks(len(weights)):
+        weights[part] = np.where(weights[part] > 0, 1.0, 0.0)
     sides, count = room((len(station_mm),), np.float64), 0  # one after the other, for their sum depends on its order
     for rows, share in _sides_in_order(station_mm, nominal, room):
         sides[count : count + len(rows)] = weights[rows] = share

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from inspection.cloud import MANY
+from inspection.cloud import MANY, row_blocks
 from inspection.errors import RegistrationError
 from inspection.placements import PlacementSearch
 from inspection.result import NOT_JUDGED
@@ -78,6 +78,9 @@ def prefix_of(rows: ScanRows, pose: RigidTransform, slide_mm: float, terms: Term
     slide_mm : how far the pose may still slide along the profile at its open ends (95 %)
     """
     count = rows.count
+    far = [np.fmax.reduce(np.abs(rows.deviation[part] - terms.target_mm), initial=0.0) for part in row_blocks(count)]
+    if max(far, default=0.0) <= _half_mm(terms):
+        return None
     if count > MANY:
         judged = telling_rows(rows.station[:count], rows.deviation[:count], terms.nominal.length_mm, MANY // 64)
     else:

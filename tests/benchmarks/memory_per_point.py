@@ -3,9 +3,9 @@
     python -m tests.benchmarks.memory_per_point 1e6 4e6 1.6e7 3.6e7
 
 A source gives batches of 1,000 points of a profile with form, noise and rows that are rejected, without a wire, as fast as they are
-taken. Memory is what the process holds for itself (RssAnon of /proc/self/status, sampled every 20 ms, less what it held before the
-first point); what of files is mapped into it the system may drop at any time, and is told beside it, as is the largest resident set.
-On systems without /proc only the largest resident set is told.
+taken and not faster. Memory is what the process holds for itself (RssAnon of /proc/self/status, sampled every 20 ms, less what it held
+before the first point); what of files is mapped into it the system may drop at any time, and is told beside it, as is the largest
+resident set. On systems without /proc only the largest resident set is told.
 """
 
 import json
@@ -24,6 +24,7 @@ import numpy as np
 from cmmlink.console.past_runs import PastRuns
 from cmmlink.demo import plan_file
 from cmmlink.devices import Connected
+from cmmlink.events import Arrived, Event
 from cmmlink.from_plan import profile_of
 from cmmlink.plan import Plan, load_plan
 from cmmlink.record import describe, export_run, find_run, open_to_read, recorded_run, replay_run
@@ -35,9 +36,10 @@ from inspection import NominalProfile, RigidTransform
 from tests.benchmarks.machine import machine
 
 BATCH = 1000
+AHEAD = 20  # batches that wait for the run at most: a device that sends 10,000 points/s is not far ahead either
 ROUND = 100_000  # points once round the profile
 WAVES = ((0.006, 3), (0.004, 11))  # height in mm and number of the form's waves
-STEPS = ("run", "replay", "export", "show")
+STEPS = ("run", "show", "export", "replay")
 
 
 class Rounds:
@@ -53,7 +55,12 @@ class Rounds:
         self._normal = profile.outward * np.column_stack([np.interp(station, known, n) for n in profile.normal.T])
         self._path = curve.point(u) + form[:, None] * self._normal
         self._place = RigidTransform(0.3, np.array([20.0, -7.0]))
-        self._stopped = threading.Event()
+        self._stopped, self._waiting = threading.Event(), threading.Semaphore(AHEAD)
+
+    def take(self, event: Event) -> None:
+        """Let the next batch come once one was taken: a sink of the run."""
+        if isinstance(event, Arrived) and isinstance(event.arrival, PointBatch):
+            self._waiting.release()
 
     def arrivals(self) -> Iterator[Arrival]:
         """Yield the points in batches."""
@@ -62,6 +69,7 @@ class Rounds:
         for first in range(0, self._points, BATCH):
             if self._stopped.is_set():
                 return
+            self._waiting.acquire()
             count = min(BATCH, self._points - first)
             rows = (first + np.arange(count)) % ROUND
             points = self._place.apply(self._path[rows] + rng.normal(0, 0.001, (count, 1)) * self._normal[rows])
@@ -113,22 +121,24 @@ def now() -> datetime:
 
 
 def the_plan(records: Path) -> Plan:
-    """The demonstration's plan, with its records in a folder."""
-    return load_plan(plan_file()).model_copy(update={"records": records})
+    """The demonstration's plan without its ball, with its records in a folder."""
+    plan = load_plan(plan_file())
+    return plan.model_copy(update={"records": records, "probe": plan.probe.model_copy(update={"tip_radius_mm": 0.0})})
 
 
 def acquire(points: int, folder: Path, profile: NominalProfile, plan: Plan) -> str:
     """Measure so many points with everything that a run has: record, page's view, result files."""
     view = RunView(RunContext.of(plan, profile, now(), "1", "memory"), time.monotonic, now)
+    source = Rounds(profile, points)
     finished = carry_out(
         plan,
         profile,
-        Connected(Rounds(profile, points), "rounds", simulated=True),
+        Connected(source, "rounds", simulated=True),
         records=folder,
         clock=time.monotonic,
         now=now,
         stop=threading.Event(),
-        sinks=[view],
+        sinks=[view, source.take],
     )
     if points >= ROUND:
         write_run(folder / "out", finished)
@@ -163,7 +173,7 @@ def show(points: int, folder: Path, profile: NominalProfile, plan: Plan) -> str:
     return f"{told['received']} received, {len(past.runs())} runs"
 
 
-STEP_OF: dict[str, Callable[[int, Path, NominalProfile, Plan], str]] = dict(zip(STEPS, (acquire, replay, export, show), strict=True))
+STEP_OF: dict[str, Callable[[int, Path, NominalProfile, Plan], str]] = dict(zip(STEPS, (acquire, show, export, replay), strict=True))
 
 
 def measure(step: str, points: int, folder: Path) -> dict[str, object]:

@@ -96,3 +96,24 @@ def test_a_device_that_never_opened_gives_no_run_and_no_result(tmp_path: Path) -
     assert not finished.outcome.measured
     assert finished.evidence is None
     assert list_runs(tmp_path, today) == []
+
+
+def test_a_run_ends_with_a_result_when_the_disk_has_no_room_for_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cmmlink.pipeline._ROOM_EVERY", 100)
+    told = threading.Event()
+
+    def refuse(_: object, received: int, announced: int | None) -> str:
+        if received > 300:
+            told.set()
+        return "the disk is full" if received > 300 else ""
+
+    monkeypatch.setattr("cmmlink.scratch.Scratch.refusal", refuse)
+    finished = run(Script(*scan_arrivals(2000)[:20], lambda: told.wait(30), *scan_arrivals(2000)), tmp_path)
+    assert finished.outcome.ending == "interrupted"
+    assert isinstance(finished.outcome.failure, StoreError)
+    assert str(finished.outcome.failure) == "the disk is full"
+    document = finished.result_json()
+    assert 300 < document["received"] < 2000
+    assert document["verdict"] == "uncertain"
+    (entry,) = list_runs(tmp_path, today)
+    assert (entry["state"], entry["received"]) == ("interrupted", document["received"])

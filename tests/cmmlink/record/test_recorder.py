@@ -2,7 +2,7 @@
 
 import sqlite3
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from pathlib import Path
 
@@ -12,7 +12,18 @@ import pytest
 from cmmlink.errors import StoreError
 from cmmlink.events import Arrived, Event, Judged, RunFinished, RunStarted
 from cmmlink.record.bodies import POINT_BYTES, unpack_judged
-from cmmlink.record.reader import arrivals_of, describe, list_runs, open_to_read, points_of, reads_of, registrations_of
+from cmmlink.record.chain import Draft, Record
+from cmmlink.record.reader import (
+    arrivals_of,
+    check_chain,
+    describe,
+    list_runs,
+    open_to_read,
+    points_of,
+    reads_of,
+    recorded_run,
+    registrations_of,
+)
 from cmmlink.record.recorder import Acknowledged, Recorder, RunInputs
 from cmmlink.record.store import FILE_NAME, Store
 from drivers.source import Arrival, Heartbeat, PointBatch, WireBytes
@@ -162,3 +173,32 @@ def test_a_result_that_cannot_be_recorded_is_not_given(tmp_path: Path) -> None:
         connection.execute("DROP TRIGGER full")
     (entry,) = list_runs(tmp_path, today)
     assert (entry["state"], entry["received"], entry["verdict"]) == ("interrupted", 612, None)
+
+
+def test_a_run_killed_between_its_judged_rows_and_its_result_was_interrupted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cmmlink.record.recorder.JUDGED_ROWS", 100)
+    monkeypatch.setattr("cmmlink.record.recorder._JUDGED_BODIES", 2)
+    whole, recorder = record(tmp_path / "whole", Script(*scan_arrivals()))
+    assert whole.result is not None
+    with open_to_read(tmp_path / "whole", today) as store:
+        counts = [record.count for record in store.records(recorder.run, "deviations")]
+        found = np.concatenate([unpack_judged(record.body).deviation_mm for record in store.records(recorder.run, "deviations")])
+    assert counts[:-1] == [100] * (len(counts) - 1)
+    assert np.array_equal(found, whole.result.deviation_mm, equal_nan=True)
+    pack = Store.append
+
+    def cut_off(store: Store, drafts: Sequence[Draft]) -> list[Record]:
+        if any(draft.kind == "result" for draft in drafts):
+            raise StoreError("the power is gone")
+        return pack(store, drafts)
+
+    monkeypatch.setattr(Store, "append", cut_off)
+    with pytest.raises(StoreError, match="the power is gone"):
+        record(tmp_path / "cut", Script(*scan_arrivals()))
+    monkeypatch.undo()
+    with open_to_read(tmp_path / "cut", today) as store:
+        (begin, end) = store.begins_and_ends()[0]
+        assert end is not None
+        assert recorded_run(store, str(begin.run)).result is None
+        assert store.totals(str(begin.run))["deviations"][1] == len(found)
+        assert check_chain(store, None)["altered"] is False
