@@ -12,6 +12,7 @@ from inspection import NominalError
 
 _LEFT_OUT = "#"
 _COMMENT_STARTS = ("#", "%", "!", "/")
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][-+]?\d+)?")
 _FEWEST_ROWS = 3  # a table: fewer rows of numbers before words may be part of a title
 
 
@@ -51,12 +52,19 @@ def _blank_title(lines: list[str], numbers: list[list[float]], notes: list[str])
     if columns[0] == 0 or columns[0] not in (2, columns[-1]):
         title, number = lines[filled[0]].strip(), filled[0] + 1
         notes.append(f"title: {title[:60]}")
-        begins = numbers_of(" ".join(_words(title)[:2])) if columns[0] == 0 else []
+        begins = (numbers_of(" ".join(_words(title)[:2])) or _numbers_in_disguise(title)) if columns[0] == 0 else []
         lines[filled[0]] = _LEFT_OUT
     if len(filled) > 2 and columns[1] in (4, 5) and columns[2] == 2:
         notes.append(f"line {filled[1] + 1}: {columns[1]} numbers, the limits of a flow grid, left out")
         lines[filled[1]] = _LEFT_OUT
     return number, tuple(begins) if len(begins) == 2 else ()
+
+
+def _numbers_in_disguise(title: str) -> list[float]:
+    """Two numbers with brackets, units or letters about them, like (1.0, 0.0) or 1.0f 0.0f; none where words say more."""
+    found = _NUMBER.findall(title)
+    rest = _NUMBER.sub("", title)
+    return numbers_of(" ".join(found)) if len(found) == 2 and not re.search(r"[^\W\d_]{3}", rest) else []
 
 
 def _blank_words_behind(lines: list[str], last_row: int, notes: list[str]) -> None:

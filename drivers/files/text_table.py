@@ -64,7 +64,7 @@ def read_text(path: Path) -> str:
         text = data.decode("utf-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
     except UnicodeDecodeError:
         text = data.decode("latin-1")
-    text = text.replace("\r\n", "\n").replace("\r", "\n").rstrip("\x1a\0")  # the end marks of old systems
+    text = text.replace("\u2212", "-").replace("\r\n", "\n").replace("\r", "\n").rstrip("\x1a\0")  # the end marks of old systems
     strange = re.search(r"[\x00-\x08\x0e-\x1f\x7f]", text)
     if strange:
         line = text.count("\n", 0, strange.start()) + 1

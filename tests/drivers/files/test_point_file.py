@@ -138,6 +138,7 @@ def test_words_behind_the_last_row_are_left_out_and_noted(tmp_path: Path, words:
 
 
 PLAIN = {
+    "minus signs": "1.5 \u22122.25 0.5\n3 4.125 0.5\n0.001 100 \u22120.25\n",
     "remarks of percent": "1.5 -2.25 0.5 % p0\n3 4.125 0.5 % p1\n0.001 100 -0.25 % p2\n",
     "bars": "| x | y | z |\n|---|---|---|\n| 1.5 | -2.25 | 0.5 |\n| 3 | 4.125 | 0.5 |\n| 0.001 | 100 | -0.25 |\n",
     "quoted header": '"x","y","z"\n1.5,-2.25,0.5\n3,4.125,0.5\n0.001,100,-0.25\n',
