@@ -28,10 +28,10 @@ _KEYWORDS: Final = {
     11: b"vertex", 15: b"vertex", 19: b"endloop", 20: b"endfacet",
 }  # fmt: skip
 _CORNER_WORDS: Final = (8, 9, 10, 12, 13, 14, 16, 17, 18)
-_SOLID_LINES: Final = re.compile(rb"^[ \t]*(?:end[ \t]*)?solid\b[^\r\n]*", re.MULTILINE)
-_COMMENTS: Final = re.compile(rb"^[ \t]*(?:#|//|;|!|%)[^\r\n]*", re.MULTILINE)
-_FIRST_SOLID: Final = re.compile(rb"^[ \t]*solid\b", re.MULTILINE | re.IGNORECASE)
-_START_BYTES: Final = 4096  # words before `solid` are looked for so far
+_SOLID_LINES: Final = re.compile(rb"^[ \t]*(?:end[ \t]*)?solid\b(?:(?!\sfacet\s+normal\b)[^\n])*", re.MULTILINE)  # a name ends at a facet
+_COMMENTS: Final = re.compile(rb"^[ \t]*(?:#|//|;|!|%)[^\n]*", re.MULTILINE)
+_BEGINNING: Final = re.compile(rb"^[ \t]*(?:solid\b|facet\s+normal\b)", re.MULTILINE | re.IGNORECASE)
+_START_BYTES: Final = 1 << 16  # words before `solid` are looked for so far
 _STEP_TOLD_MM: Final = 1e-3  # steps of float32 are that long from 16,384 mm on
 
 
@@ -75,6 +75,8 @@ def read_stl(path: Path, scale: float = 1.0) -> SurfaceMesh:
     if promised is not None and size == HEADER_BYTES + RECORD.itemsize * promised:
         mesh = _check(lambda: _binary_pieces(path, promised, scale), str(path), "binary STL")
         return replace(mesh, warnings=rounding_note(mesh, scale))
+    if start[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        raise MeshError(f"{path}: the text is written in UTF-16; save it as plain text (UTF-8), or export it as binary STL")
     if _looks_like_text(start):
         corners, warnings = _text_corners(path)
         return surface_of(corners * scale, str(path), "ASCII STL", warnings)
@@ -183,8 +185,8 @@ def _complaint(corners: NDArray[np.floating], first: int, source: str, binary: b
 
 
 def _looks_like_text(start: bytes) -> bool:
-    """Tell an ASCII file by a line that begins with `solid`; comments, a title or empty lines may stand before it."""
-    return b"\0" not in start and _FIRST_SOLID.search(_without_mark(start)) is not None
+    """Tell an ASCII file by a line that begins with `solid` or with a facet; comments, a title or empty lines may stand before it."""
+    return b"\0" not in start and _BEGINNING.search(_without_mark(start).replace(b"\r", b"\n")) is not None
 
 
 def _without_mark(text: bytes) -> bytes:
@@ -236,7 +238,7 @@ def _text_corners(path: Path) -> tuple[NDArray[np.float64], tuple[str, ...]]:
     count, offset, rest, commas, before = 0, 0, b"", False, 0
     with path.open("rb") as file:
         while chunk := file.read(_TEXT_CHUNK_BYTES):
-            text = rest + chunk.lower()
+            text = rest + chunk.lower().replace(b"\r", b"\n")
             if not pieces[1:] and not rest:
                 text, before = _blank_start(text)
             cut = text.rfind(b"endfacet")
@@ -246,24 +248,34 @@ def _text_corners(path: Path) -> tuple[NDArray[np.float64], tuple[str, ...]]:
                 count += len(pieces[-1])
                 commas = commas or b"," in text[:cut]
             rest, offset = text[cut:], offset + cut
-    left = _blank_solid_lines(rest)
+    left, behind = _without_words_behind(_blank_solid_lines(rest), rest.rfind(b"endsolid"))
     if left.strip():
         place = offset + len(left.rstrip()) - len(left.split()[-1])
         raise MeshError(f"{path}: the text breaks off in triangle {count + 1} (byte {place}); export or copy the file again")
     warnings: tuple[str, ...] = ("decimal commas were read as decimal points",) if commas else ()
     if before:
         warnings += (f"{before} line(s) before `solid` are no triangles and were left out",)
+    if behind:
+        warnings += (f"{behind} line(s) behind the last `endsolid` are no triangles and were left out",)
     if b"endsolid" not in rest.replace(b" ", b""):
         warnings += ("the text ends without endsolid; every triangle in it is whole",)
     return np.concatenate(pieces), warnings
 
 
 def _blank_start(text: bytes) -> tuple[bytes, int]:
-    """Overwrite what stands before the first `solid` with blanks; return how many lines of words that were as well."""
+    """Overwrite what stands before the first `solid` or facet with blanks; return how many lines of words that were as well."""
     text = _without_mark(text)
-    solid = _FIRST_SOLID.search(text)
-    start = solid.start() if solid else 0
+    beginning = _BEGINNING.search(text)
+    start = beginning.start() if beginning else 0
     return b" " * start + text[start:], sum(bool(line.strip()) for line in text[:start].splitlines())
+
+
+def _without_words_behind(left: bytes, end: int) -> tuple[bytes, int]:
+    """Take words behind the last `endsolid`, which stands at `end`, from what is left of a text; and count their lines."""
+    words = left[end:] if end >= 0 else b""
+    if not words.strip() or any(keyword in words for keyword in (b"facet", b"vertex", b"loop")):
+        return left, 0
+    return left[:end], sum(bool(line.strip()) for line in words.splitlines())
 
 
 def _blank_solid_lines(text: bytes) -> bytes:

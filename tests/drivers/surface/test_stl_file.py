@@ -1,6 +1,7 @@
 """STL files, good and bad: each bad kind gives one error with its place, or a stated warning; none gives an empty surface."""
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -85,6 +86,34 @@ def test_lines_before_solid_are_left_out_and_told(tmp_path: Path, before: str) -
     assert np.array_equal(corners_of(mesh), CUBE)
     lines = len([line for line in before.split("\n") if line.strip()])
     assert mesh.warnings == (f"{lines} line(s) before `solid` are no triangles and were left out",)
+
+
+TEXTS: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
+    "without solid": (lambda text: text.split("\n", 1)[1], ()),
+    "old line ends": (lambda text: text.replace("\n", "\r"), ()),
+    "all on one line": (lambda text: " ".join(text.split("\n")) + "\n", ()),
+    "a long remark before": (lambda text: "x" * 5000 + "\n" + text, ("1 line(s) before `solid` are no triangles and were left out",)),
+    "words behind": (
+        lambda text: text + "made by a test\n\non a day\n",
+        ("2 line(s) behind the last `endsolid` are no triangles and were left out",),
+    ),
+    "two solids, the first without its line": (lambda text: text.split("\n", 1)[1] + text, ()),
+}
+
+
+@pytest.mark.parametrize("form", TEXTS)
+def test_texts_that_other_programs_write_are_read_whole(tmp_path: Path, form: str) -> None:
+    change, warnings = TEXTS[form]
+    mesh = read_stl(write(tmp_path / "cube.stl", change(ascii_stl(CUBE))))
+    twice = form.startswith("two")
+    assert np.array_equal(corners_of(mesh), np.concatenate([CUBE, CUBE]) if twice else CUBE)
+    assert mesh.warnings == warnings
+
+
+def test_a_text_that_breaks_off_is_not_taken_for_words_behind(tmp_path: Path) -> None:
+    text = ascii_stl(CUBE)
+    assert "breaks off in triangle 13" in refusal(write(tmp_path / "m.stl", text + text.split("\n", 1)[1][:60]))
+    assert "UTF-16" in refusal(write(tmp_path / "m.stl", text.encode("utf-16")))
 
 
 @pytest.mark.parametrize(
