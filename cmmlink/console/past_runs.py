@@ -24,9 +24,9 @@ from cmmlink.record import (
     open_to_read,
     recorded_plan,
     recorded_profile,
+    recorded_result,
     recorded_run,
     replay_run,
-    unpack_document,
     unpack_judged,
 )
 from cmmlink.record import export_run as export_files
@@ -124,7 +124,7 @@ def _key(entry: dict[str, Any]) -> tuple[str, str]:
 def _result_of(store: Store, run: str) -> dict[str, Any]:
     """Give what the result of a run says, nothing where there is none or it cannot be read."""
     try:
-        return next((unpack_document(record.body) for record in store.records(run, "result")), {})
+        return recorded_result(store, run)
     except StoreError:
         return {}
 

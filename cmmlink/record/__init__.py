@@ -1,7 +1,7 @@
 """The hash-chained record of every run: written, read, replayed, exported. This is the front door of the package."""
 
 from cmmlink.record.against import disagreements, read_result
-from cmmlink.record.bodies import unpack_document, unpack_judged
+from cmmlink.record.bodies import unpack_judged
 from cmmlink.record.chain import Draft, Record
 from cmmlink.record.export import export_run
 from cmmlink.record.reader import (
@@ -17,6 +17,7 @@ from cmmlink.record.reader import (
     open_to_record,
     points_of,
     reads_of,
+    recorded_result,
     recorded_run,
 )
 from cmmlink.record.recorder import Recorder, RecordReference, RunInputs
@@ -52,8 +53,8 @@ __all__ = [
     "reads_of",
     "recorded_plan",
     "recorded_profile",
+    "recorded_result",
     "recorded_run",
     "replay_run",
-    "unpack_document",
     "unpack_judged",
 ]

@@ -118,6 +118,11 @@ def recorded_run(store: Store, run: str) -> RecordedRun:
     return RecordedRun(documents["run"], plan, found["nominal"].body, documents.get("end"), documents.get("result"), sha256)
 
 
+def recorded_result(store: Store, run: str) -> dict[str, Any]:
+    """The result of a run alone; nothing where there is none. Raises StoreError where it cannot be read."""
+    return next((_document(store, record) for record in store.records(run, "result")), {})
+
+
 def _document(store: Store, record: Record) -> dict[str, Any]:
     """The document of a record, checked. Raises StoreError."""
     with _named(store, record):

@@ -82,15 +82,35 @@ class Limits(_Document):
     upper_mm: float | None = None
 
 
+class Pose(_Document):
+    """The registration of a result."""
+
+    other_poses: list[Any] = []
+
+
+class Reason(_Document):
+    """Why a verdict is no other."""
+
+    kind: str
+    words: str
+
+
 class Result(_Document):
     """The result of a run, as far as anything but a person reads it."""
 
     received: int
-    verdict: VerdictName | None
-    coverage: float | None = None
+    judged: int
+    rejected: int
+    lost: int
+    damaged_bytes: int
+    rejected_by_reason: dict[str, int]
+    out_of_tolerance: int
+    verdict: VerdictName
+    coverage: float | None
     worst: Worst | None = None
     tolerance: Limits | None = None
-    registration: dict[str, Any] | None = None
+    registration: Pose | None
+    reasons: list[Reason] = []
 
 
 class Placed(_Document):

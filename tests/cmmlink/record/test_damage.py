@@ -3,15 +3,20 @@
 import itertools
 import shutil
 import sqlite3
+import time
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 
 import pytest
 
+from cmmlink.console.past_runs import PastRuns
+from cmmlink.console.protocol import History, ShownRun, json_of
+from cmmlink.console.refused import Refused, answer_errors
+from cmmlink.run_view import RunView
 from drivers.source import WireBytes
 from tests.cmmlink.command import cmmlink
-from tests.cmmlink.recorded import Script, record, scan_arrivals
+from tests.cmmlink.recorded import Script, decoder_of, record, scan_arrivals, today
 from tests.integration.damaged import Damage, damages_of_bytes, damages_of_documents, damages_of_values
 
 
@@ -59,6 +64,15 @@ def require_words(folder: Path, tmp_path: Path, name: str) -> None:
         assert "defect" not in said, (name, command)
         assert "\x1b" not in said, (name, command)
         assert said.strip(), (name, command)
+    on_page = PastRuns(shutil.copytree(folder, tmp_path / "copy"), decoder_of, time.monotonic, today)
+    with suppress(Refused), answer_errors():
+        for row in on_page.runs():
+            json_of(History((row,)))
+        opened = on_page.open_run("last")
+        view = RunView(opened.context("", "recorded"), time.monotonic, today)
+        view.recall(opened.started, opened.ended)
+        json_of(ShownRun(view.state(), recorded=True))
+    shutil.rmtree(tmp_path / "copy")
     assert not list(tmp_path.parent.glob("*evil*"))
 
 
