@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 
 _NOMINAL, _BAND, _GOOD, _UNPROVEN, _ABOVE, _BELOW = "#3a3f45", "#dfe7ee", "#2a7fa5", "#a16207", "#c2410c", "#6d28d9"
 _BAND_SHARE = 0.06  # of the part's size: how wide the magnified tolerance band is drawn
+_NEAR_AN_EDGE = 0.18  # of the width: half a label
 _MOST_WHISKERS = 1500
 _MOST_POINTS = 65536  # in the strip: more would take minutes and show no more
 
@@ -113,11 +114,17 @@ def _draw_strip(axes: Axes, result: InspectionResult, nominal: NominalProfile) -
         station, deviation = float(worst.station_mm[0]), float(worst.deviation_mm[0])
         text = f"worst {deviation:+.4f} mm at station {station:.2f} mm"
         outside = 8 if deviation >= 0 else -16
-        axes.annotate(text, (station, deviation), (0, outside), textcoords="offset points", ha="center")  # clear of the neighbouring points
+        side = side_of_label(station / nominal.length_mm)
+        axes.annotate(text, (station, deviation), (0, outside), textcoords="offset points", ha=side)  # clear of the neighbouring points
     axes.margins(y=0.2)
     axes.set(xlim=(0, nominal.length_mm), xlabel="station (mm)", ylabel="deviation (mm)")
     basis = f"coverage {result.coverage:.1%}   fit {result.fit}   method {result.method}   out of tolerance {result.out_of_tolerance}"
-    axes.set_title(basis, fontsize=10)
+    axes.set_title(f"{basis}\n{zone.decision_rule}", fontsize=10)
+
+
+def side_of_label(share: float) -> Literal["left", "center", "right"]:
+    """How a label is set beside a point at a share of the width, from 0 to 1, so that it stays inside the drawing."""
+    return "left" if share < _NEAR_AN_EDGE else "right" if share > 1 - _NEAR_AN_EDGE else "center"
 
 
 def names_of_limits(zone: ToleranceZone) -> list[tuple[float, str]]:

@@ -8,7 +8,7 @@ import pytest
 from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 
-from cmmlink.report.picture import headline_on_picture, magnification, names_of_limits, write_picture
+from cmmlink.report.picture import headline_on_picture, magnification, names_of_limits, side_of_label, write_picture
 from inspection import NominalProfile, ToleranceZone
 from tests.cmmlink.judged_oval import bumped, inspect_oval
 
@@ -41,6 +41,10 @@ def test_points_nearer_to_a_limit_than_the_uncertainty_are_drawn_neither_good_no
     write_picture(inspect_oval(profile, deviation_mm), profile, "oval", tmp_path / "a.png")
     assert pixels_of(tmp_path / "a.png", UNPROVEN) > 1000
     assert pixels_of(tmp_path / "a.png", GOOD) == pixels_of(tmp_path / "a.png", BELOW) == 0
+
+
+def test_the_label_of_the_worst_point_stays_inside_the_drawing_at_either_end() -> None:
+    assert [side_of_label(share) for share in (0.0, 0.1, 0.5, 0.9, 1.0)] == ["left", "left", "center", "right", "right"]
 
 
 def test_every_line_that_a_verdict_depends_on_has_its_name() -> None:
