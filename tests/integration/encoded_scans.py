@@ -229,14 +229,15 @@ def _cut_anew(transcript: Transcript, cuts: np.random.Generator | None) -> Itera
         yield from transcript
         return
     joined = b""
-    for data in [*transcript, None]:
+    for place, data in enumerate([*transcript, None]):
         if data is not None:
             joined += data
             continue
         edges = np.sort(cuts.integers(0, len(joined) + 1, 1 + len(joined) // 400))
         yield from (joined[first:stop] for first, stop in pairwise([0, *edges.tolist(), len(joined)]) if stop > first)
         joined = b""
-        yield None
+        if place < len(transcript):
+            yield None
 
 
 def placed(source: Source, arrivals: list[Arrival | Exception], step_mm: float) -> Listed:
