@@ -126,7 +126,6 @@ def run_inspection(
         _start(reader, failures, acquired)
         with LiveProof(live) as proof:
             full = _judge_all(source, live, proof, sinks, buffer, tally, acquired, clock, stop, watch, no_room)
-            proven_out = proof.refuted is not None
     finally:
         source.stop()
         buffer.close()
@@ -134,7 +133,7 @@ def run_inspection(
             reader.join()
     failure = full or (failures[0] if failures else None)
     ending: Ending = "interrupted" if failure else "aborted" if stop.is_set() else "complete"
-    result, refusal = _finish(live, ending, tally.missing(), proven_out, doubt)
+    result, refusal = _finish(live, ending, tally.missing(), doubt)
     judged, reasons = (result.judged, result.rejected_by_reason) if result else (0, _reasons_without_pose(live))
     counts = tally.counts(judged, reasons, buffer)
     _publish(sinks, RunFinished(ending, result, counts, str(failure or refusal or "")))
@@ -236,9 +235,13 @@ def _reasons_without_pose(live: LiveInspection) -> dict[str, int]:
 
 
 def _finish(
-    live: LiveInspection, ending: Ending, missing: Missing, proven_out: bool, doubt: Reason | None
+    live: LiveInspection, ending: Ending, missing: Missing, doubt: Reason | None
 ) -> tuple[InspectionResult | None, InspectionError | None]:
-    """The result of a run. What the operator aborted has no verdict, whatever was out by then: the part may have slipped."""
+    """The result of a run. What the operator aborted has no verdict, whatever was out by then: the part may have slipped.
+
+    Whether the part was proven out is asked of all points, not of the proof in mid-scan: when that comes depends on how busy the
+    machine is, and a replay has to find the same.
+    """
     try:
         result = live.finish(complete=ending == "complete", missing=missing)
     except InspectionError as error:
@@ -247,7 +250,7 @@ def _finish(
         result = replace(result, verdict=Verdict.UNCERTAIN, reasons=(doubt, *result.reasons))
     if ending != "aborted":
         return result, None
-    reasons = reasons_of_abort(result.reasons, proven_out or result.verdict == Verdict.NONCONFORM)
+    reasons = reasons_of_abort(result.reasons, proven_out=result.verdict == Verdict.NONCONFORM)
     return replace(result, verdict=Verdict.UNCERTAIN, reasons=reasons), None
 
 

@@ -131,9 +131,9 @@ def conclude(found: Findings, missing: Missing, limits: Limits, complete: bool) 
 def reasons_of_abort(reasons: tuple[Reason, ...], proven_out: bool) -> tuple[Reason, ...]:
     """The reasons of a run that the operator aborted, which has no verdict, whatever was found until then.
 
-    proven_out : it was proven before the abort that the part fails
+    proven_out : the points received until then prove that the part fails
     """
-    before = "Before that it was proven that the part fails: no placement of the points received until then passes."
+    before = "The points received until then prove that the part fails."
     told = [Reason("aborted", "The operator aborted the run, so there is no verdict.")]
     return (*told, *([Reason("proven-out", before)] if proven_out else []), *reasons)
 
