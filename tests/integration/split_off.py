@@ -13,7 +13,8 @@ def split_off(work: Callable[..., None], *arguments: object) -> BaseProcess:
     process: BaseProcess
     if "forkserver" in multiprocessing.get_all_start_methods():
         forking = multiprocessing.get_context("forkserver")
-        forking.set_forkserver_preload([work.__module__, *(f"{devices.__name__}.{found.name}" for found in iter_modules(devices.__path__))])
+        simulated = (f"{devices.__name__}.{found.name}" for found in iter_modules(devices.__path__))
+        forking.set_forkserver_preload(["tests.integration.simulated", "tests.integration.killed", *simulated])  # before the first only
         process = forking.Process(target=work, args=arguments)
     else:
         process = multiprocessing.get_context("spawn").Process(target=work, args=arguments)
