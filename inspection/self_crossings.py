@@ -21,6 +21,7 @@ Mask = NDArray[np.bool_]
 
 _SHORTEST = 1e-8  # of the size: stretches that do not keep apart although they are this short touch
 _MOST_PAIRS = 50_000  # more pairs than this that do not keep apart are sides that lie upon each other
+_MOST_PLACES = 1000  # that are worked out; a curve that goes round and round itself meets itself millions of times
 _SAME_PLACE = 1e-6  # of the size: ends of an open curve as near as this are one place
 _SLOWEST = 0.75  # of the speed at a piece's middle: a piece is cut so that its speed does not fall below this
 _GENTLE = 0.1  # rad; stretches that turn by less are solved by Newton's method
@@ -39,13 +40,16 @@ class Crossing:
 
 
 def find_crossings(curve: NurbsCurve) -> tuple[Crossing, ...]:
-    """Every place at which a curve crosses or touches itself, by its first station. Raises NominalError where it stands still."""
+    """Every place at which a curve crosses or touches itself, by its first station; of very many the first.
+
+    Raises NominalError where the curve stands still.
+    """
     pieces = cut_into_pieces(curve)
     size = float(np.ptp(curve.control_points_mm, axis=0).max())
     pairs = _Pairs.whole(pieces, *_near_pieces(pieces))
     joins, grain = _joins(pieces, size), _SHORTEST * size
     met: list[Array] = []  # rows of x, y, and two parameters
-    while len(pairs.first):
+    while len(pairs.first) and sum(map(len, met)) <= _MOST_PLACES:
         one, other = _stretches(pieces, pairs.first, pairs.first_t), _stretches(pieces, pairs.second, pairs.second_t)
         apart = _keep_apart(one, other) | _part_at_join(pairs, one, other, joins)
         once = ~apart & _cross_once(one, other)
@@ -263,6 +267,8 @@ def _places(curve: NurbsCurve, rows: Array, grain_mm: float) -> tuple[Crossing, 
     """The crossings of the rows. Rows whose stations follow one another by the grain are one place, of which the first is taken."""
     if not len(rows):
         return ()
+    if len(rows) > _MOST_PLACES:
+        rows = rows[np.argsort(rows[:, 2:].min(axis=1), kind="stable")[:_MOST_PLACES]]
     stations = np.sort(curve.station_mm(rows[:, 2:].ravel()).reshape(-1, 2), axis=1)
     order = np.lexsort(stations.T[::-1])
     rows, stations = rows[order], stations[order]

@@ -25,10 +25,10 @@ Array = NDArray[np.float64]
 Numbered = list[tuple[int, str]]  # line number and what stands on the line
 
 _SNIFFED_LINES = 100
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
+_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eEdD][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
 _COMMENT = re.compile(r"#|%|!|//")
 _COMMENT_STARTS = ("#", "%", "!", "/")
-_REMARK = re.compile(r"\s*(?:#|!|//).*")  # behind the numbers of a row
+_REMARK = re.compile(r"(?<!\s)\s*(?:#|!|//).*")  # behind the numbers of a row; blanks are looked through once, from their first on
 _PERCENT_REMARK = re.compile(r"(?<=\d)\s+%\s.*")  # of rows alone: in words, a percent sign follows its number
 _COUNT = re.compile(r"\d{1,12}")  # a longer number counts nothing
 _UNDERLINE = re.compile(r"[-=+|\s]+")

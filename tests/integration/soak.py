@@ -202,12 +202,13 @@ def _judge(folder: Path, scanner: Scanner, page: Page, samples: list[tuple[int, 
     verified = subprocess.run(command, capture_output=True, text=True, check=False, cwd=ROOT)
     facts = {key: page.run.get(key) for key in ("received", "judged", "rejected", "lost", "stalls", "buffer_peak", "ending")}
     verdict = page.run.get("verdict")
-    half = samples[len(samples) // 2 :]
+    scan = [sample for at, sample in enumerate(samples) if not at or sample[0] > samples[at - 1][0]]  # while points were sent
+    half = scan[len(scan) // 2 :]
     growth = (half[-1][1] - half[0][1]) * 1e6 / max(1, half[-1][0] - half[0][0])
     print(f"sent {scanner.sent:,} points, the latest {1e3 * scanner.latest_s:.0f} ms after it was due; the page says {facts}, {verdict}")
     print(f"record: {kept:,} points, {size_mb:.0f} MB; verify ends with {verified.returncode}: {verified.stdout.strip()[:60]}")
     first_mb, last_mb = samples[0][1], half[-1][1]
-    print(f"memory: {first_mb:.0f} MB at first, {last_mb:.0f} MB in the end; {growth:.1f} bytes a point in the second half of the run")
+    print(f"memory: {first_mb:.0f} MB at first, {last_mb:.0f} MB when the last point came; {growth:.1f} bytes a point in the second half")
     for words, values in (("wire to verdict", page.waited_ms), ("verdict to page", page.latency_ms)):
         p50, p99, most = np.percentile(np.array(values or [float("nan")]), [50, 99, 100])
         print(f"{words}: p50 {p50:.1f}, p99 {p99:.1f}, most {most:.1f} ms of {len(values)} messages")
