@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 Lines = list[str]
 
-CHECKS = [HealthCheck.function_scoped_fixture]
+CHECKS = [HealthCheck.function_scoped_fixture, HealthCheck.too_slow]  # a busy machine is no fault of a case
 LAW = settings(max_examples=max(2, settings().max_examples // 33), deadline=None, suppress_health_check=CHECKS)
 GOOD = SOURCES["ascii"]
 
