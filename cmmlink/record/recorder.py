@@ -280,6 +280,7 @@ class Recorder:
         if drafts:
             self._store.append(drafts)
             self._pack.acknowledged = Acknowledged(self._pack.wire_bytes, self._pack.points)
+            self._pack.kept = self._pack.points + self._pack.rejected
             self._acknowledge(self._pack.acknowledged)
 
     def _draft(self, kind: Kind, body: bytes, count: int = 1) -> Draft:
@@ -294,6 +295,7 @@ class _Packing:
     wire_bytes: int = 0
     points: int = 0
     rejected: int = 0
+    kept: int = 0  # points and rejected ones that are on record
     acknowledged: Acknowledged = field(default_factory=lambda: Acknowledged(0, 0))
 
     def bodies(self, items: "Sequence[Arrived | _Pose]") -> list[tuple[Kind, bytes, int]]:
@@ -321,7 +323,8 @@ class _Packing:
         return found
 
     def counts(self) -> dict[str, int]:
-        return {"received": self.points + self.rejected}
+        """What is on record: a batch that the full disk refused is not, though the end of its run may still have found room."""
+        return {"received": self.kept}
 
 
 def end_draft(run: str, state: str, message: str, now: datetime, result: Mapping[str, Any], sha256: str = "") -> Draft:
