@@ -7,7 +7,7 @@ INSTALL := $(PIP) --no-build-isolation --editable
 # The tests start a hundred processes; where Python may keep no compiled files, each of them compiles every file anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo install test checks compiled lowest platforms upgrade bench paper faults powercuts kills fuzz soak damage proofs laws audit supply-chain
+.PHONY: demo install test checks compiled lowest platforms upgrade bench paper faults powercuts kills fuzz soak damage memory proofs laws audit supply-chain
 demo: .venv/installed
 	$(BIN)/cmmlink demo --out demo-result
 
@@ -79,6 +79,11 @@ supply-chain: .venv/test-installed
 # The file of records damaged in thousands of ways: every command answers in words, and verify calls none of them sound.
 damage: .venv/test-installed
 	$(BIN)/pytest -n 2 --timeout 7200 --damages 100000 tests/cmmlink/record/test_damage.py
+
+# Bytes of memory a point of long scans: run, page, export and replay of 1, 4, 16 and 36 million points; takes an hour and 12 GB of disk.
+POINTS := 1e6 4e6 1.6e7 3.6e7
+memory: .venv/test-installed
+	$(BIN)/python -m tests.benchmarks.memory_per_point $(POINTS)
 
 # The proof in mid-scan over 1,200 simulated scans of six kinds, 200 each: no part that passes may be proven out.
 proofs: .venv/test-installed
