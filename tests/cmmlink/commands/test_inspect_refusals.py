@@ -111,7 +111,7 @@ def test_a_folder_that_cannot_be_written_is_refused_before_the_run(nominal: Path
     for ended in (inspect_oval(nominal, 0.0, "--out", nominal.parent / name), cmmlink("run", plan, "--out", nominal.parent / name)):
         assert ended.refused().startswith(f"{nominal.parent / name}: the results cannot be written")
     demo = cmmlink("demo", "--headless", "--out", nominal.parent / name)
-    assert demo.refused().endswith("choose another folder with --out")
+    assert "choose another folder with --out" in demo.refused()
 
 
 @pytest.mark.parametrize(

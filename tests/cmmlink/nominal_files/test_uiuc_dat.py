@@ -145,7 +145,7 @@ DAT_LINES = [
 ]
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     content=st.one_of(
         st.binary(max_size=60), st.lists(st.sampled_from(DAT_LINES), max_size=14).map(lambda lines: "\n".join(lines).encode())

@@ -225,7 +225,7 @@ PLAN_PIECES = st.lists(
 ).map("\n".join)
 
 
-@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(content=st.one_of(st.binary(max_size=60), st.text(max_size=60).map(str.encode), PLAN_PIECES.map(str.encode)))
 @example(content=b"{" * 5000)
 @example(content=b"a: " * 300)
