@@ -31,13 +31,13 @@ compiled: .venv/test-installed
 	$(BIN)/python -m tests.benchmarks.warm_up
 
 # The lowest versions that pyproject.toml allows, on Python 3.11 and without the extras, must pass the fast tests: the first case of
-# every test of the four packages, but for the files that are about processes: browser, console, streams of a command, compiled code.
+# every test of the three packages, and of what uses a library in the application: plans, nominal files, reports, record, a command, the server.
 LOWEST_PYTHON ?= python3.11
-PACKAGES := inspection drivers simulators cmmlink
-OF_PROCESSES := cmmlink/console/test_console_browser.py cmmlink/console/test_launch.py cmmlink/commands/test_main.py inspection/kernels/test_compiling.py
+OF_LIBRARIES := plan nominal_files report record/test_recorder.py commands/test_inspect.py console/test_server.py
 lowest: .venv/lowest/installed
 	.venv/lowest/bin/python -m tests.benchmarks.warm_up
-	.venv/lowest/bin/python -m pytest $(TWO_AT_ONCE) --first-case $(PACKAGES:%=tests/%) $(OF_PROCESSES:%=--ignore=tests/%)
+	.venv/lowest/bin/python -m pytest $(TWO_AT_ONCE) --first-case tests/inspection tests/drivers tests/simulators $(OF_LIBRARIES:%=tests/cmmlink/%) \
+		--ignore=tests/inspection/kernels/test_compiling.py
 
 # For every system of the README the versions of constraints.txt must exist as wheels.
 platforms: .venv/test-installed

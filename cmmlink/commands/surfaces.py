@@ -4,7 +4,7 @@ import re
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -219,8 +219,8 @@ class _SectionBar:
 
     @contextmanager
     def show(self) -> Iterator[None]:
-        """Keep the bar on the screen."""
-        with self._progress:
+        """Keep the bar on the screen. One that is not to be seen is not begun: older versions of rich end it with an empty line."""
+        with nullcontext() if self._progress.disable else self._progress:
             yield
         for task in self._progress.task_ids:
             self._progress.remove_task(task)
