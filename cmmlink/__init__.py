@@ -1,10 +1,10 @@
 """The application: plans, runs, records, reports and the command line. This is its front door for scripts.
 
-plan = load_plan(Path("blade.yaml"))
-profile = profile_of(plan)
-with connect(plan) as device:
-run = carry_out(plan, profile, device, records=None, clock=time.monotonic, now=datetime.now, stop=threading.Event())
-run.result_json()["verdict"]
+    plan = load_plan(Path("blade.yaml"))
+    profile = profile_of(plan)
+    with connect(plan) as device:
+        run = carry_out(plan, profile, device, records=None, clock=time.monotonic, now=lambda: datetime.now(UTC), stop=Event())
+    run.result_json()["verdict"]
 
 A name is loaded when it is used: the command line begins before its libraries are there.
 """

@@ -17,29 +17,8 @@ from typing import Any
 import numpy as np
 
 from tests.drivers.surface.ct_phantom import Defect, make_phantom, write_nominal, write_stl
+from tests.integration.test_replay import FAULTS
 
-FAULTS = [
-    [],
-    ["flip:0.001"],
-    ["flip:0.01@5"],
-    ["lost-bytes:0.002"],
-    ["inserted-bytes:0.002"],
-    ["burst:300@250"],
-    ["burst:900@100"],
-    ["lost-frames:0.05"],
-    ["repeated-frames:0.05"],
-    ["reordered-frames:0.05"],
-    ["invalid:0.1"],
-    ["gap:60@200"],
-    ["stall:0.3@250"],
-    ["silence:9@400"],
-    ["die@350"],
-    ["unplug:0.2@300"],
-    ["unplug:0.2@300", "flip:0.005"],
-    ["lost-frames:0.02", "repeated-frames:0.02", "reordered-frames:0.02", "flip:0.002", "invalid:0.02"],
-    ["flip:0.002@10", "lost-bytes:0.001", "inserted-bytes:0.001", "gap:30@300"],
-    ["flip:0.002@10", "lost-bytes:0.001", "inserted-bytes:0.001", "die@300"],
-]
 SCAN = ["--count", "1500", "--seed", "5", "--tip-radius-mm", "1", "--noise-mm", "0.01", "--form-error-mm", "0.02"]
 METHODS = ("exact", "circle", "chord", "pcp", "veaw", "inversion")
 FITS = ("best-fit", "minimum-zone", "none")

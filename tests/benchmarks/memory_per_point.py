@@ -112,7 +112,8 @@ def held() -> tuple[int, int]:
     if not status.is_file():
         return 0, 0
     lines = dict(line.split(":", 1) for line in status.read_text().splitlines())
-    return tuple(int(lines[name].split()[0]) * 1024 for name in ("RssAnon", "RssFile"))  # type: ignore[return-value]
+    own, files = (int(lines[name].split()[0]) * 1024 for name in ("RssAnon", "RssFile"))
+    return own, files
 
 
 def now() -> datetime:
