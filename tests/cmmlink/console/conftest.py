@@ -32,9 +32,9 @@ FLAGS = [
 expect.set_options(timeout=20_000)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def browser(request: pytest.FixtureRequest) -> Iterator[Browser]:
-    """Debian's Chromium, with a profile of its own."""
+    """Debian's Chromium, with a profile of its own; while it is open, no test of the process can run an event loop of its own."""
     chromium = shutil.which("chromium")
     if chromium is None:
         reason = "no chromium on this machine (Debian: apt install chromium)"
