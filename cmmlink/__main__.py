@@ -15,16 +15,16 @@ _REQUESTS = ("SIGTERM", "SIGHUP", "SIGBREAK")  # as far as the system has them
 def main() -> None:
     """Run the command line."""
     interruptible = signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    if interruptible:
-        signal.signal(signal.SIGINT, _end_at_once)
-    from cmmlink.commands import main as run  # noqa: PLC0415 - this takes a second, in which Ctrl-C has to work
-
-    if interruptible:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-    for request in (getattr(signal, name) for name in _REQUESTS if hasattr(signal, name)):
-        if signal.getsignal(request) is signal.SIG_DFL:  # else somebody wants it ignored, as nohup does
-            signal.signal(request, _leave)
     try:
+        if interruptible:
+            signal.signal(signal.SIGINT, _end_at_once)
+        from cmmlink.commands import main as run  # noqa: PLC0415 - this takes a second, in which Ctrl-C has to work
+
+        if interruptible:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+        for request in (getattr(signal, name) for name in _REQUESTS if hasattr(signal, name)):
+            if signal.getsignal(request) is signal.SIG_DFL:  # else somebody wants it ignored, as nohup does
+                signal.signal(request, _leave)
         run()
     except KeyboardInterrupt:
         _say_stopped()

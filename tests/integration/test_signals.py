@@ -12,7 +12,22 @@ from pathlib import Path
 import pytest
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="ends processes by POSIX signals, and looks for them in /proc")
-FROM_THE_FIRST_MOMENT = "from cmmlink.__main__ import main; print('here', flush=True); main()"
+# Says that it is here as soon as the program, not Python any more, answers for Ctrl-C.
+FROM_THE_FIRST_MOMENT = """
+import signal
+from cmmlink.__main__ import main
+
+own = signal.signal
+
+def first(*given):
+    signal.signal = own
+    before = own(*given)
+    print("here", flush=True)
+    return before
+
+signal.signal = first
+main()
+"""
 
 
 @contextmanager

@@ -35,7 +35,8 @@ export class History {
     byId("no-runs").hidden = runs.length > 0;
     byId("runs").hidden = !runs.length;
     for (const act of ACTS) buttonOf(`${act}-run`).disabled = !runs.length;
-    this.table.show(runs);
+    const { at, chosen } = this.table, now = at ? runs.findIndex(({ run }) => run === chosen?.run) : 0;
+    this.table.show(runs, Math.max(now, 0)); // the choice stays with its run; at the top it stays with the newest
     const last = runs.filter((run) => !run.section).slice(0, SHOWN); // sections of a surface are no parts
     const entries = last.map((run) => ({ ...run, label: run.serial_number || run.run })).reverse();
     for (const chart of this.charts) chart.show(entries);
