@@ -1,11 +1,11 @@
 """deviations.csv: one line for every received point. That of a run that did not come to its end says so in every line."""
 
-import csv
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
+from cmmlink.csv_rows import Texts, write_rows
 from inspection import NOT_JUDGED, JudgedRows, Rejection, Verdict
 
 COLUMNS = {
@@ -19,8 +19,7 @@ COLUMNS = {
     "verdict": "conform, nonconform or uncertain; of a rejected point `rejected:` and the reason, beside empty numbers",
 }
 
-_LINE = "%d" + 6 * ",%.6f" + ",%s"
-_WORDS = {int(verdict): verdict.word for verdict in Verdict}
+_WORDS = (*(verdict.word for verdict in Verdict), *(f"rejected: {reason.words}" for reason in Rejection))
 
 EARLY_COLUMNS = {
     **COLUMNS,
@@ -34,21 +33,15 @@ def write_deviations(blocks: Iterable[JudgedRows], path: Path, ending: str = "co
     blocks : the rows of a result piece by piece, as `InspectionResult.blocks` gives them
     ending : how the run ended; of one that did not come to its end a last column says so
     """
-    early = () if ending == "complete" else (ending,)
-    with path.open("w", newline="", encoding="utf-8") as file:
-        csv.writer(file).writerow(EARLY_COLUMNS if early else COLUMNS)
-        end, index = ",".join(("", *early)) + "\r\n", 0
+    columns, last = (COLUMNS, "") if ending == "complete" else (EARLY_COLUMNS, f",{ending}")
+    words = [word + last for word in _WORDS]
+    with path.open("wb") as file:
+        file.write((",".join(columns) + "\r\n").encode())
+        index = 0
         for rows in blocks:
-            file.writelines(line + end for line in _lines(rows, index))
+            judged = rows.verdicts != NOT_JUDGED
+            numbers = np.column_stack([rows.actual_mm, rows.station_mm, rows.foot_mm, rows.deviation_mm])
+            numbers[~judged] = np.nan
+            found = Texts(np.where(judged, rows.verdicts, len(Verdict) + rows.rejection), words)
+            write_rows(file, [np.arange(index, index + rows.received), numbers, found])
             index += rows.received
-
-
-def _lines(rows: JudgedRows, first: int) -> Iterator[str]:
-    """The lines of rows without their ends, made by one format each: a format a number would take most of the time of a long export."""
-    values = np.column_stack([rows.actual_mm, rows.station_mm, rows.foot_mm, rows.deviation_mm]).tolist()
-    codes = zip(values, rows.verdicts.tolist(), rows.rejection.tolist(), strict=True)
-    for index, (numbers, verdict, rejection) in enumerate(codes, start=first):
-        if verdict == NOT_JUDGED:
-            yield f"{index},,,,,,,rejected: {Rejection(rejection).words}"
-        else:
-            yield _LINE % (index, *numbers, _WORDS[verdict])

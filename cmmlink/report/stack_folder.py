@@ -2,15 +2,18 @@
 
 import csv
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
+import numpy as np
+
+from cmmlink.csv_rows import Texts, write_rows
 from cmmlink.deviations_csv import write_deviations
 from cmmlink.errors import PlanError
 from cmmlink.result_folder import make_room
 from cmmlink.result_keys import SectionInspected
 from cmmlink.stack import SectionOutcome, StackOutcome
-from drivers.surface import SurfaceSection
+from drivers.surface import Contour
 from inspection import ToleranceZone
 
 CONTOUR_COLUMNS = {
@@ -56,7 +59,7 @@ def write_stack(
         for number, section in enumerate(stack.sections, start=1):
             own = folder / section_folder(number, section)
             own.mkdir(exist_ok=True)
-            write_contours(section.slice, own / "contours.csv")
+            write_contours(section.slice.contours, own / "contours.csv")
             result = section.run.result
             if result is not None and result.judged:
                 write_deviations(result.blocks(), own / "deviations.csv", section.run.ending)
@@ -75,15 +78,14 @@ def section_folder(number: int, section: SectionOutcome) -> str:
     return f"section-{number:03d}_{section.slice.asked_mm:.3f}mm"
 
 
-def write_contours(cut: SurfaceSection, path: Path) -> None:
+def write_contours(contours: Iterable[Contour], path: Path) -> None:
     """Write every contour point, in machine and in section coordinates; closed contours do not repeat their first point."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(CONTOUR_COLUMNS)
-        for number, contour in enumerate(cut.contours, start=1):
-            head = (number, "closed" if contour.closed else "open", "hole" if contour.hole else "outer")
-            for machine, section in zip(contour.points_mm.tolist(), contour.section_mm.tolist(), strict=True):
-                writer.writerow((*head, *(f"{value:.6f}" for value in (*machine, *section))))
+    with path.open("wb") as file:
+        file.write((",".join(CONTOUR_COLUMNS) + "\r\n").encode())
+        for number, contour in enumerate(contours, start=1):
+            head = f"{number},{'closed' if contour.closed else 'open'},{'hole' if contour.hole else 'outer'}"
+            heads = Texts(np.zeros(len(contour.points_mm), dtype=np.int64), [head])
+            write_rows(file, [heads, np.column_stack([contour.points_mm, contour.section_mm])])
 
 
 def _write_sections(stack: StackOutcome, path: Path) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cmmlink.deviations_csv import COLUMNS, write_deviations
-from inspection import LiveInspection, NominalProfile, RigidTransform, ToleranceZone
+from inspection import NOT_JUDGED, LiveInspection, NominalProfile, Rejection, RigidTransform, ToleranceZone, Verdict
 from tests.cmmlink.judged_oval import bumped, inspect_oval
 from tests.cmmlink.oval_part import oval_feet, oval_points, station_mm
 
@@ -38,3 +38,27 @@ def test_a_rejected_point_keeps_its_row_and_says_why(profile: NominalProfile, tm
     assert [row["verdict"] for row in rows] == ["conform", "rejected: not finite", "nonconform"]
     assert [rows[1][name] for name in list(COLUMNS)[1:7]] == [""] * 6
     assert float(rows[2]["deviation_mm"]) == pytest.approx(0.3)
+
+
+def test_the_file_is_byte_for_byte_what_plain_formats_write(profile: NominalProfile, tmp_path: Path) -> None:
+    live = LiveInspection(profile, ToleranceZone(-0.05, 0.07, 0.01), datum=RigidTransform.identity(), off_section_max_mm=1.0)
+    points = np.column_stack([oval_points(bumped()), np.zeros(360)])
+    points[::7] += 0.02 * np.random.default_rng(1).normal(size=(52, 3))
+    points[50, 2], points[60, 0] = 2.0, np.inf
+    live.add(points)
+    result = live.finish()
+    for ending in ("complete", "aborted"):
+        write_deviations(result.blocks(at_once=100), tmp_path / "deviations.csv", ending)
+        columns, last = (list(COLUMNS), []) if ending == "complete" else ([*COLUMNS, "ending"], [ending])
+        with (tmp_path / "plain.csv").open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(columns)
+            rows = result.rows_at(slice(None))
+            for i, code in enumerate(rows.verdicts.tolist()):
+                numbers = (*rows.actual_mm[i], rows.station_mm[i], *rows.foot_mm[i], rows.deviation_mm[i])
+                if code == NOT_JUDGED:
+                    writer.writerow([i, *[""] * 6, f"rejected: {Rejection(rows.rejection[i]).words}", *last])
+                else:
+                    writer.writerow([i, *(f"{number:.6f}" for number in numbers), Verdict(code).word, *last])
+        assert (tmp_path / "deviations.csv").read_bytes() == (tmp_path / "plain.csv").read_bytes()
+    assert {*result.verdicts.tolist()} == {NOT_JUDGED, *Verdict}
