@@ -2,7 +2,8 @@
 
 A long array lies in a file without a name, which is gone with the array or with the program, and is mapped into memory, so that the
 operating system may write it out and read it back. The file is written before it is mapped: a full disk is an error here, and never a
-signal in the middle of a loop.
+signal in the middle of a loop. An array that has to be longer is mapped again with more of its file: nothing is copied, so the next
+points of a scan cost what the first ones did.
 """
 
 import mmap
@@ -11,7 +12,7 @@ import shutil
 import tempfile
 import weakref
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,19 +36,23 @@ class Scratch:
     def __init__(self, folder: Path | None = None, rows_in_memory: int = ROWS_IN_MEMORY) -> None:
         self.folder = folder if folder is not None else Path(tempfile.gettempdir())
         self._rows_in_memory = rows_in_memory
-        self._mapped: weakref.WeakSet[mmap.mmap] = weakref.WeakSet()
+        self._mapped: weakref.WeakValueDictionary[int, _Mapped] = weakref.WeakValueDictionary()  # by where they lie in memory
 
     def __call__(self, shape: tuple[int, ...], kind: type[np.generic]) -> NDArray[Any]:
         """An array whose values are not set. Raises StoreError where the disk has no room for it."""
         if shape[0] <= self._rows_in_memory:
             return np.empty(shape, kind)
-        self._let_go()
-        try:
-            memory = _mapped_file(self.folder, int(np.prod(shape)) * np.dtype(kind).itemsize)
-        except OSError as error:
-            raise StoreError(f"{self.folder}: a scan of {shape[0]} points does not fit there ({error.strerror}); {_MEND}") from None
-        self._mapped.add(memory)
-        return np.frombuffer(memory, kind).reshape(shape)
+        return self._map(_UnnamedFile(self.folder), shape, kind)
+
+    def resize(self, array: NDArray[Any], rows: int) -> NDArray[Any] | None:
+        """An array that was given, with so many rows where it lies. None where it lies in memory, and has to be copied.
+
+        Raises StoreError where the disk has no room for it.
+        """
+        memory = self._mapped.get(array.ctypes.data)
+        if memory is None:
+            return None
+        return array[:rows] if rows <= len(array) else self._map(memory.file, (rows, *array.shape[1:]), array.dtype.type)
 
     def refusal(self, received: int, announced: int | None = None) -> str:
         """Why a run cannot go on after so many points, where its disk has no room for the rest of it; nothing where it has."""
@@ -60,11 +65,46 @@ class Scratch:
             return ""
         return f"{self.folder}: {told}. {_MEND}"
 
+    def _map(self, file: "_UnnamedFile", shape: tuple[int, ...], kind: type[np.generic]) -> NDArray[Any]:
+        self._let_go()
+        try:
+            memory = file.map(int(np.prod(shape)) * np.dtype(kind).itemsize)
+        except OSError as error:
+            raise StoreError(f"{self.folder}: a scan of {shape[0]} points does not fit there ({error.strerror}); {_MEND}") from None
+        array = np.frombuffer(memory, kind).reshape(shape)
+        self._mapped[array.ctypes.data] = memory
+        return array
+
     def _let_go(self) -> None:
         """Let the system have the memory of what was mapped so far; what was written stays in the files."""
         if hasattr(mmap, "MADV_DONTNEED"):
-            for memory in self._mapped:
+            for memory in list(self._mapped.values()):
                 memory.madvise(mmap.MADV_DONTNEED)
+
+
+class _Mapped(mmap.mmap):
+    """The beginning of a file without a name as memory."""
+
+    file: "_UnnamedFile"
+
+
+class _UnnamedFile:
+    """A file that only this process knows, as long as it or memory of it is in use."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder, self._size = folder, 0
+        self._file: IO[bytes] | None = None
+
+    def map(self, size: int) -> _Mapped:
+        """So many bytes of it; what was not written before is zero. Raises OSError where the disk has no room for them."""
+        if self._file is None:
+            self._file = tempfile.TemporaryFile(dir=self._folder, prefix="cmmlink-", buffering=0)  # noqa: SIM115 - closed with its last mapping
+            weakref.finalize(self, self._file.close)
+        while (left := size - self._size) > 0:
+            self._size += self._file.write(_PIECE[: min(left, len(_PIECE))])
+        memory = _Mapped(self._file.fileno(), size)
+        memory.file = self
+        return memory
 
 
 def points_that_fit(folder: Path, received: int = 0) -> int:
@@ -83,11 +123,3 @@ def words_of_room(folder: Path) -> str:
 def scratch_in(folder: Path | None) -> Scratch:
     """Room on the disk of a folder, or with the system's temporary files where nothing can be written there."""
     return Scratch(folder if folder is not None and folder.is_dir() and os.access(folder, os.W_OK) else None)
-
-
-def _mapped_file(folder: Path, size: int) -> mmap.mmap:
-    with tempfile.TemporaryFile(dir=folder, prefix="cmmlink-") as file:
-        for left in range(size, 0, -len(_PIECE)):
-            file.write(_PIECE[: min(left, len(_PIECE))])
-        file.flush()
-        return mmap.mmap(file.fileno(), size)

@@ -6,6 +6,7 @@ and worked out again for whoever asks.
 
 import math
 from functools import partial
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +24,17 @@ Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 BLOCK = 64  # points between two moves of the state of a live inspection; the places of the block that is being filled are kept
-_GROWTH = 1.5  # of the columns, where they are full
+_GROWTH = 1.5  # of the columns, where they are full and have to be copied
+_MORE = 1 << 18  # rows that they grow by where they are not copied
 _USABLE = (Rejection.NONE, Rejection.BEYOND_END, Rejection.IN_HOLLOW)  # the last two depend on the pose that is still being sought
+
+
+@runtime_checkable
+class ResizingRoom(Protocol):
+    """A room that can give an array which it gave another number of rows without copying it. None where it cannot."""
+
+    def resize(self, array: NDArray[Any], rows: int) -> NDArray[Any] | None:
+        """The array with so many rows: those that it had, and others whose values are not set."""
 
 
 class ScanRows:
@@ -39,7 +49,7 @@ class ScanRows:
                 is no verdict
     plane     : the plane of the section
     settled_at : the pose at which all rows were settled last, None where rows were taken in or judged otherwise since
-    room      : gives the columns, like numpy.empty
+    room      : gives the columns, like numpy.empty; a ResizingRoom spares the copies as they grow
     """
 
     def __init__(self, capacity: int = 4096, plane: SectionPlane = XY_PLANE, room: Room = np.empty) -> None:
@@ -180,17 +190,25 @@ class ScanRows:
         """Make room for so many rows, in larger columns where there is none."""
         if capacity <= len(self.verdicts):
             return
-        self._resize(max(capacity, int(_GROWTH * len(self.verdicts))))
+        grown = int(_GROWTH * len(self.verdicts))
+        if isinstance(self.room, ResizingRoom):
+            grown = min(grown, len(self.verdicts) + _MORE)
+        self._resize(max(capacity, grown))
 
     def _resize(self, capacity: int) -> None:
         """Hold the columns in arrays of so many rows, one after the other."""
         for name in ("points", "height", "station", "deviation", "verdicts", "rejection"):
             old = getattr(self, name)
             if 0 < len(old) != capacity:
-                new = self.room((capacity, *old.shape[1:]), old.dtype.type)
-                for rows in row_blocks(self.count):
-                    new[rows] = old[rows]
-                setattr(self, name, new)
+                setattr(self, name, self._resized(old, capacity))
+
+    def _resized(self, old: NDArray[Any], capacity: int) -> NDArray[Any]:
+        new = self.room.resize(old, capacity) if isinstance(self.room, ResizingRoom) else None
+        if new is None:
+            new = self.room((capacity, *old.shape[1:]), old.dtype.type)
+            for rows in row_blocks(self.count):
+                new[rows] = old[rows]
+        return new
 
 
 def _places(count: int) -> tuple[Array, Array, Array]:

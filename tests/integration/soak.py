@@ -31,6 +31,10 @@ from websockets.sync.client import ClientConnection, connect
 from tests.cmmlink.oval_part import oval_points, write_nominal
 
 BLOCK = 100  # points
+MOST_GROWTH_MB = 16.0  # of the station's own memory, from the end of the first quarter of the scan to its last point
+MOST_FILES_MB = 256.0  # of files that are in memory: code of libraries, and the newest rows of a scan
+SLOWER = 3.0  # times as long as in the first tenth half the verdicts of the last may take, and
+SLOWER_MS = 3.0  # so much longer on top: the machine does other work as well
 AFTER_S = 1200.0  # the longest that a station may take to finish, record and answer when the scan is over
 ROOT = Path(__file__).resolve().parents[2]
 PLAN = """\
@@ -97,6 +101,7 @@ class Page:
     run: dict[str, object] = field(default_factory=dict)
     latency_ms: list[float] = field(default_factory=list)
     waited_ms: list[float] = field(default_factory=list)
+    waited_at: list[int] = field(default_factory=list)  # points received, of each of these
     bytes: int = 0
     complaints: list[str] = field(default_factory=list)
 
@@ -114,6 +119,7 @@ class Page:
                 self.run = said["run"]
                 if said["run"]["latency_s"] is not None:
                     self.waited_ms.append(1e3 * said["run"]["latency_s"])
+                    self.waited_at.append(said["run"]["received"])
             elif said["type"] == "answer" and not said["ok"]:
                 self.complaints.append(said["message"])
             elif said["type"] == "alarms":
@@ -148,13 +154,22 @@ def joined(address: str) -> Iterator[ClientConnection]:
         yield live
 
 
-def resident_mb(process: int) -> float:
-    """Memory that a process holds now."""
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """What a station held when so many points had been sent: memory of its own, and of files that are mapped into it, in MB."""
+
+    sent: int
+    own_mb: float
+    files_mb: float
+
+
+def sample_of(process: int, sent: int) -> Sample:
+    """What a process holds now. NaN on systems that do not tell."""
     if sys.platform != "linux":
-        return float("nan")
-    words = Path(f"/proc/{process}/status").read_text(encoding="ascii")
-    found = re.search(r"VmRSS:\s+(\d+) kB", words)
-    return int(found[1]) / 1e3 if found else float("nan")
+        return Sample(sent, float("nan"), float("nan"))
+    words = Path(f"/proc/{process}/smaps_rollup").read_text(encoding="ascii")
+    held, own = (int(re.findall(rf"^{name}:\s+(\d+) kB", words, re.M)[0]) / 1e3 for name in ("Rss", "Anonymous"))
+    return Sample(sent, own, held - own)
 
 
 def soak(seconds: float, rate_hz: float) -> int:
@@ -175,26 +190,50 @@ def soak(seconds: float, rate_hz: float) -> int:
             ended_s = time.monotonic()
             while page.run.get("ending") is None and time.monotonic() - ended_s < AFTER_S:
                 time.sleep(0.5)
-                samples.append((scanner.sent, resident_mb(process.pid)))
-            print(f"finished {time.monotonic() - ended_s:.1f} s after the last point; most memory {max(mb for _, mb in samples):.0f} MB")
+                samples.append(sample_of(process.pid, scanner.sent))
+            most_mb = max(sample.own_mb for sample in samples)
+            print(f"finished {time.monotonic() - ended_s:.1f} s after the last point; most memory of its own {most_mb:.0f} MB")
         return _judge(folder, scanner, page, samples)
 
 
-def _sample(process: int, scanner: Scanner, page: Page, seconds: float) -> list[tuple[int, float]]:
-    """Sample twenty times while the scan goes on."""
-    samples: list[tuple[int, float]] = []
-    while not scanner.done.wait(max(1.0, seconds / 20)):
-        samples.append((scanner.sent, resident_mb(process)))
+def _sample(process: int, scanner: Scanner, page: Page, seconds: float) -> list[Sample]:
+    """Sample forty times while the scan goes on."""
+    samples: list[Sample] = []
+    while not scanner.done.wait(max(1.0, seconds / 40)):
+        samples.append(sample_of(process, scanner.sent))
         lost, received = page.run.get("lost"), page.run.get("received")
-        recent = page.latency_ms[-200:] or [float("nan")]
+        waited, drawn = (max(values[-200:] or [float("nan")]) for values in (page.waited_ms, page.latency_ms))
         print(
-            f"  sent {scanner.sent:>11,}  received {received!s:>11}  lost {lost}  {samples[-1][1]:7.1f} MB  page {max(recent):6.1f} ms",
+            f"  sent {scanner.sent:>11,}  received {received!s:>11}  lost {lost}  own {samples[-1].own_mb:6.1f} MB  "
+            f"files {samples[-1].files_mb:6.1f} MB  verdict {waited:6.1f} ms  page {drawn:6.1f} ms",
             flush=True,
         )
-    return [*samples, (scanner.sent, resident_mb(process))]
+    return [*samples, sample_of(process, scanner.sent)]
 
 
-def _judge(folder: Path, scanner: Scanner, page: Page, samples: list[tuple[int, float]]) -> int:
+def _tell_memory(samples: list[Sample]) -> bool:
+    """Print what the station held while points were sent; False where that grew."""
+    scan = [sample for at, sample in enumerate(samples) if sample.sent and (not at or sample.sent > samples[at - 1].sent)]
+    later = [sample for sample in scan if sample.sent >= scan[-1].sent / 4]
+    growth_mb = max(sample.own_mb for sample in later) - later[0].own_mb
+    files_mb = max(sample.files_mb for sample in scan)
+    told = ", ".join(f"{sample.own_mb:.1f} MB at {sample.sent:,} points" for sample in (scan[0], later[0], later[-1]))
+    print(f"own memory: {told}; grown by at most {growth_mb:.1f} MB since the first quarter; of files at most {files_mb:.0f} MB in memory")
+    return not (growth_mb > MOST_GROWTH_MB or files_mb > MOST_FILES_MB)
+
+
+def _tell_tenths(page: Page, total: int) -> bool:
+    """Print how long verdicts took in the first and in the last tenth of the scan; False where they became slower."""
+    waited, at = np.array(page.waited_ms), np.array(page.waited_at)
+    halves = []
+    for words, part in (("first", waited[at <= total / 10]), ("last", waited[(at >= total * 9 / 10) & (at < total)])):
+        p50, p99, most = np.percentile(part if len(part) else np.array([float("nan")]), [50, 99, 100])
+        print(f"wire to verdict in the {words} tenth: p50 {p50:.2f}, p99 {p99:.1f}, most {most:.1f} ms of {len(part)}")
+        halves.append(p50)
+    return bool(halves[1] <= SLOWER * halves[0] + SLOWER_MS)
+
+
+def _judge(folder: Path, scanner: Scanner, page: Page, samples: list[Sample]) -> int:
     with closing(sqlite3.connect(folder / "records" / "station.sqlite")) as connection:
         (kept,) = connection.execute("SELECT sum(count) FROM record WHERE kind = 'points'").fetchone()
         size_mb = sum(path.stat().st_size for path in (folder / "records").iterdir()) / 1e6
@@ -202,20 +241,18 @@ def _judge(folder: Path, scanner: Scanner, page: Page, samples: list[tuple[int, 
     verified = subprocess.run(command, capture_output=True, text=True, check=False, cwd=ROOT)
     facts = {key: page.run.get(key) for key in ("received", "judged", "rejected", "lost", "stalls", "buffer_peak", "ending")}
     verdict = page.run.get("verdict")
-    scan = [sample for at, sample in enumerate(samples) if not at or sample[0] > samples[at - 1][0]]  # while points were sent
-    half = scan[len(scan) // 2 :]
-    growth = (half[-1][1] - half[0][1]) * 1e6 / max(1, half[-1][0] - half[0][0])
     print(f"sent {scanner.sent:,} points, the latest {1e3 * scanner.latest_s:.0f} ms after it was due; the page says {facts}, {verdict}")
     print(f"record: {kept:,} points, {size_mb:.0f} MB; verify ends with {verified.returncode}: {verified.stdout.strip()[:60]}")
-    first_mb, last_mb = samples[0][1], half[-1][1]
-    print(f"memory: {first_mb:.0f} MB at first, {last_mb:.0f} MB when the last point came; {growth:.1f} bytes a point in the second half")
+    is_flat, is_quick = _tell_memory(samples), _tell_tenths(page, scanner.total)
     for words, values in (("wire to verdict", page.waited_ms), ("verdict to page", page.latency_ms)):
         p50, p99, most = np.percentile(np.array(values or [float("nan")]), [50, 99, 100])
         print(f"{words}: p50 {p50:.1f}, p99 {p99:.1f}, most {most:.1f} ms of {len(values)} messages")
     print(f"read by the page: {page.bytes / 1e6:.0f} MB")
     print("complaints:", "; ".join(dict.fromkeys(page.complaints)) or "none")
     whole = facts["received"] == facts["judged"] == kept == scanner.sent == scanner.total and facts["lost"] == 0
-    return 0 if whole and verified.returncode == 0 and facts["ending"] == "complete" else 1
+    is_kept = whole and verified.returncode == 0 and facts["ending"] == "complete"
+    print(f"whole: {is_kept}; memory flat: {is_flat}; verdicts as quick as at first: {is_quick}")
+    return 0 if is_kept and is_flat and is_quick else 1
 
 
 if __name__ == "__main__":
