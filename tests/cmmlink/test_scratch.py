@@ -98,11 +98,11 @@ def test_a_disk_that_fills_up_while_an_array_grows_leaves_it_as_it_is(tmp_path: 
 
 def test_a_scan_grows_on_the_disk_without_a_copy_and_its_result_is_that_of_memory(tmp_path: Path) -> None:
     given = live_scan("late form", 3, 3000)
-    scratch, copied = Scratch(tmp_path, rows_in_memory=500), []
+    scratch, copied = Scratch(tmp_path, rows_in_memory=500), list[int]()
 
     class Watched(Scratch):
         def __call__(self, shape: tuple[int, ...], kind: type[np.generic]) -> NDArray[Any]:
-            copied.append(shape[0])
+            copied.extend(shape[:1] if len(shape) == 2 else ())
             return scratch(shape, kind)
 
         def resize(self, array: NDArray[Any], rows: int) -> NDArray[Any] | None:
@@ -115,7 +115,7 @@ def test_a_scan_grows_on_the_disk_without_a_copy_and_its_result_is_that_of_memor
         for points in np.array_split(given.points_mm, 40):
             long.add(points)
     assert len(long._kept.verdicts) < 3000 + 200 + 100, "on the disk it grows step by step"
-    assert max(copied) <= 2 * 500, "and is copied only as long as it is in memory"
+    assert max(copied) <= 2 * 500, "and its points are copied only as long as they are in memory"
     short = LiveInspection(given.nominal, ZONE)
     short.add(given.points_mm)
     here, there = short.finish(), long.finish()
