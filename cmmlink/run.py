@@ -18,7 +18,7 @@ from cmmlink.events import RunStarted, Sink
 from cmmlink.from_plan import inspection_of, notes_on_nominal, run_started
 from cmmlink.log import log_event
 from cmmlink.pipeline import RunOutcome, run_inspection
-from cmmlink.plan import Plan
+from cmmlink.plan import FileDevice, Plan
 from cmmlink.record import PATIENCE_S, Recorder, RecordReference, RunInputs, open_to_record
 from cmmlink.result_folder import folder_of
 from cmmlink.result_json import density_notes, density_of, identity_json, result_json, stations_of
@@ -88,6 +88,7 @@ def carry_out(
     patience_s : how long another process may go on recording before this run is refused
     on_ready: called when everything is compiled, just before the device is asked for points
 
+    The points of a file that no sink follows have their verdicts at the end alone; the result is the same to the last bit.
     A device that fails does not raise: the outcome says so. Raises StoreError when the record cannot be kept, PlanError when
     the plan cannot be carried out, and whatever a sink raises.
     """
@@ -95,7 +96,8 @@ def carry_out(
     rehearse(profile, plan.registration.method, plan.registration.reject_outliers)
     scratch = scratch_in(records)
     _log.info("%s", words_of_room(scratch.folder))
-    live = inspection_of(plan, profile, scratch)
+    followed = bool(sinks) or not isinstance(plan.device, FileDevice)
+    live = inspection_of(plan, profile, scratch, provisional=followed)
     started = run_started(plan, device.device, device.simulated, (*notes_on_nominal(plan), *device.notes))
     on_ready()
     began = now()

@@ -4,20 +4,27 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 from cmmlink.devices import Connected
 from cmmlink.errors import StoreError
 from cmmlink.events import Arrived, Event, Judged, RunFinished, RunStarted, Sink
+from cmmlink.from_plan import inspection_of
+from cmmlink.plan import FileDevice, Plan
 from cmmlink.record.reader import list_runs, open_to_read, recorded_run
 from cmmlink.run import FinishedRun, carry_out
 from drivers import LinkError
+from inspection import LiveInspection
 from tests.cmmlink.recorded import Script, scan_arrivals, small_plan, small_profile, today
 
 
-def run(source: Script, records: Path | None, *sinks: Sink, on_ready: Callable[[], None] = lambda: None) -> FinishedRun:
-    plan = small_plan().model_copy(update={"operator": "A. Operator"})
+def run(
+    source: Script, records: Path | None, *sinks: Sink, on_ready: Callable[[], None] = lambda: None, plan: Plan | None = None
+) -> FinishedRun:
+    plan = (plan or small_plan()).model_copy(update={"operator": "A. Operator"})
     return carry_out(
         plan,
         small_profile(),
@@ -117,3 +124,23 @@ def test_a_run_ends_with_a_result_when_the_disk_has_no_room_for_more(tmp_path: P
     assert document["verdict"] == "uncertain"
     (entry,) = list_runs(tmp_path, today)
     assert (entry["state"], entry["received"]) == ("interrupted", document["received"])
+
+
+def test_a_file_that_nobody_follows_is_judged_at_its_end_alone_and_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    lives: list[LiveInspection] = []
+
+    def kept(*args: Any, **settings: Any) -> LiveInspection:
+        lives.append(inspection_of(*args, **settings))
+        return lives[-1]
+
+    monkeypatch.setattr("cmmlink.run.inspection_of", kept)
+    plan = small_plan().model_copy(update={"device": FileDevice(type="file", file=tmp_path / "points.csv")})
+    judged: list[Judged] = []
+    alone = run(Script(*scan_arrivals()), None, plan=plan)
+    followed = run(Script(*scan_arrivals()), None, lambda event: judged.append(event) if isinstance(event, Judged) else None, plan=plan)
+    assert [live.state for live in lives] == ["seeking", "provisional"]
+    assert judged[-1].counts.judged > 0
+    assert alone.result_json() | {"measured_at": ""} == followed.result_json() | {"measured_at": ""}
+    assert alone.outcome.result is not None
+    assert followed.outcome.result is not None
+    np.testing.assert_array_equal(alone.outcome.result.deviation_mm, followed.outcome.result.deviation_mm, strict=True)
