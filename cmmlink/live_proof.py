@@ -11,7 +11,7 @@ from contextlib import suppress
 from inspection import LiveInspection, Prefix
 
 _GROWTH = 1 / 32  # share by which the points must have grown before they are handed over again: copying stays cheap
-_FEWEST_NEW = 16
+_FEWEST_NEW, _MOST_NEW = 16, 1 << 16  # points, however short or long the scan is
 _LET_THROUGH_S = 2e-4  # slept between two slices
 
 
@@ -48,7 +48,7 @@ class LiveProof:
         received = self._live.received
         if self._refuted is not None or received < self._next_offer:
             return
-        self._next_offer = received + max(_FEWEST_NEW, int(received * _GROWTH))
+        self._next_offer = received + min(max(_FEWEST_NEW, int(received * _GROWTH)), _MOST_NEW)
         prefix = self._live.prefix()
         if prefix is None:
             return

@@ -23,7 +23,7 @@ from inspection.kernels import Room
 from inspection.methods import Method, WeightName
 from inspection.nominal import NominalProfile
 from inspection.pose_track import PoseTrack, seek_pose
-from inspection.prefix import Prefix, PrefixSearch, prefix_of
+from inspection.prefix import Prefix, PrefixSearch, PrefixWatch
 from inspection.registration import Registration
 from inspection.result import InspectionResult
 from inspection.rigid import RigidTransform
@@ -126,6 +126,7 @@ class LiveInspection:
         self._handed_over = False  # the rows belong to a result by now
         self._next_fit = BLOCK  # received points at which the pose is sought, or fitted anew
         self._track: PoseTrack | None = None
+        self._watch = PrefixWatch(self._terms)
 
     @property
     def state(self) -> State:
@@ -180,7 +181,7 @@ class LiveInspection:
         """
         if self._track is None or self._terms.reject_outliers:
             return None
-        return prefix_of(self._rows, self._track.pose, self._track.slide_mm(), self._terms)
+        return self._watch.prefix(self._rows, self._track.pose, self._track.slide_mm())
 
     def prefix_search(self) -> PrefixSearch:
         """A search for the proof that the part will fail, on the terms of this inspection. It may run in another thread."""

@@ -72,27 +72,49 @@ class PrefixSearch:
         return np.arange(count) if count <= 2 * SHARES else telling_rows(prefix.station_mm, prefix.deviation_mm, self._length)
 
 
-def prefix_of(rows: ScanRows, pose: RigidTransform, slide_mm: float, terms: Terms) -> Prefix | None:
-    """The prefix at a provisional pose, None where no point looks out there: that pose is then a placement that passes.
+class PrefixWatch:
+    """Takes prefixes of one scan as it grows. Rows are looked at once, unless they are judged anew: what it costs does not grow."""
 
-    slide_mm : how far the pose may still slide along the profile at its open ends (95 %)
-    """
-    count = rows.count
-    far = [np.fmax.reduce(np.abs(rows.deviation[part] - terms.target_mm), initial=0.0) for part in row_blocks(count)]
-    if max(far, default=0.0) <= _half_mm(terms):
-        return None
-    if count > MANY:
-        judged = telling_rows(rows.station[:count], rows.deviation[:count], terms.nominal.length_mm, MANY // 64)
-    else:
-        judged = np.flatnonzero(rows.verdicts[:count] != NOT_JUDGED)
-    if not terms.nominal.curve.closed:
-        reserve = _SURELY * slide_mm + terms.zone.upper_mm - terms.zone.lower_mm
-        station = rows.station[judged]
-        judged = judged[(station > reserve) & (station < terms.nominal.length_mm - reserve)]
-    deviation = rows.deviation[judged]
-    if np.abs(deviation - terms.target_mm).max(initial=0.0) <= _half_mm(terms):
-        return None
-    return Prefix(count, rows.points[judged], rows.station[judged], deviation, pose)
+    def __init__(self, terms: Terms) -> None:
+        self._terms = terms
+        self._seen: tuple[ScanRows | None, int] = (None, 0)  # the rows looked at, and how often they had been judged anew
+        self._stop = self._told = 0  # rows that were looked at, and rows that the telling ones tell of
+        self._farthest_mm = 0.0
+        self._telling = np.empty(0, dtype=np.int64)
+
+    def prefix(self, rows: ScanRows, pose: RigidTransform, slide_mm: float) -> Prefix | None:
+        """The prefix at a provisional pose, None where no point looks out there: that pose is then a placement that passes.
+
+        slide_mm : how far the pose may still slide along the profile at its open ends (95 %)
+        """
+        self._look(rows)
+        terms, count = self._terms, rows.count
+        if self._farthest_mm <= _half_mm(terms):
+            return None
+        judged = self._telling if count > MANY else np.flatnonzero(rows.verdicts[:count] != NOT_JUDGED)
+        if not terms.nominal.curve.closed:
+            reserve = _SURELY * slide_mm + terms.zone.upper_mm - terms.zone.lower_mm
+            station = rows.station[judged]
+            judged = judged[(station > reserve) & (station < terms.nominal.length_mm - reserve)]
+        deviation = rows.deviation[judged]
+        if np.abs(deviation - terms.target_mm).max(initial=0.0) <= _half_mm(terms):
+            return None
+        return Prefix(count, rows.points[judged], rows.station[judged], deviation, pose)
+
+    def _look(self, rows: ScanRows) -> None:
+        """Look at the rows that were not looked at yet."""
+        if self._seen != (rows, rows.times_anew):
+            self._seen, self._stop, self._told = (rows, rows.times_anew), 0, 0
+            self._farthest_mm, self._telling = 0.0, self._telling[:0]
+        count, length_mm = rows.count, self._terms.nominal.length_mm
+        for part in row_blocks(count - self._stop):
+            off = np.abs(rows.deviation[self._stop + part.start : self._stop + part.stop] - self._terms.target_mm)
+            self._farthest_mm = float(np.fmax.reduce(off, initial=self._farthest_mm))
+        if count > MANY:  # of fewer points all are asked
+            told = self._telling, self._told
+            self._telling = telling_rows(rows.station[:count], rows.deviation[:count], length_mm, MANY // 64, *told)
+            self._told = count
+        self._stop = count
 
 
 def _half_mm(terms: Terms) -> float:

@@ -49,6 +49,7 @@ class ScanRows:
                 is no verdict
     plane     : the plane of the section
     settled_at : the pose at which all rows were settled last, None where rows were taken in or judged otherwise since
+    times_anew : how often rows that had been judged were judged again
     room      : gives the columns, like numpy.empty; a ResizingRoom spares the copies as they grow
     """
 
@@ -62,6 +63,8 @@ class ScanRows:
         self.actual, self.foot, self.normal = _places(0)
         self._tally = np.zeros(TALLY, dtype=np.int64)
         self.settled_at: RigidTransform | None = None
+        self.times_anew = 0
+        self._judged_to = 0  # rows that were judged once
         self._end = 0  # rows taken in, whether they count yet or not
 
     def take_in(self, points_mm: Array, plane: SectionPlane, off_section_max_mm: float) -> None:
@@ -79,6 +82,8 @@ class ScanRows:
         reserve_mm : how far a deviation may still move; a verdict on a point is given where that cannot change it
         """
         self.settled_at = None
+        self.times_anew += first < self._judged_to
+        self._judged_to = stop
         if first < self.base:
             self._keep_places(first, first)
         for rows in row_blocks(stop - first):
@@ -89,6 +94,7 @@ class ScanRows:
         if not len(self.station):
             self.station, self.deviation = (self.room((len(self.verdicts),), np.float64) for _ in range(2))
         self.settled_at = pose if stop is None else None
+        self.times_anew += 1
         for rows in row_blocks(self.count if stop is None else stop):
             self._judge(rows.start, rows.stop, _places(rows.stop - rows.start), rows.start, pose, terms, reserve_mm)
 

@@ -1,12 +1,19 @@
 """The proof in mid-scan: it comes when no placement is left, never on a part that can pass, and never for points beyond an end."""
 
+from typing import Any
+from unittest.mock import patch
+
 import numpy as np
 import pytest
 
 from inspection import LiveInspection, RigidTransform, ToleranceZone, Verdict, discretize
+from inspection.cloud import MANY
+from inspection.prefix import PrefixWatch
+from inspection.telling_points import telling_rows
 from inspection.terms import FitName
 from tests.inspection import profiles
 from tests.inspection.live_scans import ZONE, LiveScan, live_scan, proven_at
+from tests.inspection.profiles import Array
 from tests.inspection.test_placements import dented, nominal_of, scan
 
 
@@ -58,6 +65,36 @@ def test_points_that_may_lie_beyond_an_open_end_take_no_part() -> None:
         live.add(RigidTransform(0.7, np.array([5.0, 9.0])).apply(points + bump[:, None] * normal))
         prefix = live.prefix()
         assert (prefix is not None and live.prefix_search().refutes(prefix)) == is_proof
+
+
+@pytest.mark.parametrize("many", [MANY, 300])
+def test_a_prefix_costs_what_is_new_and_is_that_of_a_look_at_all(many: int) -> None:
+    """Of a scan of many points no row is looked at twice, whatever its length, unless all were judged anew."""
+    given, rng = live_scan("dent", 3, 3000), np.random.default_rng(1)
+    looked = []
+
+    def seen(station_mm: Array, deviation_mm: Array, *rest: Any) -> Any:
+        looked.append(len(station_mm) - rest[-1])
+        return telling_rows(station_mm, deviation_mm, *rest)
+
+    with patch("inspection.live.MANY", many), patch("inspection.prefix.MANY", many), patch("inspection.prefix.telling_rows", seen):
+        live, terms = LiveInspection(given.nominal, ZONE), LiveInspection(given.nominal, ZONE)._terms
+        prefixes = 0
+        for points in np.split(given.points_mm, np.sort(rng.integers(1, 3000, 30))):
+            live.add(points)
+            prefix = live.prefix()
+            if live._track is None:
+                continue
+            looked_so_far = len(looked)
+            whole = PrefixWatch(terms).prefix(live._rows, live._track.pose, live._track.slide_mm())
+            del looked[looked_so_far:]
+            assert (prefix is None) == (whole is None)
+            if prefix is not None and whole is not None:
+                prefixes += 1
+                for name in ("received", "points_mm", "station_mm", "deviation_mm"):
+                    assert np.array_equal(getattr(prefix, name), getattr(whole, name)), name
+    assert prefixes > 5
+    assert sum(looked) == (3000 if many == 300 else 0)
 
 
 def test_a_long_prefix_is_asked_about_by_the_points_that_stand_for_all() -> None:
