@@ -4,21 +4,26 @@ The curve is cut at its corners into smooth pieces; every piece is sampled up to
 corner is two samples at one place, each with the tangent of its own piece.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from itertools import pairwise
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from inspection.curve import NurbsCurve, left_limit
 from inspection.errors import NominalError
+from inspection.first_use import OnFirstUse
 from inspection.foot_grid import FootGrid, build_foot_grid
+from inspection.kernels import SAMPLE_METHODS
 from inspection.methods import Method
 from inspection.sample_table import ProfileSamples, SampleTable, pack_samples
 from inspection.spacing import LocalPoles, space_out
 from inspection.voronoi import site_poles
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -34,20 +39,38 @@ _MOST_SAMPLES = 400_000  # a refinement beyond this is a step limit set too smal
 class NominalProfile(ProfileSamples):
     """The nominal profile: the samples of an exact curve, the curve, and what is looked up on them.
 
-    curve        : the exact curve
-    material     : the side of the curve, seen along its direction, on which the material lies
-    unmet        : samples, other than ends and corners, whose pole angle stays below the limit at the smallest step
-    tree         : finds the nearest sample
-    grid         : finds the closest point of the curve
-    sample_table : the samples packed for the compiled methods
+    curve              : the exact curve
+    material           : the side of the curve, seen along its direction, on which the material lies
+    pole_angle_min_deg : the limit of the pole angles, 0 where there is none
+    grid               : finds the closest point of the curve
+    search, packed     : what is looked up on the samples, made when it is first asked for: see `tree` and `sample_table`
     """
 
     curve: NurbsCurve
     material: Material
-    unmet: int
-    tree: cKDTree
+    pole_angle_min_deg: float
     grid: FootGrid
-    sample_table: SampleTable
+    search: "OnFirstUse[cKDTree]"
+    packed: OnFirstUse[SampleTable]
+
+    @property
+    def tree(self) -> "cKDTree":
+        """The search tree that finds the nearest sample."""
+        return self.search.value
+
+    @property
+    def sample_table(self) -> SampleTable:
+        """The samples, with their poles, packed for the compiled methods that look at samples only."""
+        return self.packed.value
+
+    def table_for(self, method: Method) -> SampleTable | None:
+        """The packed samples where the method looks at samples only; None where it needs none, and so no Voronoi diagram either."""
+        return self.sample_table if method in SAMPLE_METHODS else None
+
+    @property
+    def unmet(self) -> int:
+        """Samples, other than ends and corners, whose pole angle stays below the limit at the smallest step."""
+        return int(_below(self, self.pole_angle_min_deg).sum())
 
     @property
     def outward(self) -> float:
@@ -94,35 +117,53 @@ def discretize(
                          `inversion` are exact at any spacing. The pole angle and the smallest step are not used, because
                          they bound no error.
 
-    The pole angle alone bounds no error; with the defaults it is the even starting step that does. Raises NominalError.
+    The pole angle alone bounds no error; with the defaults it is the even starting step that does. The diagram is built where a
+    step may still be split, and for the methods that use it when they first do. Raises NominalError.
     """
     if accuracy_mm is not None:
-        grid = build_foot_grid(curve)
-        return _profile(curve, material, _evaluate(curve, _accurate_parameters(curve, accuracy_mm, method)), grid)
+        return _profile(curve, material, _evaluate(curve, _accurate_parameters(curve, accuracy_mm, method)), 0.0)
     if samples < 8 or not 0 < pole_angle_min_deg < 180 or not 0 < step_min < 1 or material not in ("left", "right"):
         raise NominalError(
             f"need samples >= 8, 0 < pole_angle_min_deg < 180, 0 < step_min < 1, material left or right; "
             f"got {samples}, {pole_angle_min_deg}, {step_min}, {material}"
         )
-    grid = build_foot_grid(curve)
     pieces = _even_parameters(curve, samples)
     smallest = step_min * (curve.domain[1] - curve.domain[0])
-    while True:
-        found = _evaluate(curve, pieces)
-        below = (found.poles.angle_deg < pole_angle_min_deg) & (found.next_site >= 0) & (found.previous_site >= 0)
-        refined = _refine(pieces, below, smallest)
+    found = _evaluate(curve, pieces)
+    while any(_may_split(piece, smallest).any() for piece in pieces):  # else no pole angle changes anything
+        refined = _refine(pieces, _below(found, pole_angle_min_deg), smallest)
         if sum(map(len, refined)) == sum(map(len, pieces)):
-            return _profile(curve, material, found, grid, int(below.sum()))
+            break
         if sum(map(len, refined)) > _MOST_SAMPLES:
             raise NominalError(f"more than {_MOST_SAMPLES} samples needed; choose a larger step_min than {step_min:g}")
         pieces = refined
+        found = _evaluate(curve, pieces)
+    return _profile(curve, material, found, pole_angle_min_deg)
 
 
-def _profile(curve: NurbsCurve, material: Material, samples: ProfileSamples, grid: FootGrid, unmet: int = 0) -> NominalProfile:
+def _profile(curve: NurbsCurve, material: Material, samples: ProfileSamples, pole_angle_min_deg: float) -> NominalProfile:
     """The profile of these samples."""
-    sampled = {field.name: getattr(samples, field.name) for field in fields(samples)}
-    tree, table = cKDTree(samples.points_mm), pack_samples(samples, curve)
-    return NominalProfile(**sampled, curve=curve, material=material, unmet=unmet, tree=tree, grid=grid, sample_table=table)
+    return NominalProfile(
+        **{field.name: getattr(samples, field.name) for field in fields(samples)},
+        curve=curve,
+        material=material,
+        pole_angle_min_deg=pole_angle_min_deg,
+        grid=build_foot_grid(curve),
+        search=OnFirstUse(lambda: _search_tree(samples.points_mm)),
+        packed=OnFirstUse(lambda: pack_samples(samples, curve)),
+    )
+
+
+def _search_tree(points_mm: Array) -> "cKDTree":
+    """The search tree of points (n, 2)."""
+    from scipy.spatial import cKDTree  # noqa: PLC0415 - it takes a third of a second, and the exact method needs no tree
+
+    return cKDTree(points_mm)
+
+
+def _below(samples: ProfileSamples, pole_angle_min_deg: float) -> NDArray[np.bool_]:
+    """Whether each sample (n,), other than ends and corners, has a pole angle below the limit."""
+    return np.asarray((samples.poles.angle_deg < pole_angle_min_deg) & (samples.next_site >= 0) & (samples.previous_site >= 0))
 
 
 def _accurate_parameters(curve: NurbsCurve, accuracy_mm: float, method: Method) -> list[Array]:
@@ -130,6 +171,19 @@ def _accurate_parameters(curve: NurbsCurve, accuracy_mm: float, method: Method) 
     if not 0 < accuracy_mm < np.inf:
         raise NominalError(f"the accuracy must be a positive number, not {accuracy_mm:g} mm")
     even = _even_parameters(curve, _SCOUT_SAMPLES)
+    scouted = OnFirstUse(lambda: _scout_poles(curve, even))
+
+    def poles(at: Array) -> LocalPoles:
+        return scouted.value(at)
+
+    pieces = [space_out(curve, piece[0], piece[-1], accuracy_mm, method, poles) for piece in even]
+    if sum(map(len, pieces)) > _MOST_SAMPLES:
+        raise NominalError(f"{method} needs more than {_MOST_SAMPLES} samples for {accuracy_mm:g} mm; choose circle or exact")
+    return pieces
+
+
+def _scout_poles(curve: NurbsCurve, even: list[Array]) -> Callable[[Array], LocalPoles]:
+    """What tells the poles at parameters (g,), read off those of an even discretisation."""
     scout = _evaluate(curve, even)
     u, curvature, poles_there = scout.parameter, scout.curvature, scout.poles
     sides = ((poles_there.left_curvature, curvature), (poles_there.right_curvature, -curvature))
@@ -143,10 +197,7 @@ def _accurate_parameters(curve: NurbsCurve, accuracy_mm: float, method: Method) 
         wrapped = np.where(at > end, at - (end - start), at)
         return LocalPoles(*(np.interp(wrapped, u[order], values[order]) for values in (radius, _neighbourhood_maximum(pole_error))))
 
-    pieces = [space_out(curve, piece[0], piece[-1], accuracy_mm, method, poles) for piece in even]
-    if sum(map(len, pieces)) > _MOST_SAMPLES:
-        raise NominalError(f"{method} needs more than {_MOST_SAMPLES} samples for {accuracy_mm:g} mm; choose circle or exact")
-    return pieces
+    return poles
 
 
 def _pole_error(pole_curvature: Array, curvature: Array, farthest_mm: float) -> Array:
@@ -177,9 +228,14 @@ def _refine(pieces: list[Array], below: NDArray[np.bool_], smallest: float) -> l
         smooth_loop = len(pieces) == 1 and len(piece) == len(below) + 1
         failing = np.append(below, below[0]) if smooth_loop else below[first : first + len(piece)]
         first += len(piece)
-        split = (failing[:-1] | failing[1:]) & (np.diff(piece) / 2 >= smallest)
+        split = (failing[:-1] | failing[1:]) & _may_split(piece, smallest)
         refined.append(np.sort(np.concatenate([piece, (piece[:-1] + piece[1:])[split] / 2])))
     return refined
+
+
+def _may_split(piece: Array, smallest: float) -> NDArray[np.bool_]:
+    """Whether the halves of each step of a piece are no shorter than `smallest`."""
+    return np.asarray(np.diff(piece) / 2 >= smallest)
 
 
 def _evaluate(curve: NurbsCurve, pieces: list[Array]) -> ProfileSamples:
@@ -210,7 +266,7 @@ def _evaluate(curve: NurbsCurve, pieces: list[Array]) -> ProfileSamples:
         previous_site=previous,
         twin=twin,
         is_open_end=is_open_end,
-        poles=site_poles(point, normal, following, at_end, is_straight),
+        diagram=OnFirstUse(lambda: site_poles(point, normal, following, at_end, is_straight)),
     )
 
 

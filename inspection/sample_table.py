@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from inspection.box_tree import box_tree
 from inspection.curve import NurbsCurve
+from inspection.first_use import OnFirstUse
 from inspection.kernels.layout import LEAF
 from inspection.voronoi import SitePoles
 
@@ -16,7 +17,7 @@ Index = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ProfileSamples:
-    """n samples of a curve with their neighbours and poles.
+    """n samples of a curve with their neighbours and, made when they are first asked for, their poles.
 
     parameter       : (n,) curve parameter of each sample, rising within a piece
     points_mm       : (n, 2)
@@ -27,7 +28,7 @@ class ProfileSamples:
     next_site, previous_site : (n,) neighbours within the piece (around the seam where that is smooth), -1 at its ends
     twin            : (n,) the sample of the adjoining piece at the same corner, -1 elsewhere
     is_open_end     : (n,) the two ends of an open curve
-    poles           : left and right poles of every sample
+    diagram         : the poles to be, for `poles`
     """
 
     parameter: Array
@@ -41,7 +42,7 @@ class ProfileSamples:
     previous_site: Index
     twin: Index
     is_open_end: NDArray[np.bool_]
-    poles: SitePoles
+    diagram: OnFirstUse[SitePoles]
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -51,6 +52,11 @@ class ProfileSamples:
 
     def __len__(self) -> int:
         return len(self.parameter)
+
+    @property
+    def poles(self) -> SitePoles:
+        """Left and right poles of every sample, from the Voronoi diagram of all of them: the paper's methods need them, no other does."""
+        return self.diagram.value
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import Voronoi, cKDTree
 
 Array = NDArray[np.float64]
 
@@ -57,6 +56,8 @@ def site_poles(
     is_end    : (n,) ends and corners, whose pole directions are plus and minus the normal, whatever their cell says
     is_straight : (n,) sites of straight parts, where a vertex out in the box counts as one at infinity
     """
+    from scipy.spatial import Voronoi  # noqa: PLC0415 - it takes a third of a second, and the exact method needs no diagram
+
     site_of, cells = _distinct_cells(sites_mm)  # (n,), (c, 2)
     diagram = Voronoi(np.vstack([cells, _box_places(cells)]))
     ridges = np.asarray(diagram.ridge_points, dtype=np.int64)  # (r, 2) pairs of cells
@@ -74,6 +75,8 @@ def site_poles(
 
 def _distinct_cells(sites_mm: Array) -> tuple[NDArray[np.int64], Array]:
     """Cell of every site (n,), and the places of the cells (c, 2)."""
+    from scipy.spatial import cKDTree  # noqa: PLC0415
+
     grain = _SAME_PLACE * np.hypot(*np.ptp(sites_mm, axis=0))
     owner = np.arange(len(sites_mm))
     pairs = cKDTree(sites_mm).query_pairs(grain, output_type="ndarray")  # (p, 2), smaller index first

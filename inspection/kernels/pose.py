@@ -94,7 +94,7 @@ class PoseFit:
         self,
         points_mm: Array,
         grid: CurveTables,
-        table: SampleTables,
+        table: SampleTables | None,
         method: str,
         outward: float,
         tip_radius_mm: float,
@@ -107,7 +107,7 @@ class PoseFit:
         self.weights[:] = 1.0
         curve = (grid.reals, grid.integers, float(outward), float(tip_radius_mm))
         self._problem = (flatten(points_mm), left_out, self.weights, *curve)
-        self._samples = (*table.flat, SAMPLE_METHODS.index(method)) if method in SAMPLE_METHODS else None
+        self._samples = None if table is None else (*table.flat, SAMPLE_METHODS.index(method))
         chunk = min(m, at_once)
         before, after = room((m,), np.uint8), room((m,), np.uint8)
         before[:] = 1

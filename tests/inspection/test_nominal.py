@@ -1,11 +1,25 @@
 """Algorithm 1: both limits respected, every sample consistent with the curve, and the counts of the published method."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from inspection import NominalError, NominalProfile, NurbsCurve, discretize
+from inspection import (
+    LiveInspection,
+    Method,
+    NominalError,
+    NominalProfile,
+    NurbsCurve,
+    RigidTransform,
+    ToleranceZone,
+    Verdict,
+    deviations,
+    discretize,
+    register,
+)
+from inspection.kernels import SAMPLE_METHODS
 from tests.inspection import profiles
 
 
@@ -119,6 +133,44 @@ def test_coinciding_ends_of_an_open_curve_leave_no_gap_in_the_numbers() -> None:
         assert np.isfinite(getattr(nominal.poles, field)).all(), field
     assert np.isfinite(nominal.normal).all()
     assert nominal.is_open_end.sum() == 2
+
+
+def refuse_diagrams(*_: Any) -> Any:
+    """Stand in for the making of poles where none may be made."""
+    raise AssertionError("a Voronoi diagram was built")
+
+
+def test_the_exact_method_builds_no_voronoi_diagram(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("inspection.nominal.site_poles", refuse_diagrams)
+    nominal = discretize(profiles.p3())
+    points = nominal.points_mm[::20] + 0.01 * nominal.normal[::20]
+    for method in ("exact", "inversion"):
+        assert deviations(points, nominal, method=method).deviation_mm == pytest.approx(-0.01)
+    moved = RigidTransform(0.3, np.array([5.0, 6.0])).apply(points)
+    assert register(moved, nominal).converged
+    live = LiveInspection(nominal, ToleranceZone(-0.1, 0.1))
+    live.add(moved)
+    assert live.finish().verdict == Verdict.CONFORM
+    assert len(discretize(profiles.p3(), accuracy_mm=0.01, method="exact")) > 8
+
+
+@pytest.mark.parametrize("method", SAMPLE_METHODS)
+def test_methods_that_look_at_samples_have_their_diagram_before_the_first_point(method: Method, monkeypatch: pytest.MonkeyPatch) -> None:
+    nominal = discretize(profiles.p3(), samples=500, step_min=1 / 500)
+    live = LiveInspection(nominal, ToleranceZone(-0.1, 0.1), method=method)
+    monkeypatch.setattr("inspection.nominal.site_poles", refuse_diagrams)
+    live.add(nominal.points_mm)
+    assert live.finish().verdict == Verdict.CONFORM
+
+
+def test_poles_are_those_of_the_samples_whenever_they_are_asked_for() -> None:
+    early, late = (discretize(profiles.p1(), samples=500, step_min=1 / 500) for _ in range(2))
+    assert early.poles.angle_deg.min() > 0
+    deviations(late.points_mm, late)  # other work in between
+    for poles in (late.poles, replace(late, material="right").poles):
+        assert poles.edge_left_mm.tobytes() == early.poles.edge_left_mm.tobytes()
+        assert not poles.left.flags.writeable
+    assert late.poles is late.poles
 
 
 def test_outward_follows_the_side_of_the_material() -> None:
