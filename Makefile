@@ -7,7 +7,7 @@ INSTALL := $(PIP) --no-build-isolation --editable
 # The tests start a hundred processes; where Python may keep no compiled files, each of them compiles every file anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo install test checks compiled lowest platforms upgrade bench paper faults powercuts kills fuzz soak damage memory proofs laws audit supply-chain
+.PHONY: demo install test checks compiled lowest platforms upgrade bench slower paper faults powercuts kills fuzz soak damage memory proofs laws audit supply-chain
 demo: .venv/installed
 	$(BIN)/cmmlink demo --out demo-result
 
@@ -97,9 +97,15 @@ laws: .venv/test-installed
 audit: .venv/test-installed
 	$(BIN)/python -m tests.benchmarks.verdict_audit
 
-# Ours against the rivals of the package index, in one run; takes some minutes and wants a quiet machine.
+# All that a user waits for, and the projection against the rivals of the package index; takes half an hour and wants a quiet machine.
+# A line is added to docs/performance-history.jsonl, docs/performance.md is written, and what got slower is named.
 bench: .venv/bench-installed
+	$(BIN)/python -m tests.benchmarks.bench --long
 	$(BIN)/python -m tests.benchmarks.projection_benchmark --rivals --millions
+
+# What got slower in the last run of the benchmark than in the one before on this processor, by more than its scatter.
+slower: .venv/test-installed
+	$(BIN)/python -m tests.benchmarks.bench --slower
 
 # The published paper's tables and the registration's figures; MH42=FILE gives the coordinates that may not be shipped.
 paper: .venv/bench-installed

@@ -9,9 +9,6 @@ from pathlib import Path
 
 def machine(*packages: str) -> str:
     """Date, processor, cores, system, versions of Python and of those of the packages that are installed."""
-    info = Path("/proc/cpuinfo")
-    lines = info.read_text().splitlines() if info.is_file() else []
-    processor = next((line.split(":")[1].strip() for line in lines if line.startswith("model name")), platform.processor())
     versions = [f"Python {platform.python_version()}"]
     for package in packages:
         try:
@@ -19,4 +16,12 @@ def machine(*packages: str) -> str:
         except importlib.metadata.PackageNotFoundError:
             versions.append(f"{package} not installed")
     today = datetime.datetime.now(tz=datetime.UTC).date().isoformat()
-    return f"{today}; {processor or platform.machine()}, {os.cpu_count()} cores, {platform.system()}; {', '.join(versions)}."
+    return f"{today}; {processor()}, {os.cpu_count()} cores, {platform.system()}; {', '.join(versions)}."
+
+
+def processor() -> str:
+    """Name of the processor: figures of another one are not comparable."""
+    info = Path("/proc/cpuinfo")
+    lines = info.read_text(encoding="utf-8").splitlines() if info.is_file() else []
+    named = next((line.split(":")[1].strip() for line in lines if line.startswith("model name")), platform.processor())
+    return named or platform.machine()
