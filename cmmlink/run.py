@@ -100,12 +100,12 @@ def carry_out(
     live = inspection_of(plan, profile, scratch, provisional=followed)
     started = run_started(plan, device.device, device.simulated, (*notes_on_nominal(plan), *device.notes))
     on_ready()
-    began = now()
     with ExitStack() as stack:
         recorder: Recorder | None = None
         if records is not None:
             store = stack.enter_context(open_to_record(records, now, patience_s))
             recorder = stack.enter_context(Recorder(store, RunInputs.of(plan), clock=clock, now=now))
+        began = recorder.began if recorder else now()
         listeners: list[Sink] = [*([recorder] if recorder else []), *sinks, log_event]
         outcome = run_inspection(
             device.source,

@@ -60,13 +60,24 @@ class StackRecord:
 
     @classmethod
     def of(
-        cls, store: Store, plan: CtPlan, triangles: int, sections: int, *, clock: Callable[[], float], now: Callable[[], datetime]
+        cls,
+        store: Store,
+        plan: CtPlan,
+        triangles: int,
+        sections: int,
+        *,
+        began: datetime,
+        clock: Callable[[], float],
+        now: Callable[[], datetime],
     ) -> "StackRecord":
-        """Begin the records of a stack; the file of the surface is read for its hash."""
+        """Begin the records of a stack; the file of the surface is read for its hash.
+
+        began : when its inspection began; `now` tells when each section did
+        """
         with plan.mesh.file.open("rb") as file:
             sha256 = hashlib.file_digest(file, "sha256").hexdigest()
         facts = {
-            "stack": f"{now():%Y%m%d-%H%M%S}-{sha256[:8]}",
+            "stack": f"{began:%Y%m%d-%H%M%S}-{sha256[:8]}",
             "sections": sections,
             "surface": plan.mesh.file.name,
             "surface_sha256": sha256,

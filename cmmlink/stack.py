@@ -180,7 +180,7 @@ def inspect_stack(
         record = None
         if records is not None:
             store = opened.enter_context(open_to_record(records, now, patience_s))
-            record = StackRecord.of(store, plan, mesh.triangles, len(heights), clock=clock, now=now)
+            record = StackRecord.of(store, plan, mesh.triangles, len(heights), began=began, clock=clock, now=now)
         on_start(len(heights))
         read_in = [f"{plan.mesh.file.name}: read in {plan.mesh.unit}, as asked"] if plan.mesh.unit else []
         notes = [*read_in, *mesh.warnings, *profiles.notes]

@@ -110,7 +110,10 @@ def judged_bodies(result: InspectionResult | None) -> Iterator[tuple[int, bytes]
 
 
 class Recorder:
-    """Records one run in an open store."""
+    """Records one run in an open store.
+
+    began : when the run began, the one moment that its record and its result tell
+    """
 
     def __init__(
         self,
@@ -127,7 +130,7 @@ class Recorder:
         self.run = ""
         self.evidence: RecordReference | None = None
         self._started: RunStarted | None = None
-        self._began = now()
+        self.began = now()
         self._store, self._inputs, self._clock, self._now = store, inputs, clock, now
         self._commit_s, self._acknowledge = commit_s, acknowledge
         self._queue: Buffer[Arrived | _Pose] = Buffer(queue_bytes)
@@ -146,7 +149,7 @@ class Recorder:
         elif isinstance(event, Judged):
             self._note_pose(event)
         elif isinstance(event, RunStarted):
-            self._started, self._began = event, self._now()
+            self._started = event
         elif isinstance(event, RunFinished) and self.run:
             self._end(event)
 
@@ -174,7 +177,7 @@ class Recorder:
     def _begin(self) -> None:
         """Add the run to the records. A device that never opened gives no run: nothing was measured."""
         assert self._started is not None, "a run begins with RunStarted"
-        began, started, inputs = self._began, self._started, self._inputs
+        began, started, inputs = self.began, self._started, self._inputs
         self.run = f"{began:%Y%m%d-%H%M%S}-{self._store.count_runs() + 1:04d}"
         plan = inputs.plan.encode()
         header = {

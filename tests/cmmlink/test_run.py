@@ -1,8 +1,10 @@
 """One run of a plan: its record, its sinks, and what comes of it."""
 
+import itertools
 import threading
 import time
 from collections.abc import Callable
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +18,19 @@ from cmmlink.from_plan import inspection_of
 from cmmlink.plan import FileDevice, Plan
 from cmmlink.record.reader import list_runs, open_to_read, recorded_run
 from cmmlink.run import FinishedRun, carry_out
+from cmmlink.words import utc_words
 from drivers import LinkError
 from inspection import LiveInspection
 from tests.cmmlink.recorded import Script, scan_arrivals, small_plan, small_profile, today
 
 
 def run(
-    source: Script, records: Path | None, *sinks: Sink, on_ready: Callable[[], None] = lambda: None, plan: Plan | None = None
+    source: Script,
+    records: Path | None,
+    *sinks: Sink,
+    on_ready: Callable[[], None] = lambda: None,
+    plan: Plan | None = None,
+    now: Callable[[], datetime] = today,
 ) -> FinishedRun:
     plan = (plan or small_plan()).model_copy(update={"operator": "A. Operator"})
     return carry_out(
@@ -31,7 +39,7 @@ def run(
         Connected(source, "scripted", simulated=True),
         records=records,
         clock=time.monotonic,
-        now=today,
+        now=now,
         stop=threading.Event(),
         sinks=sinks,
         on_ready=on_ready,
@@ -50,6 +58,16 @@ def test_a_finished_run_is_what_its_record_says(tmp_path: Path) -> None:
     assert (document["run"], document["operator"], document["simulated"]) == (recorded.run, "A. Operator", True)
     assert document["received"] == document["judged"] + document["rejected"] == 612
     assert finished.title == f"{small_plan().part.name} {small_plan().part.serial_number} (SIMULATED)"
+
+
+def test_a_run_was_measured_at_one_moment_whoever_tells_it(tmp_path: Path) -> None:
+    moments = (today() + timedelta(seconds=7 * number) for number in itertools.count())
+    finished = run(Script(*scan_arrivals()), tmp_path, now=lambda: next(moments))
+    assert finished.evidence is not None
+    with open_to_read(tmp_path, today) as store:
+        header = recorded_run(store, finished.evidence.run).header
+    assert finished.result_json()["measured_at"] == header["started"] == utc_words(finished.began)
+    assert finished.evidence.run.startswith(f"{finished.began:%Y%m%d-%H%M%S}")
 
 
 def test_without_a_folder_nothing_is_recorded_and_the_result_is_the_same(tmp_path: Path) -> None:

@@ -26,7 +26,7 @@ from cmmlink.record.reader import (
 )
 from cmmlink.record.recorder import Acknowledged, Recorder, RunInputs
 from cmmlink.record.store import FILE_NAME, Store
-from drivers.source import Arrival, Heartbeat, PointBatch, WireBytes
+from drivers.source import Arrival, Heartbeat, PointBatch, Rejected, WireBytes
 from tests.cmmlink.recorded import Script, record, scan_arrivals, today
 
 
@@ -155,6 +155,35 @@ def test_a_program_that_fails_leaves_a_run_that_says_so(tmp_path: Path) -> None:
         told = describe(store, entry["run"])
         assert "a defect elsewhere" in told["message"]
         assert sum(len(batch) for batch in points_of(store, entry["run"])) == 600
+
+
+@pytest.mark.parametrize("end_has_room", [True, False])
+@pytest.mark.parametrize("batches", [1, 2, 5])
+def test_a_disk_that_fills_up_leaves_the_count_of_what_is_on_record(tmp_path: Path, batches: int, end_has_room: bool) -> None:
+    """So many batches find room; of what follows nothing does, or the end of the run alone."""
+    reached, acknowledged = threading.Event(), [0]
+    refused = "NEW.kind = 'points'" if end_has_room else "1"
+
+    def acknowledge(told: Acknowledged) -> None:
+        acknowledged.append(told.points)
+        if told.points == 50 * batches and not reached.is_set():
+            with closing(sqlite3.connect(tmp_path / FILE_NAME)) as connection, connection:
+                connection.execute(f"CREATE TRIGGER full BEFORE INSERT ON record WHEN {refused} BEGIN SELECT RAISE(ABORT, 'full'); END")
+            reached.set()
+
+    scan, first = scan_arrivals(), 3 * batches - 1
+    source = Script(*scan[:first], lambda: reached.wait(30), *scan[first:])
+    with pytest.raises(StoreError, match="so it has no result") as error:
+        record(tmp_path, source, acknowledge=acknowledge, commit_s=0.001)
+    with closing(sqlite3.connect(tmp_path / FILE_NAME)) as connection:
+        connection.execute("DROP TRIGGER full")
+    (entry,) = list_runs(tmp_path, today)
+    with open_to_read(tmp_path, today) as store:
+        points = sum(len(batch) for batch in points_of(store, entry["run"]))
+        rejected = sum(moment.arrival.count for moment in arrivals_of(store, entry["run"]) if isinstance(moment.arrival, Rejected))
+    assert f"{points} points are safe" in str(error.value)
+    assert points == acknowledged[-1] == 50 * batches
+    assert (entry["state"], entry["received"]) == ("interrupted", points + rejected)
 
 
 def test_a_result_that_cannot_be_recorded_is_not_given(tmp_path: Path) -> None:
