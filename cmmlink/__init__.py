@@ -19,16 +19,25 @@ if TYPE_CHECKING:
     from cmmlink.run import FinishedRun, carry_out
     from cmmlink.stack import StackOutcome, inspect_stack
     from cmmlink.version import __version__
+else:
+    _PLACES = {
+        "cmmlink.devices": ("Connected", "connect"),
+        "cmmlink.errors": ("PlanError", "RunError", "StoreError"),
+        "cmmlink.from_plan": ("profile_of",),
+        "cmmlink.plan": ("CtPlan", "Plan", "load_ct_plan", "load_plan"),
+        "cmmlink.run": ("FinishedRun", "carry_out"),
+        "cmmlink.stack": ("StackOutcome", "inspect_stack"),
+        "cmmlink.version": ("__version__",),
+    }
 
-_PLACES = {
-    "cmmlink.devices": ("Connected", "connect"),
-    "cmmlink.errors": ("PlanError", "RunError", "StoreError"),
-    "cmmlink.from_plan": ("profile_of",),
-    "cmmlink.plan": ("CtPlan", "Plan", "load_ct_plan", "load_plan"),
-    "cmmlink.run": ("FinishedRun", "carry_out"),
-    "cmmlink.stack": ("StackOutcome", "inspect_stack"),
-    "cmmlink.version": ("__version__",),
-}
+    def __getattr__(name: str) -> object:
+        from importlib import import_module  # noqa: PLC0415 - nothing is loaded before a name is used
+
+        for place, names in _PLACES.items():
+            if name in names:
+                return getattr(import_module(place), name)
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
 
 __all__ = [
     "Connected",
@@ -47,12 +56,3 @@ __all__ = [
     "load_plan",
     "profile_of",
 ]
-
-
-def __getattr__(name: str) -> object:
-    from importlib import import_module  # noqa: PLC0415 - nothing is loaded before a name is used
-
-    for place, names in _PLACES.items():
-        if name in names:
-            return getattr(import_module(place), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

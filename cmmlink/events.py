@@ -7,10 +7,12 @@ A sink is any function that takes an event; it is called in the thread of the ru
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from drivers import Arrival
-from inspection import InspectionResult, LiveUpdate
+
+if TYPE_CHECKING:
+    from inspection import InspectionResult, LiveUpdate
 
 Ending = Literal["complete", "aborted", "interrupted"]
 
@@ -72,7 +74,7 @@ class Judged:
 
     time_s: float
     age_s: float
-    update: LiveUpdate
+    update: "LiveUpdate"
     counts: Counts
 
 
@@ -89,7 +91,7 @@ class RunFinished:
     """The run is over. Without a result, `message` says why there is none; after a failure it says what failed."""
 
     ending: Ending
-    result: InspectionResult | None
+    result: "InspectionResult | None"
     counts: Counts
     message: str
 

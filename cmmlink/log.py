@@ -14,16 +14,12 @@ from pathlib import Path
 
 from platformdirs import user_log_path
 
-from cmmlink.events import Arrived, Event, RunFinished, RunStarted
 from cmmlink.version import __version__
-from drivers import LinkDown, LinkUp, ScanClosed, ScanOpened
 
 FILE_NAME = "cmmlink.log"
 _MOST_BYTES, _OLDER_FILES = 1_000_000, 3
 _LINE = "%(asctime)s %(process)d %(levelname)s %(name)s: %(message)s"
-_TOLD = ScanOpened | ScanClosed | LinkDown | LinkUp  # of what arrives: a few lines a run, never one a point or a frame
 _log = logging.getLogger(__name__)
-logging.getLogger("cmmlink").addHandler(logging.NullHandler())  # as in any library: a script that keeps no log is not spoken to
 
 
 def log_folder() -> Path:
@@ -66,19 +62,6 @@ def log_command(arguments: list[str]) -> None:
     _log.info("cmmlink %s on %s: %s", __version__, python, " ".join(map(_quote, arguments)))
     with suppress(OSError):  # the folder may be gone
         _log.info("in %s", Path.cwd())
-
-
-def log_event(event: Event) -> None:
-    """A sink that notes how a run begins and ends and what happens to its link."""
-    if isinstance(event, RunStarted):
-        _log.info("run of %s", event)
-    elif isinstance(event, Arrived):
-        if isinstance(event.arrival, _TOLD):
-            _log.log(logging.WARNING if isinstance(event.arrival, LinkDown) else logging.INFO, "link: %s", event.arrival)
-    elif isinstance(event, RunFinished):
-        _log.info(
-            "run %s, %s: %s. %s", event.ending, event.result.verdict.word if event.result else "no result", event.counts, event.message
-        )
 
 
 class _SilentQueue(QueueHandler):

@@ -2,13 +2,16 @@
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cmmlink.events import Counts, RunStarted
-from inspection import InspectionResult, Registration, Verdict
+from inspection import Verdict
+
+if TYPE_CHECKING:
+    from inspection import InspectionResult, Registration
 
 _PLACES = 50  # of the profile, whose numbers of points are compared
 _DENSER = 10.0
@@ -16,7 +19,7 @@ _AT_ONCE = 1 << 16  # points looked at together
 _SHARE_OF_A_PLACE = 0.05  # of the points: fewer move no fit
 
 
-def result_json(result: InspectionResult | None, counts: Counts) -> dict[str, Any]:
+def result_json(result: "InspectionResult | None", counts: Counts) -> dict[str, Any]:
     """The result with the keys that the command line promises. Without a result: the counts, the verdict uncertain, and nulls."""
     head = {"received": counts.received, "judged": counts.judged, "rejected": counts.rejected, "lost": counts.lost}
     tail = {"rejected_by_reason": dict(counts.rejected_by_reason), "damaged_bytes": counts.damaged_bytes}
@@ -64,7 +67,7 @@ def density_of(stations_mm: Iterable[NDArray[np.float64]], length_mm: float) -> 
     return counts
 
 
-def stations_of(result: InspectionResult | None) -> Iterator[NDArray[np.float64]]:
+def stations_of(result: "InspectionResult | None") -> Iterator[NDArray[np.float64]]:
     """The stations of a result, piece by piece."""
     for first in range(0, result.received if result is not None else 0, _AT_ONCE):
         assert result is not None
@@ -129,12 +132,12 @@ def number(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def _gap(result: InspectionResult) -> dict[str, float]:
+def _gap(result: "InspectionResult") -> dict[str, float]:
     gap = result.gap
     return {"from_mm": gap.from_mm, "to_mm": gap.to_mm, "allowed_mm": result.gap_max_mm, "could_hide_mm": gap.could_hide_mm}
 
 
-def _worst(result: InspectionResult) -> dict[str, float] | None:
+def _worst(result: "InspectionResult") -> dict[str, float] | None:
     worst = result.worst_row
     if worst is None:
         return None
@@ -146,7 +149,7 @@ def _worst(result: InspectionResult) -> dict[str, float] | None:
     }
 
 
-def _registration(registration: Registration) -> dict[str, Any]:
+def _registration(registration: "Registration") -> dict[str, Any]:
     pose = registration.nominal_from_section
     return {
         "rotation_deg": math.degrees(pose.rotation_rad),

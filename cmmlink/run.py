@@ -16,12 +16,12 @@ from typing import Any
 from cmmlink.devices import Connected
 from cmmlink.events import RunStarted, Sink
 from cmmlink.from_plan import inspection_of, notes_on_nominal, run_started
-from cmmlink.log import log_event
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan import FileDevice, Plan
 from cmmlink.record import PATIENCE_S, Recorder, RecordReference, RunInputs, open_to_record
 from cmmlink.result_folder import folder_of
 from cmmlink.result_json import density_notes, density_of, identity_json, result_json, stations_of
+from cmmlink.run_log import log_event
 from cmmlink.scratch import scratch_in, words_of_room
 from cmmlink.words import utc_words
 from inspection import NominalProfile, rehearse

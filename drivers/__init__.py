@@ -5,33 +5,75 @@ files of points. What opens a link stays in `drivers.links`, and what cuts surfa
 scipy and Open3D are loaded only by those who import from there.
 """
 
-from drivers.codecs import decoder, decoders, unseen_in
-from drivers.codecs.register_decoder import RegisterDecoder
-from drivers.codecs.register_map import RegisterMap, register_map
-from drivers.errors import DeviceError, DeviceRefused, LinkError, MeshError, PointFileError, ProtocolError
-from drivers.files.column_choice import AxisName
-from drivers.files.point_file import PointFile, PointFileSource, convert_to_mm, points_of, read_points
-from drivers.files.stated_units import UnitName, mm_per
-from drivers.files.text_table import Columns, count_of, numbers_of, parse_columns, read_text, shorten
-from drivers.links.address import device_address
-from drivers.links.capture import Capture
-from drivers.maps import shipped_map, shipped_maps
-from drivers.source import (
-    HARMLESS_REASONS,
-    Arrival,
-    Damaged,
-    Decoder,
-    Heartbeat,
-    LinkDown,
-    LinkUp,
-    Lost,
-    PointBatch,
-    Rejected,
-    ScanClosed,
-    ScanOpened,
-    ScanSource,
-    WireBytes,
-)
+TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer to load than all of this
+
+if TYPE_CHECKING:
+    from drivers.codecs import decoder, decoders, unseen_in
+    from drivers.codecs.register_decoder import RegisterDecoder
+    from drivers.codecs.register_map import RegisterMap, register_map
+    from drivers.errors import DeviceError, DeviceRefused, LinkError, MeshError, PointFileError, ProtocolError
+    from drivers.files.column_choice import AxisName
+    from drivers.files.point_file import PointFile, PointFileSource, convert_to_mm, points_of, read_points
+    from drivers.files.stated_units import UnitName, mm_per
+    from drivers.files.text_table import Columns, count_of, numbers_of, parse_columns, read_text, shorten
+    from drivers.links.address import device_address
+    from drivers.links.capture import Capture
+    from drivers.maps import shipped_map, shipped_maps
+    from drivers.source import (
+        HARMLESS_REASONS,
+        Arrival,
+        Damaged,
+        Decoder,
+        Heartbeat,
+        LinkDown,
+        LinkUp,
+        Lost,
+        PointBatch,
+        Rejected,
+        ScanClosed,
+        ScanOpened,
+        ScanSource,
+        WireBytes,
+    )
+else:
+    _PLACES = {
+        "drivers.codecs": ("decoder", "decoders", "unseen_in"),
+        "drivers.codecs.register_decoder": ("RegisterDecoder",),
+        "drivers.codecs.register_map": ("RegisterMap", "register_map"),
+        "drivers.errors": ("DeviceError", "DeviceRefused", "LinkError", "MeshError", "PointFileError", "ProtocolError"),
+        "drivers.files.column_choice": ("AxisName",),
+        "drivers.files.point_file": ("PointFile", "PointFileSource", "convert_to_mm", "points_of", "read_points"),
+        "drivers.files.stated_units": ("UnitName", "mm_per"),
+        "drivers.files.text_table": ("Columns", "count_of", "numbers_of", "parse_columns", "read_text", "shorten"),
+        "drivers.links.address": ("device_address",),
+        "drivers.links.capture": ("Capture",),
+        "drivers.maps": ("shipped_map", "shipped_maps"),
+        "drivers.source": (
+            "HARMLESS_REASONS",
+            "Arrival",
+            "Damaged",
+            "Decoder",
+            "Heartbeat",
+            "LinkDown",
+            "LinkUp",
+            "Lost",
+            "PointBatch",
+            "Rejected",
+            "ScanClosed",
+            "ScanOpened",
+            "ScanSource",
+            "WireBytes",
+        ),
+    }
+
+    def __getattr__(name: str) -> object:
+        from importlib import import_module  # noqa: PLC0415 - nothing is loaded before a name is used
+
+        for place, names in _PLACES.items():
+            if name in names:
+                return getattr(import_module(place), name)
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
 
 __all__ = [
     "HARMLESS_REASONS",

@@ -3,30 +3,72 @@
 This is the front door: an application imports what `__all__` lists and none of the files behind it.
 """
 
-from inspection import synthetic
-from inspection.coarse import register_coarse
-from inspection.conclusion import Missing, Reason, reasons_of_abort
-from inspection.curve import NurbsCurve
-from inspection.curve_check import CurveCheck, Hollow, check_curve
-from inspection.deviations import Deviations, deviations, profile_error_mm
-from inspection.errors import InspectionError, NominalError, NotMeasured, RegistrationError
-from inspection.fine import register, register_fine
-from inspection.gaps import Gap, coverage, default_gap_max_mm
-from inspection.kernels import Room, compiled_code_folder, while_compiling
-from inspection.live import LiveInspection, LiveUpdate, State, rehearse
-from inspection.methods import Method, WeightName
-from inspection.minimum_zone import MinimumZone, fit_minimum_zone
-from inspection.nominal import Material, NominalProfile, discretize
-from inspection.placements import PlacementProof, PlacementSearch
-from inspection.prefix import Prefix, PrefixSearch
-from inspection.registration import Registration
-from inspection.result import NOT_JUDGED, InspectionResult, JudgedRows, Rejection, Stretch
-from inspection.rigid import RigidTransform
-from inspection.section import SectionPlane
-from inspection.self_crossings import Crossing, find_crossings
-from inspection.telling_points import telling_rows
-from inspection.terms import FitName, RuleName
-from inspection.tolerance import ToleranceZone, Verdict
+TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer to load than all of this
+
+if TYPE_CHECKING:
+    from inspection import synthetic
+    from inspection.coarse import register_coarse
+    from inspection.conclusion import Missing, Reason, reasons_of_abort
+    from inspection.curve import NurbsCurve
+    from inspection.curve_check import CurveCheck, Hollow, check_curve
+    from inspection.errors import InspectionError, NominalError, NotMeasured, RegistrationError
+    from inspection.fine import register, register_fine
+    from inspection.gaps import Gap, coverage, default_gap_max_mm
+    from inspection.judged_rows import JudgedRows
+    from inspection.kernels import Room, compiled_code_folder, while_compiling
+    from inspection.live import LiveInspection, LiveUpdate, State, rehearse
+    from inspection.methods import FitName, Material, Method, RuleName, WeightName
+    from inspection.minimum_zone import MinimumZone, fit_minimum_zone
+    from inspection.nominal import NominalProfile, discretize
+    from inspection.placements import PlacementProof, PlacementSearch
+    from inspection.prefix import Prefix, PrefixSearch
+    from inspection.registration import Registration
+    from inspection.result import InspectionResult, Stretch
+    from inspection.rigid import RigidTransform
+    from inspection.section import SectionPlane
+    from inspection.self_crossings import Crossing, find_crossings
+    from inspection.signed_deviations import Deviations, deviations, profile_error_mm
+    from inspection.telling_points import telling_rows
+    from inspection.tolerance import ToleranceZone
+    from inspection.verdict import NOT_JUDGED, Rejection, Verdict
+else:
+    _PLACES = {
+        "inspection.synthetic": ("synthetic",),
+        "inspection.coarse": ("register_coarse",),
+        "inspection.conclusion": ("Missing", "Reason", "reasons_of_abort"),
+        "inspection.curve": ("NurbsCurve",),
+        "inspection.curve_check": ("CurveCheck", "Hollow", "check_curve"),
+        "inspection.errors": ("InspectionError", "NominalError", "NotMeasured", "RegistrationError"),
+        "inspection.fine": ("register", "register_fine"),
+        "inspection.gaps": ("Gap", "coverage", "default_gap_max_mm"),
+        "inspection.judged_rows": ("JudgedRows",),
+        "inspection.kernels": ("Room", "compiled_code_folder", "while_compiling"),
+        "inspection.live": ("LiveInspection", "LiveUpdate", "State", "rehearse"),
+        "inspection.methods": ("FitName", "Material", "Method", "RuleName", "WeightName"),
+        "inspection.minimum_zone": ("MinimumZone", "fit_minimum_zone"),
+        "inspection.nominal": ("NominalProfile", "discretize"),
+        "inspection.placements": ("PlacementProof", "PlacementSearch"),
+        "inspection.prefix": ("Prefix", "PrefixSearch"),
+        "inspection.registration": ("Registration",),
+        "inspection.result": ("InspectionResult", "Stretch"),
+        "inspection.rigid": ("RigidTransform",),
+        "inspection.section": ("SectionPlane",),
+        "inspection.self_crossings": ("Crossing", "find_crossings"),
+        "inspection.signed_deviations": ("Deviations", "deviations", "profile_error_mm"),
+        "inspection.telling_points": ("telling_rows",),
+        "inspection.tolerance": ("ToleranceZone",),
+        "inspection.verdict": ("NOT_JUDGED", "Rejection", "Verdict"),
+    }
+
+    def __getattr__(name: str) -> object:
+        from importlib import import_module  # noqa: PLC0415 - nothing is loaded before a name is used
+
+        for place, names in _PLACES.items():
+            if name in names:
+                found = import_module(place)
+                return found if place == f"{__name__}.{name}" else getattr(found, name)
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
 
 __all__ = [
     "NOT_JUDGED",

@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from inspection.cloud import Cloud
 from inspection.contour_order import Contour, trace_contour
-from inspection.deviations import check_points
 from inspection.errors import RegistrationError
 from inspection.frame import Frame, arc_length_weights, dominant_points, principal_frame
 from inspection.kernels import project, strides
@@ -22,6 +21,7 @@ from inspection.medians import median_place
 from inspection.nominal import NominalProfile
 from inspection.registration import Registration
 from inspection.rigid import RigidTransform, best_motion, rotate
+from inspection.signed_deviations import check_points
 
 Array = NDArray[np.float64]
 

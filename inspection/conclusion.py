@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from inspection.gaps import Gap
-from inspection.tolerance import ToleranceZone, Verdict
+from inspection.tolerance import ToleranceZone
+from inspection.verdict import Verdict
 
 ReasonKind = Literal[
     "out-of-tolerance",

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inspection.curve import NurbsCurve
-from inspection.nominal import Material
+from inspection.methods import Material
 from inspection.self_crossings import Crossing, find_crossings
 
 Array = NDArray[np.float64]

@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 from inspection.cloud import MANY, Cloud
 from inspection.coarse import check_cloud, contour_of, poses_of_contour, trimmed_mean_square
 from inspection.contour_order import Contour
-from inspection.deviations import feet_on
 from inspection.gaps import weigh_by_station
 from inspection.kernels import AT_ONCE, OutlierLimit, PoseEstimate, PoseFit, project
 from inspection.kernels.layout import OPEN_END
@@ -23,6 +22,7 @@ from inspection.methods import Method, WeightName
 from inspection.nominal import NominalProfile
 from inspection.registration import Registration, no_outliers
 from inspection.rigid import RigidTransform, best_motion
+from inspection.signed_deviations import feet_on
 
 Array = NDArray[np.float64]
 Scheme = Literal["gauss-newton", "icp"]

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from inspection.cloud import MANY, Cloud
 from inspection.conclusion import Missing
 from inspection.kernels import Room
-from inspection.methods import Method, WeightName
+from inspection.methods import FitName, Method, RuleName, WeightName
 from inspection.nominal import NominalProfile
 from inspection.pose_track import PoseTrack, seek_pose
 from inspection.prefix import Prefix, PrefixSearch, PrefixWatch
@@ -30,7 +30,7 @@ from inspection.rigid import RigidTransform
 from inspection.scan_rows import BLOCK, ScanRows
 from inspection.section import SectionPlane
 from inspection.settled import settle
-from inspection.terms import FitName, RuleName, Terms
+from inspection.terms import Terms
 from inspection.tolerance import ToleranceZone
 
 Array = NDArray[np.float64]

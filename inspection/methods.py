@@ -1,4 +1,4 @@
-"""The methods of projection by name: how the foot of a point is found.
+"""What an inspection may be told to do, by name. First the methods of projection: how the foot of a point is found.
 
 exact      the closest point of the curve itself
 circle     projection on the osculating circle of the nearest sample (third order; Hu & Wallner 2005 is a relative)
@@ -11,4 +11,7 @@ inversion  point inversion started at the nearest sample, the published method's
 from typing import Literal
 
 Method = Literal["exact", "circle", "chord", "pcp", "veaw", "inversion"]
+Material = Literal["left", "right"]  # the side of the curve that the material lies on
+FitName = Literal["best-fit", "minimum-zone", "none"]
+RuleName = Literal["minimum-zone", "best-fit"]  # what decides where there is no datum
 WeightName = Literal["arc-length", "points"]

@@ -15,12 +15,12 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linprog
 
 from inspection.coarse import check_registrable
-from inspection.deviations import Deviations, deviations
 from inspection.fine import register
 from inspection.methods import Method
 from inspection.nominal import NominalProfile
 from inspection.registration import Registration
 from inspection.rigid import RigidTransform, rotation_about
+from inspection.signed_deviations import Deviations, deviations
 from inspection.telling_points import MANY, telling_rows
 
 Array = NDArray[np.float64]

@@ -7,7 +7,7 @@ corner is two samples at one place, each with the tangent of its own piece.
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from itertools import pairwise
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from inspection.errors import NominalError
 from inspection.first_use import OnFirstUse
 from inspection.foot_grid import FootGrid, build_foot_grid
 from inspection.kernels import SAMPLE_METHODS
-from inspection.methods import Method
+from inspection.methods import Material, Method
 from inspection.sample_table import ProfileSamples, SampleTable, pack_samples
 from inspection.spacing import LocalPoles, space_out
 from inspection.voronoi import site_poles
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-Material = Literal["left", "right"]
 
 _FARTHEST = 0.1  # of the profile's size: farther points are not asked to meet an accuracy
 _STRAIGHT = 1e-9  # curvature times size: less is round-off of a straight line

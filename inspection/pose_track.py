@@ -7,16 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inspection.cloud import Cloud
-from inspection.deviations import deviations
 from inspection.errors import RegistrationError
 from inspection.fine import MISFIT, ranked_poses, register_fine
 from inspection.kernels import GrowingSums
 from inspection.nominal import NominalProfile
 from inspection.registration import Registration
-from inspection.result import NOT_JUDGED
 from inspection.rigid import RigidTransform, rotation_about
 from inspection.scan_rows import ScanRows
+from inspection.signed_deviations import deviations
 from inspection.terms import Terms
+from inspection.verdict import NOT_JUDGED
 
 Array = NDArray[np.float64]
 

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from inspection.cloud import MANY, row_blocks
 from inspection.errors import RegistrationError
 from inspection.placements import PlacementSearch
-from inspection.result import NOT_JUDGED
 from inspection.rigid import RigidTransform
 from inspection.scan_rows import ScanRows
 from inspection.telling_points import SHARES, telling_rows
 from inspection.terms import Terms
+from inspection.verdict import NOT_JUDGED
 
 Array = NDArray[np.float64]
 

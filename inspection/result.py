@@ -5,7 +5,6 @@ A result keeps 18 bytes a point; where points and feet lie is worked out anew fo
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,32 +12,16 @@ from numpy.typing import NDArray
 from inspection.cloud import ROWS_AT_ONCE, row_blocks
 from inspection.conclusion import Reason
 from inspection.gaps import Gap
-from inspection.kernels import Room, layout
+from inspection.judged_rows import JudgedRows
+from inspection.kernels import Room
 from inspection.methods import Method
 from inspection.nominal import NominalProfile
 from inspection.registration import Registration
 from inspection.station_order import in_station_order
-from inspection.tolerance import ToleranceZone, Verdict
+from inspection.tolerance import ToleranceZone
+from inspection.verdict import Verdict
 
 Array = NDArray[np.float64]
-
-NOT_JUDGED = layout.NOT_JUDGED  # in place of a verdict where a point was rejected, or is not judged yet
-
-
-class Rejection(IntEnum):
-    """Why a received point was not judged."""
-
-    NONE = layout.NOT_REJECTED
-    NOT_FINITE = layout.NOT_FINITE
-    OFF_SECTION = layout.OFF_SECTION
-    BEYOND_END = layout.BEYOND_END
-    OUTLIER = layout.OUTLIER
-    IN_HOLLOW = layout.IN_HOLLOW
-
-    @property
-    def words(self) -> str:
-        """The reason as results spell it."""
-        return self.name.lower().replace("_", " ")
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,39 +31,6 @@ class Stretch:
     from_mm: float
     to_mm: float
     worst_mm: float
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class JudgedRows:
-    """A row for every received point, in the order of arrival; those of rejected points are NaN, their verdict NOT_JUDGED.
-
-    actual_mm    : (m, 2) actual surface points in nominal coordinates (ball centres are already compensated)
-    foot_mm      : (m, 2) the nominal points they are compared with
-    station_mm   : (m,) arc length of the foot points
-    deviation_mm : (m,) positive out of material
-    verdicts     : (m,) codes of `Verdict`
-    rejection    : (m,) codes of `Rejection`
-    """
-
-    actual_mm: Array
-    foot_mm: Array
-    station_mm: Array
-    deviation_mm: Array
-    verdicts: NDArray[np.int8]
-    rejection: NDArray[np.int8]
-
-    def __post_init__(self) -> None:
-        pairs, columns = (self.actual_mm, self.foot_mm), (self.station_mm, self.deviation_mm, self.verdicts, self.rejection)
-        m = len(self.verdicts)
-        if any(array.shape != (m, 2) for array in pairs) or any(array.shape != (m,) for array in columns):
-            raise ValueError(f"expected ({m}, 2) twice and ({m},), got {[array.shape for array in (*pairs, *columns)]}")
-        for array in (*pairs, *columns):
-            array.setflags(write=False)
-
-    @property
-    def received(self) -> int:
-        """Points received; always judged + rejected."""
-        return len(self.verdicts)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

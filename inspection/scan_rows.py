@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inspection.cloud import Cloud, row_blocks
-from inspection.deviations import feet_on
+from inspection.judged_rows import JudgedRows
 from inspection.kernels import JUDGED_AS, TALLY, Places, Room, judge_rows, take_in
-from inspection.result import NOT_JUDGED, JudgedRows, Rejection
 from inspection.rigid import RigidTransform
 from inspection.section import XY_PLANE, SectionPlane
+from inspection.signed_deviations import feet_on
 from inspection.terms import Terms
-from inspection.tolerance import Verdict
+from inspection.verdict import NOT_JUDGED, Rejection, Verdict
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]

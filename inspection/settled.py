@@ -17,13 +17,13 @@ from inspection.gaps import measure
 from inspection.minimum_zone import fit_minimum_zone
 from inspection.placements import PlacementSearch
 from inspection.registration import Registration, datum_registration
-from inspection.result import NOT_JUDGED, InspectionResult, Rejection, extent_of, stretches
+from inspection.result import InspectionResult, extent_of, stretches
 from inspection.rigid import RigidTransform
 from inspection.scan_rows import ScanRows
 from inspection.setup_check import check_fit, check_points, shift_reservation
 from inspection.telling_points import telling_rows
 from inspection.terms import Terms
-from inspection.tolerance import Verdict
+from inspection.verdict import NOT_JUDGED, Rejection, Verdict
 
 Array = NDArray[np.float64]
 

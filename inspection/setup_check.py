@@ -13,13 +13,13 @@ from scipy.spatial import ConvexHull, QhullError
 
 from inspection.cloud import MANY, Cloud, few_of
 from inspection.coarse import FEWEST_POINTS
-from inspection.deviations import deviations
 from inspection.errors import NotMeasured
 from inspection.far_points import Away, far_points, refuse_beyond_a_kilometre, space_of, words_of_far
 from inspection.fine import MISFIT, register
 from inspection.plane_check import STRAIGHT, check_plane, check_section
 from inspection.registration import Registration, no_outliers
 from inspection.scan_rows import ScanRows
+from inspection.signed_deviations import deviations
 from inspection.terms import Terms
 
 Array = NDArray[np.float64]

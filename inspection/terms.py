@@ -1,19 +1,16 @@
 """What the points of a scan are held against, and how: everything that an inspection is told before the first point."""
 
 from dataclasses import dataclass, field
-from typing import Literal, get_args
+from typing import get_args
 
 from inspection.conclusion import Limits
-from inspection.deviations import check_method, check_tip_radius
 from inspection.gaps import default_gap_max_mm
 from inspection.kernels import Judgement
-from inspection.methods import Method, WeightName
+from inspection.methods import FitName, Method, RuleName, WeightName
 from inspection.nominal import NominalProfile
 from inspection.rigid import RigidTransform
+from inspection.signed_deviations import check_method, check_tip_radius
 from inspection.tolerance import ToleranceZone
-
-FitName = Literal["best-fit", "minimum-zone", "none"]
-RuleName = Literal["minimum-zone", "best-fit"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

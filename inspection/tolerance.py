@@ -1,25 +1,11 @@
-"""The tolerance zone, and the three-state verdict of ISO 14253-1 on a point and on a profile."""
+"""The tolerance zone, and what it proves of a deviation by ISO 14253-1."""
 
 from dataclasses import dataclass
-from enum import IntEnum
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inspection.kernels import layout
-
-
-class Verdict(IntEnum):
-    """Ordered so that the verdict on a profile is the maximum over its points."""
-
-    CONFORM = layout.CONFORM
-    UNCERTAIN = layout.UNCERTAIN
-    NONCONFORM = layout.NONCONFORM
-
-    @property
-    def word(self) -> str:
-        """The word that results and JSON use, which never changes: conform, uncertain, nonconform."""
-        return self.name.lower()
+from inspection.verdict import Verdict
 
 
 @dataclass(frozen=True, slots=True)

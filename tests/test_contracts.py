@@ -2,6 +2,7 @@
 
 import ast
 import contextlib
+import importlib
 import io
 import re
 import subprocess
@@ -73,6 +74,34 @@ def relative(path: Path) -> str:
 def test_inspection_exports_what_is_promised() -> None:
     assert set(PROMISED_NAMES) <= set(inspection.__all__)
     assert all(callable(getattr(inspection, name)) for name in PROMISED_NAMES)
+
+
+FRONT_DOORS = [path for path in SOURCES if path.name == "__init__.py" and "_PLACES" in path.read_text(encoding="utf-8")]
+
+
+def test_the_packages_that_a_command_may_do_without_load_their_names_when_they_are_used() -> None:
+    doors = {relative(path.parent) for path in FRONT_DOORS}
+    assert doors == {"cmmlink", "cmmlink/plan", "cmmlink/record", "cmmlink/report", "drivers", "inspection", "inspection/kernels"}
+
+
+@pytest.mark.parametrize("door", FRONT_DOORS, ids=lambda path: relative(path.parent))
+def test_a_front_door_gives_what_type_checkers_see(door: Path) -> None:
+    package = ".".join(door.parent.relative_to(ROOT).parts)
+    module = importlib.import_module(package)
+    (checked,) = (node for node in ast.parse(door.read_text(encoding="utf-8")).body if isinstance(node, ast.If))
+    seen = {
+        alias.name: f"{package}.{alias.name}" if node.module == package else node.module  # the second is a file that is given whole
+        for node in checked.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    assert {name: place for place, names in module._PLACES.items() for name in names} == seen
+    assert sorted(module.__all__) == sorted(seen)
+    assert [name for name in seen if not hasattr(module, name)] == []
+    files = {path.stem for path in door.parent.iterdir()}  # an imported file hides what a front door gives by the same name
+    assert {name for name, place in seen.items() if name in files and place != f"{package}.{name}"} == set()
+    with pytest.raises(AttributeError, match="no attribute 'nothing_like_it'"):
+        getattr(module, "nothing_like_it")  # noqa: B009 - type checkers know that it is not there
 
 
 def test_the_three_libraries_import_none_of_ours() -> None:

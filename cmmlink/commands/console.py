@@ -15,29 +15,22 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cmmlink.buffer import CAPACITY_POINTS
 from cmmlink.commands.options import NoBrowser, Records, records_folder
 from cmmlink.commands.output import Output, now, report_outcome, stop_on_ctrl_c
-from cmmlink.console.ct_import import Section
-from cmmlink.console.launch import CONSOLE_PORT, graphical_browser, serve, stay_while_seen
-from cmmlink.console.listening import Access
-from cmmlink.console.past_runs import PastRuns
-from cmmlink.console.refused import Refused
-from cmmlink.console.station_setup import StationSetup
-from cmmlink.devices import Connect, connect, decoder_of, serial_ports
-from cmmlink.endings import Ended
 from cmmlink.errors import PlanError
-from cmmlink.plan import CtPlan, Plan, load_ct_plan
-from cmmlink.report import prepare, write_run, write_stack
-from cmmlink.run import FinishedRun
-from cmmlink.run_view import RunContext
-from cmmlink.stack import SectionOutcome, inspect_stack
 from cmmlink.version import __version__
 from cmmlink.words import VERDICT_WORDS
 
 if TYPE_CHECKING:
+    from cmmlink.console.ct_import import Section
+    from cmmlink.console.past_runs import PastRuns
     from cmmlink.console.server import ConsoleServer
+    from cmmlink.devices import Connect
+    from cmmlink.plan import CtPlan, Plan
+    from cmmlink.run import FinishedRun
+    from cmmlink.stack import SectionOutcome
 
+CONSOLE_PORT = 8207
 _PAGE_OPENS_S = 20.0  # how long a run waits for the page that is to show it
 _LOOK_S = 0.2
 _LONGEST_PLAN = 200_000
@@ -61,6 +54,11 @@ def serve_console(
 
     The address that it prints opens one page, once, within a minute. Enter prints another, and `new` turns out every page first.
     """
+    from cmmlink.console.launch import serve
+    from cmmlink.console.listening import Access
+    from cmmlink.console.station_setup import StationSetup
+    from cmmlink.devices import connect, serial_ports
+
     if not folder.is_dir():
         raise PlanError(f"{folder}: there is no such folder; give the folder that holds the plans")
     past = _past_runs(records)
@@ -80,8 +78,13 @@ def serve_console(
     return 0
 
 
-def run_on_page(plan_file: Path, connect: Connect, output: Output) -> int:
+def run_on_page(plan_file: Path, connect: "Connect", output: Output) -> int:
     """Carry out a plan on the console's page, and stay for the next part while the page is open."""
+    from cmmlink.console.launch import serve, stay_while_seen
+    from cmmlink.console.refused import Refused
+    from cmmlink.console.station_setup import StationSetup
+    from cmmlink.devices import serial_ports
+
     past = _past_runs(output.records)
     write = _write_for(output.out)
     setup = StationSetup(lambda: {plan_file.name: plan_file}, connect, serial_ports, past, time.monotonic, now, write=write)
@@ -114,9 +117,13 @@ def run_on_page(plan_file: Path, connect: Connect, output: Output) -> int:
 
 
 def inspect_surface(
-    records: Path, file: Path, stop: threading.Event, on_start: Callable[[int], None], on_section: Callable[[Section], None]
+    records: Path, file: Path, stop: threading.Event, on_start: Callable[[int], None], on_section: "Callable[[Section], None]"
 ) -> tuple[str, Sequence[str]]:
     """Inspect the surface of a CT plan for the console and record its sections. Returns the outcome as a sentence, and the notes."""
+    from cmmlink.plan import load_ct_plan
+    from cmmlink.report import prepare, write_stack
+    from cmmlink.stack import inspect_stack
+
     plan = load_ct_plan(file)
     prepare(plan.out)
     stack = inspect_stack(
@@ -136,7 +143,12 @@ def inspect_surface(
     return f"{words}. Results in {folder}" if folder is not None else words, stack.notes
 
 
-def _section(plan: CtPlan, outcome: SectionOutcome, plan_name: str) -> Section:
+def _section(plan: "CtPlan", outcome: "SectionOutcome", plan_name: str) -> "Section":
+    from cmmlink.buffer import CAPACITY_POINTS
+    from cmmlink.console.ct_import import Section
+    from cmmlink.endings import Ended
+    from cmmlink.run_view import RunContext
+
     height_mm, run = outcome.slice.height_mm, outcome.run
     title = f"Section at height {height_mm:.3f} mm of {plan.mesh.file.name}"
     context = RunContext(
@@ -146,14 +158,18 @@ def _section(plan: CtPlan, outcome: SectionOutcome, plan_name: str) -> Section:
     return Section(height_mm, context, outcome.started, ended, outcome.warnings)
 
 
-def _past_runs(folder: Path | None) -> PastRuns:
+def _past_runs(folder: Path | None) -> "PastRuns":
+    from cmmlink.console.past_runs import PastRuns
+    from cmmlink.devices import decoder_of
+
     return PastRuns(records_folder(folder), decoder_of, time.monotonic, now)
 
 
-def _write_for(out: Path | None = None) -> Callable[[Plan, FinishedRun], None]:
+def _write_for(out: Path | None = None) -> "Callable[[Plan, FinishedRun], None]":
     """Return the function that writes the results of each run: into `out`, or else into the folder that its plan names."""
+    from cmmlink.report import write_run
 
-    def write(plan: Plan, run: FinishedRun) -> None:
+    def write(plan: "Plan", run: "FinishedRun") -> None:
         folder = out or plan.out
         if folder is not None and run.outcome.measured:
             write_run(run.folder_of(folder), run)
@@ -163,6 +179,8 @@ def _write_for(out: Path | None = None) -> Callable[[Plan, FinishedRun], None]:
 
 def _show(server: "ConsoleServer", no_browser: bool) -> None:
     """Say where the page is, and open it. The browser's address is its own, because the printed one may be used elsewhere."""
+    from cmmlink.console.browser import graphical_browser
+
     sys.stderr.write(f"console: {server.new_address()}\n")
     if server.encryption is not None:
         sys.stderr.write(f"certificate: SHA-256 {server.encryption.fingerprint}\n")

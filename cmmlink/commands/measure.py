@@ -6,12 +6,10 @@ import sys
 import time
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 
-from cmmlink.commands.console import run_on_page
 from cmmlink.commands.options import (
     AllowUnseen,
     Closed,
@@ -40,17 +38,14 @@ from cmmlink.commands.options import (
     section_in,
 )
 from cmmlink.commands.output import Output, now, report_outcome, stop_on_ctrl_c
-from cmmlink.demo import plan_file as demo_plan_file
-from cmmlink.devices import Connect, connect
 from cmmlink.errors import PlanError
-from cmmlink.from_plan import check_plan, inspection_of, profile_of
-from cmmlink.plan import Plan, load_plan
-from cmmlink.report import LiveTable, prepare
-from cmmlink.run import carry_out
-from cmmlink.run_view import RunContext, RunView
-from cmmlink.simulated import connect_demo_device
 from cmmlink.words import printable
-from inspection import FitName, Material, Method, NominalProfile
+from inspection import FitName, Material, Method
+
+if TYPE_CHECKING:
+    from cmmlink.devices import Connect
+    from cmmlink.plan import Plan
+    from inspection import NominalProfile
 
 _PATIENCE_S = 60.0  # files are inspected side by side, and each waits for its turn to be recorded
 _OPTION_OF = {
@@ -79,6 +74,13 @@ def demo(
     no_browser: NoBrowser = False,
 ) -> int:
     """Run the whole chain on a simulated device, no set-up."""
+    from cmmlink.commands.console import run_on_page
+    from cmmlink.demo import plan_file as demo_plan_file
+    from cmmlink.from_plan import check_plan
+    from cmmlink.plan import load_plan
+    from cmmlink.report import prepare
+    from cmmlink.simulated import connect_demo_device
+
     plan = load_plan(demo_plan_file())
     profile = check_plan(plan, demo_plan_file())
     bump = None if defect is None else _defect(defect, profile.length_mm)
@@ -112,6 +114,12 @@ def run(
     no_browser: NoBrowser = False,
 ) -> int:
     """Acquire and inspect with the device of a plan."""
+    from cmmlink.commands.console import run_on_page
+    from cmmlink.devices import connect
+    from cmmlink.from_plan import check_plan
+    from cmmlink.plan import load_plan
+    from cmmlink.report import prepare
+
     plan = load_plan(plan_file)
     profile = check_plan(plan, plan_file)
     prepare(out or plan.out)
@@ -119,8 +127,14 @@ def run(
     return run_on_page(plan_file, connect, output) if output.on_page else _run(plan, profile, connect, output)
 
 
-def _run(plan: Plan, profile: NominalProfile, connect: Connect, output: Output) -> int:
+def _run(plan: "Plan", profile: "NominalProfile", connect: "Connect", output: Output) -> int:
     """Carry out a plan, record it, and report the outcome; a live table is shown when the output goes to a terminal."""
+    from rich.console import Console
+
+    from cmmlink.report import LiveTable
+    from cmmlink.run import carry_out
+    from cmmlink.run_view import RunContext, RunView
+
     quiet = output.headless or output.as_json or not sys.stderr.isatty()
     view = RunView(RunContext.of(plan, profile, now(), number="", plan_name=""), time.monotonic, now)
     table = nullcontext() if quiet else LiveTable(Console(stderr=True), view)
@@ -170,6 +184,12 @@ def inspect(
     as_json: Json = False,
 ) -> int:
     """Inspect a file of points, and record it as a run."""
+    from cmmlink.devices import connect
+    from cmmlink.from_plan import inspection_of, profile_of
+    from cmmlink.plan import Plan
+    from cmmlink.report import prepare
+    from cmmlink.run import carry_out
+
     settings = {
         "part": {"name": printable((points.stem.strip() or points.name).replace("\n", " "))},
         "nominal": {"file": nominal, "scale": scale, "unit": nominal_unit, "closed": closed, "material": material},

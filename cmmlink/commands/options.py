@@ -2,16 +2,16 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 import typer
-from pydantic import BaseModel, ValidationError
 
 from cmmlink.errors import PlanError
-from cmmlink.plan import words_of_allowed
-from cmmlink.record import default_folder
 from drivers import UnitName
 from inspection import RuleName, WeightName
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel
 
 PlanFile = Annotated[Path, typer.Argument(metavar="PLAN.yaml", help="The inspection plan.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of words.")]
@@ -55,11 +55,13 @@ Uncertainty = Annotated[float, typer.Option(metavar="U", help="Expanded uncertai
 NominalScale = Annotated[float, typer.Option(metavar="S", help="Units of the nominal file to mm (a chord, for airfoils).")]
 Closed = Annotated[bool | None, typer.Option("--closed/--open", help="Close the nominal, or leave it open.")]
 
-Model = TypeVar("Model", bound=BaseModel)
+Model = TypeVar("Model", bound="BaseModel")
 
 
 def records_folder(records: Path | None) -> Path:
     """The folder of the run records: the one that was asked for, or the user's own."""
+    from cmmlink.record import default_folder
+
     return records or default_folder()
 
 
@@ -68,6 +70,10 @@ def plan_from_options(model: type[Model], settings: Mapping[str, object], option
 
     option_of : maps a key of the plan, or a group of keys, to the option that sets it
     """
+    from pydantic import ValidationError
+
+    from cmmlink.plan import words_of_allowed
+
     try:
         return model.model_validate(settings)
     except ValidationError as failure:

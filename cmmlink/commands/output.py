@@ -9,17 +9,18 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
-from rich.console import Console
 
 from cmmlink.commands.exit_codes import DEVICE_FAILED, EXIT_OF, NO_RECORD, UNUSABLE, say
-from cmmlink.console.launch import graphical_browser
 from cmmlink.errors import StoreError
-from cmmlink.report import print_summary, write_run
-from cmmlink.run import FinishedRun
 from inspection import NotMeasured
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from cmmlink.run import FinishedRun
 
 _STOPPING = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")  # as far as the system has them
 
@@ -37,6 +38,8 @@ class Output:
     @property
     def on_page(self) -> bool:
         """True when somebody can see the console's page and asked for nothing else by --headless or --json."""
+        from cmmlink.console.browser import graphical_browser
+
         quiet = self.headless or self.as_json
         return not quiet and (self.no_browser or (sys.stderr.isatty() and graphical_browser() is not None))
 
@@ -51,12 +54,14 @@ def print_json(document: dict[str, Any]) -> None:
     typer.echo(json.dumps(document))
 
 
-def terminal() -> Console:
+def terminal() -> "Console":
     """Standard output for words with style; lines are broken only where a person reads them."""
+    from rich.console import Console
+
     return Console(highlight=False, soft_wrap=not sys.stdout.isatty())
 
 
-def report_outcome(run: FinishedRun, output: Output) -> int:
+def report_outcome(run: "FinishedRun", output: Output) -> int:
     """Print the outcome and write its files, each even if the other fails. Returns the exit code.
 
     Raises NotMeasured where the set-up contradicts the points: then there is no result to print or to write.
@@ -73,12 +78,16 @@ def report_outcome(run: FinishedRun, output: Output) -> int:
     folder: Path | None = None
     try:
         if output.out is not None and outcome.measured:
+            from cmmlink.report import write_run
+
             folder = run.folder_of(output.out)
             written = write_run(folder, run)
     finally:
         if output.as_json:
             print_json(run.result_json())
         else:
+            from cmmlink.report import print_summary
+
             print_summary(terminal(), outcome.result, outcome.counts, f"{run.title}, {run.started.device}", outcome.ending, run.notes)
     if written and not output.as_json:
         typer.echo(f"results in {folder}: {', '.join(written)}")

@@ -4,32 +4,19 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from cmmlink.commands.exit_codes import EXIT_OF, NO_RECORD, UNUSABLE, fail
 from cmmlink.commands.options import Json, Out, Records, RunName, records_folder
 from cmmlink.commands.output import now, print_json, terminal
-from cmmlink.devices import decoder_of
 from cmmlink.errors import PlanError
-from cmmlink.record import (
-    Replay,
-    check_chain,
-    describe,
-    disagreements,
-    export_run,
-    find_run,
-    list_runs,
-    open_to_read,
-    read_result,
-    recorded_run,
-    replay_run,
-)
-from cmmlink.report import print_summary, write_results
-from cmmlink.result_keys import RunLine
 from cmmlink.words import headline_of, local_words, printable, section_words, utc_words
 from inspection import Method, Verdict
+
+if TYPE_CHECKING:
+    from cmmlink.record import Replay
 
 _DETAILS = ("run", "started", "ended", "state", "message", "verdict", "part", "serial_number", "operator", "device", "chain_sha256")
 _MOST_DISAGREEMENTS = 5
@@ -46,8 +33,12 @@ _LONGEST_HEADLINE = len("INTERRUPTED AT 99 %")
 
 def runs(records: Records = None, as_json: Json = False) -> int:
     """List the recorded runs."""
+    from cmmlink.record import list_runs
+
     found = list_runs(records_folder(records), now)
     if as_json:
+        from cmmlink.result_keys import RunLine
+
         print_json({"runs": [{key: entry[key] for key in RunLine.model_fields if key != "stack" or entry[key]} for entry in found]})
         return 0
     for entry in found:
@@ -76,6 +67,8 @@ def _local(recorded: str | None) -> str:
 
 def show(name: RunName, records: Records = None, as_json: Json = False) -> int:
     """Show one recorded run."""
+    from cmmlink.record import describe, find_run, open_to_read
+
     with open_to_read(records_folder(records), now) as store:
         found = describe(store, find_run(store, name))
     if as_json:
@@ -109,6 +102,8 @@ def export(
     as_json: Json = False,
 ) -> int:
     """Write a recorded run as csv, npy, json and raw bytes."""
+    from cmmlink.record import export_run, find_run, open_to_read
+
     with open_to_read(records_folder(records), now) as store:
         run_id = find_run(store, name)
         written = export_run(store, run_id, out)
@@ -128,6 +123,9 @@ def replay(
     as_json: Json = False,
 ) -> int:
     """Evaluate a recorded run once more; with nothing changed the result is the same to the last bit."""
+    from cmmlink.devices import decoder_of
+    from cmmlink.record import find_run, open_to_read, recorded_run, replay_run
+
     with open_to_read(records_folder(records), now) as store:
         recorded = recorded_run(store, find_run(store, name))
         again = replay_run(store, recorded, decoder_of, tolerance=tolerance, method=method)
@@ -136,6 +134,8 @@ def replay(
     document |= {"notes": list(again.notes)}
     document |= {"changed": [asdict(change) for change in again.changed], "differs": [asdict(change) for change in again.differs]}
     if out is not None:
+        from cmmlink.report import write_results
+
         write_results(out, document, again.outcome.result, again.profile, f"{recorded.header['part']}, run {recorded.run} replayed")
     if as_json:
         print_json(document)
@@ -146,7 +146,9 @@ def replay(
     return UNUSABLE if again.outcome.result is None else EXIT_OF[again.outcome.result.verdict]
 
 
-def _print_replay(again: Replay, run_id: str) -> None:
+def _print_replay(again: "Replay", run_id: str) -> None:
+    from cmmlink.report import print_summary
+
     heading = f"run {run_id}, evaluated again"
     print_summary(terminal(), again.outcome.result, again.outcome.counts, heading, again.outcome.ending, again.notes)
     for title, changes in (("changed", again.changed), ("differs", again.differs)):
@@ -171,6 +173,8 @@ def verify(
     A chain has no key: whoever may write the file can write it anew, hashes and all, or cut off its end. A result file that was kept
     elsewhere shows that, with --against.
     """
+    from cmmlink.record import check_chain, disagreements, find_run, open_to_read, read_result
+
     result = None if against is None else read_result(against)
     with open_to_read(records_folder(records), now, close_interrupted=False) as store:
         run = find_run(store, name) if name else None

@@ -5,25 +5,19 @@ import platform
 import textwrap
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from cmmlink.commands.exit_codes import UNUSABLE
-from cmmlink.commands.open3d_doctor import look_after_open3d
 from cmmlink.commands.options import Closed, Json, PlanFile, Records, records_folder
 from cmmlink.commands.output import now, print_json
-from cmmlink.commands.support_bundle import pack_bundle
-from cmmlink.demo import plan_file as demo_plan_file
-from cmmlink.devices import connect, serial_ports, words_of
 from cmmlink.errors import PlanError
-from cmmlink.from_plan import check_plan, name_place, notes_on_nominal, profile_of
-from cmmlink.nominal_files import NominalFile, load_nominal, material_side
-from cmmlink.plan import load_plan
-from cmmlink.scratch import words_of_room
 from cmmlink.version import __version__
 from drivers import LinkError, UnitName
-from inspection import rehearse
+
+if TYPE_CHECKING:
+    from cmmlink.nominal_files import NominalFile
 
 
 def nominal(
@@ -34,6 +28,8 @@ def nominal(
     as_json: Json = False,
 ) -> int:
     """Show what was understood of a nominal file."""
+    from cmmlink.nominal_files import load_nominal
+
     understood = load_nominal(file, scale, closed, unit)
     if as_json:
         print_json(_nominal_json(understood))
@@ -46,7 +42,9 @@ def nominal(
     return 0
 
 
-def _nominal_json(understood: NominalFile) -> dict[str, Any]:
+def _nominal_json(understood: "NominalFile") -> dict[str, Any]:
+    from cmmlink.nominal_files import material_side
+
     curve = understood.curve
     assert curve.weights is not None
     return {
@@ -65,6 +63,11 @@ def _nominal_json(understood: NominalFile) -> dict[str, Any]:
 
 def check(plan_file: PlanFile) -> int:
     """Check a plan and the files that it names. The device is not contacted."""
+    from cmmlink.devices import connect, words_of
+    from cmmlink.from_plan import check_plan, name_place, notes_on_nominal
+    from cmmlink.plan import load_plan
+    from cmmlink.scratch import words_of_room
+
     plan = load_plan(plan_file)
     profile = check_plan(plan, plan_file)
     with name_place(plan_file, "device"), connect(plan) as device:
@@ -95,11 +98,21 @@ def doctor(
         return _look_after_all(say, records)
     finally:
         if bundle is not None:  # packed even when a check above raises
+            from cmmlink.commands.support_bundle import pack_bundle
+
             for line in pack_bundle(bundle, said, records_folder(records), now):
                 typer.echo(line)
 
 
 def _look_after_all(say: Callable[[str], None], records: Path | None) -> int:
+    from cmmlink.commands.open3d_doctor import look_after_open3d
+    from cmmlink.demo import plan_file as demo_plan_file
+    from cmmlink.devices import serial_ports
+    from cmmlink.from_plan import profile_of
+    from cmmlink.plan import load_plan
+    from cmmlink.scratch import words_of_room
+    from inspection import rehearse
+
     say(f"cmmlink {__version__} on Python {platform.python_version()}, {platform.system()} {platform.machine()}")
     rehearse(profile_of(load_plan(demo_plan_file())))
     say("inspection: compiled and working")
@@ -116,6 +129,8 @@ def _look_after_all(say: Callable[[str], None], records: Path | None) -> int:
 
 def list_ports() -> int:
     """List the serial ports of this computer."""
+    from cmmlink.devices import serial_ports
+
     found = serial_ports()
     for name, description in found:
         typer.echo(f"{name}\t{description}")
@@ -126,7 +141,7 @@ def list_ports() -> int:
 
 def simulate(context: typer.Context, device: Annotated[str, typer.Argument(metavar="DEVICE")] = "") -> int:
     """Serve a simulated device."""
-    from simulators import end_with_stdin, known_devices, say, settings_from  # noqa: PLC0415 - only this command knows simulators
+    from simulators import end_with_stdin, known_devices, say, settings_from
 
     known = known_devices()
     if device in ("-h", "--help"):

@@ -6,12 +6,9 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from typer.core import TyperCommand
 
 from cmmlink.commands.exit_codes import EXIT_OF
@@ -35,12 +32,16 @@ from cmmlink.commands.options import (
 )
 from cmmlink.commands.output import Output, print_json, stop_on_ctrl_c, terminal
 from cmmlink.errors import PlanError
-from cmmlink.plan import CtPlan, CutterName, NominalAt, load_ct_plan
-from cmmlink.report import STYLE_OF, STYLES, prepare, write_stack
-from cmmlink.stack import SectionOutcome, StackOutcome, inspect_stack
+from cmmlink.plan import CutterName
 from cmmlink.words import VERDICT_WORDS, headline_of, printable
 from drivers import UnitName
 from inspection import FitName, Material, Method
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from cmmlink.plan import CtPlan
+    from cmmlink.stack import SectionOutcome, StackOutcome
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _MOST_WARNINGS = 20
@@ -129,6 +130,8 @@ def ct(
     as_json: Json = False,
 ) -> int:
     """Inspect sections of a CT surface, and record each as a run."""
+    from cmmlink.plan import CtPlan, load_ct_plan
+
     if mesh.suffix.lower() in (".yaml", ".yml"):
         beside = [name for name in _options_given(context) if name not in _BESIDE_A_PLAN]
         if beside:
@@ -160,8 +163,13 @@ def ct(
     return _inspect_stack(plan_from_options(CtPlan, settings, _OPTION_OF), Output(False, as_json, out, records), pictures, no_record)
 
 
-def _inspect_stack(plan: CtPlan, output: Output, pictures: bool, no_record: bool) -> int:
+def _inspect_stack(plan: "CtPlan", output: Output, pictures: bool, no_record: bool) -> int:
     """Inspect a stack with a progress bar; write its files and print what came of it, each even if the other fails."""
+    from rich.console import Console
+
+    from cmmlink.report import prepare, write_stack
+    from cmmlink.stack import inspect_stack
+
     pattern = output.out or plan.out
     prepare(pattern)
     bar = _SectionBar(Console(stderr=True), visible=not output.as_json and sys.stderr.isatty())
@@ -194,6 +202,8 @@ def _inspect_stack(plan: CtPlan, output: Output, pictures: bool, no_record: bool
 
 def _own_nominals(texts: Sequence[str]) -> list[dict[str, object]]:
     """Understand HEIGHT=FILE as ManyHeights spells it."""
+    from cmmlink.plan import NominalAt
+
     own = []
     for text in texts:
         height, found, file = text.partition("=")
@@ -212,7 +222,9 @@ def _options_given(context: typer.Context) -> list[str]:
 class _SectionBar:
     """A progress bar with the remaining time. One round goes once through all sections; several rounds can follow one another."""
 
-    def __init__(self, console: Console, visible: bool) -> None:
+    def __init__(self, console: "Console", visible: bool) -> None:
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
         words, count = TextColumn("{task.description}"), MofNCompleteColumn()
         columns = (words, BarColumn(bar_width=40), count, TextColumn("left"), TimeRemainingColumn())
         self._progress = Progress(*columns, console=console, transient=True, disable=not visible)
@@ -231,8 +243,12 @@ class _SectionBar:
         return lambda: self._progress.advance(task)
 
 
-def _print_stack(console: Console, stack: StackOutcome) -> None:
+def _print_stack(console: "Console", stack: "StackOutcome") -> None:
     """Print the verdict, a line for each section, and the warnings."""
+    from rich.markup import escape
+
+    from cmmlink.report import STYLE_OF
+
     counts = stack.result_json()
     cutters = ", ".join(sorted({section.slice.cutter for section in stack.sections}))
     missing = "" if stack.complete else f" of {stack.asked}"
@@ -256,7 +272,9 @@ def _print_stack(console: Console, stack: StackOutcome) -> None:
         console.print(f"  note: {note}", markup=False)
 
 
-def _line(section: SectionOutcome) -> str:
+def _line(section: "SectionOutcome") -> str:
+    from cmmlink.report import STYLES
+
     result, cut = section.run.result, section.slice
     head = f"{cut.height_mm:11.4f}  [{STYLES[section.verdict]}]{VERDICT_WORDS[section.verdict]:11}[/]"
     if result is None or result.worst is None:

@@ -1,7 +1,6 @@
-"""The page brought to the operator: its address, the browser, and how long to stay."""
+"""The page brought to the operator: its address, and how long to stay."""
 
 import threading
-import webbrowser
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
@@ -14,8 +13,6 @@ from cmmlink.errors import PlanError
 if TYPE_CHECKING:
     from cmmlink.console.server import ConsoleServer
 
-CONSOLE_PORT = 8207
-_TEXT_BROWSERS = ("www-browser", "links", "elinks", "lynx", "w3m")
 _LOOK_S = 0.25
 _GONE_S = 5.0  # a page that is loaded anew is away for a moment only
 
@@ -39,15 +36,6 @@ def serve(setup: StationSetup, version: str, access: Access | None = None) -> It
             station.job.abort()
             station.job.wait(_GONE_S)
         server.stop()
-
-
-def graphical_browser() -> webbrowser.BaseBrowser | None:
-    """The browser of this computer, None where there is none with a window."""
-    try:
-        browser = webbrowser.get()
-    except webbrowser.Error:
-        return None
-    return None if getattr(browser, "name", "") in _TEXT_BROWSERS else browser
 
 
 def stay_while_seen(server: "ConsoleServer", ended: threading.Event) -> None:

@@ -1,24 +1,60 @@
 """Plans of every kind: what may stand in them, and how they are read. This is the front door of the package."""
 
-from cmmlink.plan.own_maps import map_of
-from cmmlink.plan.scan import (
-    Datum,
-    Device,
-    Discretisation,
-    FileDevice,
-    ModbusDevice,
-    Nominal,
-    Part,
-    Plan,
-    Registration,
-    Section,
-    SerialDevice,
-    load_plan,
-    place_of,
-    with_own_maps,
-)
-from cmmlink.plan.surface import CtPlan, CutterName, NominalAt, load_ct_plan
-from cmmlink.plan.yaml_model import Positive, Settings, line_of, read_model, words_of_allowed
+TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer to load than all of this
+
+if TYPE_CHECKING:
+    from cmmlink.plan.cutters import CutterName
+    from cmmlink.plan.own_maps import map_of
+    from cmmlink.plan.scan import (
+        Datum,
+        Device,
+        Discretisation,
+        FileDevice,
+        ModbusDevice,
+        Nominal,
+        Part,
+        Plan,
+        Registration,
+        Section,
+        SerialDevice,
+        load_plan,
+        place_of,
+        with_own_maps,
+    )
+    from cmmlink.plan.surface import CtPlan, NominalAt, load_ct_plan
+    from cmmlink.plan.yaml_model import Positive, Settings, line_of, read_model, words_of_allowed
+else:
+    _PLACES = {
+        "cmmlink.plan.own_maps": ("map_of",),
+        "cmmlink.plan.scan": (
+            "Datum",
+            "Device",
+            "Discretisation",
+            "FileDevice",
+            "ModbusDevice",
+            "Nominal",
+            "Part",
+            "Plan",
+            "Registration",
+            "Section",
+            "SerialDevice",
+            "load_plan",
+            "place_of",
+            "with_own_maps",
+        ),
+        "cmmlink.plan.cutters": ("CutterName",),
+        "cmmlink.plan.surface": ("CtPlan", "NominalAt", "load_ct_plan"),
+        "cmmlink.plan.yaml_model": ("Positive", "Settings", "line_of", "read_model", "words_of_allowed"),
+    }
+
+    def __getattr__(name: str) -> object:
+        from importlib import import_module  # noqa: PLC0415 - nothing is loaded before a name is used
+
+        for place, names in _PLACES.items():
+            if name in names:
+                return getattr(import_module(place), name)
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
 
 __all__ = [
     "CtPlan",

@@ -5,16 +5,15 @@ from these descriptions.
 """
 
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Self
 
 from pydantic import Field, field_validator, model_validator
 
 from cmmlink.errors import PlanError, YamlError
+from cmmlink.plan.cutters import CutterName
 from cmmlink.plan.scan import OUT, RECORDS, Deciding, Nominal, Part, Registration, ResultFolder, Tolerance, Unit
 from cmmlink.plan.yaml_model import Positive, Settings, read_model
 from drivers import PointFileError, mm_per, read_text
-
-CutterName = Literal["auto", "open3d", "numpy"]
 
 
 class Mesh(Settings):

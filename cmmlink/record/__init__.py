@@ -1,29 +1,68 @@
 """The hash-chained record of every run: written, read, replayed, exported. This is the front door of the package."""
 
-from cmmlink.record.against import disagreements, read_result
-from cmmlink.record.bodies import unpack_judged
-from cmmlink.record.chain import Draft, Record
-from cmmlink.record.export import export_run
-from cmmlink.record.reader import (
-    RecordedRun,
-    arrivals_of,
-    check_chain,
-    default_folder,
-    describe,
-    end_missing,
-    find_run,
-    list_runs,
-    open_to_read,
-    open_to_record,
-    points_of,
-    reads_of,
-    recorded_result,
-    recorded_run,
-)
-from cmmlink.record.recorder import Recorder, RecordReference, RunInputs
-from cmmlink.record.replay import Change, Replay, recorded_plan, recorded_profile, replay_run
-from cmmlink.record.station_lock import PATIENCE_S
-from cmmlink.record.store import FILE_NAME, Store
+TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer to load than all of this
+
+if TYPE_CHECKING:
+    from cmmlink.record.against import disagreements, read_result
+    from cmmlink.record.bodies import unpack_judged
+    from cmmlink.record.chain import Draft, Record
+    from cmmlink.record.export import export_run
+    from cmmlink.record.reader import (
+        RecordedRun,
+        arrivals_of,
+        check_chain,
+        default_folder,
+        describe,
+        end_missing,
+        find_run,
+        list_runs,
+        open_to_read,
+        open_to_record,
+        points_of,
+        reads_of,
+        recorded_result,
+        recorded_run,
+    )
+    from cmmlink.record.recorder import Recorder, RecordReference, RunInputs
+    from cmmlink.record.replay import Change, Replay, recorded_plan, recorded_profile, replay_run
+    from cmmlink.record.station_lock import PATIENCE_S
+    from cmmlink.record.store import FILE_NAME, Store
+else:
+    _PLACES = {
+        "cmmlink.record.against": ("disagreements", "read_result"),
+        "cmmlink.record.bodies": ("unpack_judged",),
+        "cmmlink.record.chain": ("Draft", "Record"),
+        "cmmlink.record.export": ("export_run",),
+        "cmmlink.record.reader": (
+            "RecordedRun",
+            "arrivals_of",
+            "check_chain",
+            "default_folder",
+            "describe",
+            "end_missing",
+            "find_run",
+            "list_runs",
+            "open_to_read",
+            "open_to_record",
+            "points_of",
+            "reads_of",
+            "recorded_result",
+            "recorded_run",
+        ),
+        "cmmlink.record.recorder": ("Recorder", "RecordReference", "RunInputs"),
+        "cmmlink.record.replay": ("Change", "Replay", "recorded_plan", "recorded_profile", "replay_run"),
+        "cmmlink.record.station_lock": ("PATIENCE_S",),
+        "cmmlink.record.store": ("FILE_NAME", "Store"),
+    }
+
+    def __getattr__(name: str) -> object:
+        from importlib import import_module  # noqa: PLC0415 - nothing is loaded before a name is used
+
+        for place, names in _PLACES.items():
+            if name in names:
+                return getattr(import_module(place), name)
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
 
 __all__ = [
     "FILE_NAME",

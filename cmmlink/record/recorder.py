@@ -14,12 +14,11 @@ from dataclasses import asdict, dataclass, field
 from datetime import datetime
 from importlib import metadata
 from itertools import islice
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cmmlink.buffer import Buffer
 from cmmlink.errors import PlanError, StoreError
 from cmmlink.events import Arrived, Event, Judged, RunFinished, RunStarted
-from cmmlink.plan import Plan, map_of, with_own_maps
 from cmmlink.record.bodies import JUDGED_ROWS, PlacedArrival, pack_arrivals, pack_document, pack_judged, pack_points, pack_reads
 from cmmlink.record.chain import Draft, Kind
 from cmmlink.record.store import Store
@@ -27,7 +26,10 @@ from cmmlink.result_json import number, result_json
 from cmmlink.version import __version__
 from cmmlink.words import utc_words
 from drivers import LinkDown, PointBatch, Rejected, WireBytes
-from inspection import InspectionResult
+
+if TYPE_CHECKING:
+    from cmmlink.plan import Plan
+    from inspection import InspectionResult
 
 COMMIT_S = 0.1
 CHUNK_POINTS = 1000
@@ -51,11 +53,13 @@ class RunInputs:
     stack: Mapping[str, Any] | None = None
 
     @classmethod
-    def of(cls, plan: Plan, stack: Mapping[str, Any] | None = None) -> "RunInputs":
+    def of(cls, plan: "Plan", stack: Mapping[str, Any] | None = None) -> "RunInputs":
         """The inputs of a plan as they are at this moment. The user's own register maps become part of the plan. Raises PlanError.
 
         A map is kept as it was understood, with every default filled in, because a later version may read the same file differently.
         """
+        from cmmlink.plan import map_of, with_own_maps  # noqa: PLC0415 - who reads records needs no plans
+
         try:
             device = with_own_maps(plan.device, lambda own: map_of(own).model_dump(mode="json"))
         except ValueError as error:
@@ -104,7 +108,7 @@ def result_sha256(document: Mapping[str, Any], bodies: Iterable[bytes]) -> str:
     return digest.hexdigest()
 
 
-def judged_bodies(result: InspectionResult | None) -> Iterator[tuple[int, bytes]]:
+def judged_bodies(result: "InspectionResult | None") -> Iterator[tuple[int, bytes]]:
     """The rows of a result as the record holds them, one body after the other, each with its number of rows."""
     return pack_judged(result.blocks(JUDGED_ROWS) if result is not None else ())
 
@@ -244,7 +248,7 @@ class Recorder:
         nominal_sha256 = hashlib.sha256(self._inputs.nominal).hexdigest()
         self.evidence = RecordReference(self.run, end.sha256.hex(), plan_sha256, nominal_sha256, self._inputs.software)
 
-    def _keep_judged(self, document: Mapping[str, Any], result: InspectionResult | None) -> str:
+    def _keep_judged(self, document: Mapping[str, Any], result: "InspectionResult | None") -> str:
         """Write the judged rows, some megabytes at a time, and return the hash of the result. They count once the result follows."""
         digest = hashlib.sha256(pack_document(document))
         bodies = judged_bodies(result)

@@ -2,20 +2,47 @@
 
 Every point is worked out on its own: no result depends on the batch, the order or the thread that a point comes in.
 Arithmetic is plain IEEE double precision with explicit fused multiply-adds, so results are the same bit for bit in
-vectorised and scalar code. Nothing is compiled at import; the first call does it.
+vectorised and scalar code. Nothing is compiled at import; the first call does it. A name is loaded when it is used, and
+numba with the first name that needs it.
 
 What the rest of the project may call stands here; the files behind it are this package's own.
 """
 
-from inspection.kernels.blocks import CurveTables, project
-from inspection.kernels.compiling import compiled_code_folder, while_compiling
-from inspection.kernels.feet import Feet, Marks, Room
-from inspection.kernels.growing import GrowingSums
-from inspection.kernels.layout import SAMPLE_METHODS
-from inspection.kernels.on_samples import SampleTables, project_on_samples
-from inspection.kernels.pose import AT_ONCE, NONE_LEFT_OUT, OutlierLimit, PoseEstimate, PoseFit
-from inspection.kernels.rows import JUDGED_AS, TALLY, Columns, Judgement, Places, judge_rows, take_in
-from inspection.kernels.thinning import strides
+TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer to load than all of this
+
+if TYPE_CHECKING:
+    from inspection.kernels.blocks import CurveTables, project
+    from inspection.kernels.compile_notice import while_compiling
+    from inspection.kernels.compiling import compiled_code_folder
+    from inspection.kernels.feet import Feet, Marks, Room
+    from inspection.kernels.growing import GrowingSums
+    from inspection.kernels.layout import SAMPLE_METHODS
+    from inspection.kernels.on_samples import SampleTables, project_on_samples
+    from inspection.kernels.pose import AT_ONCE, NONE_LEFT_OUT, OutlierLimit, PoseEstimate, PoseFit
+    from inspection.kernels.rows import JUDGED_AS, TALLY, Columns, Judgement, Places, judge_rows, take_in
+    from inspection.kernels.thinning import strides
+else:
+    _PLACES = {
+        "inspection.kernels.blocks": ("CurveTables", "project"),
+        "inspection.kernels.compile_notice": ("while_compiling",),
+        "inspection.kernels.compiling": ("compiled_code_folder",),
+        "inspection.kernels.feet": ("Feet", "Marks", "Room"),
+        "inspection.kernels.growing": ("GrowingSums",),
+        "inspection.kernels.layout": ("SAMPLE_METHODS",),
+        "inspection.kernels.on_samples": ("SampleTables", "project_on_samples"),
+        "inspection.kernels.pose": ("AT_ONCE", "NONE_LEFT_OUT", "OutlierLimit", "PoseEstimate", "PoseFit"),
+        "inspection.kernels.rows": ("JUDGED_AS", "TALLY", "Columns", "Judgement", "Places", "judge_rows", "take_in"),
+        "inspection.kernels.thinning": ("strides",),
+    }
+
+    def __getattr__(name: str) -> object:
+        from importlib import import_module  # noqa: PLC0415 - nothing is loaded before a name is used
+
+        for place, names in _PLACES.items():
+            if name in names:
+                return getattr(import_module(place), name)
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
 
 __all__ = [
     "AT_ONCE",

@@ -12,10 +12,11 @@ from typing import Any, TypeVar, cast
 from llvmlite import ir
 from numba import carray, njit, types
 from numba.core import cgutils, config
-from numba.core.event import Event, Listener, install_listener
+from numba.core.event import Event, Listener, register
 from numba.extending import intrinsic
 
 from inspection.kernels.cache_folder import places_for, stamp_of, stamped_folder
+from inspection.kernels.compile_notice import begin_to_compile
 from inspection.kernels.layout import BLOCK, CHUNK, INTEGERS, REALS
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -152,21 +153,12 @@ def claim_chunk(typing_context: Any, claimed: Any) -> Any:
     return types.int64(claimed), generate
 
 
-@contextmanager
-def while_compiling(tell: Callable[[], None]) -> Iterator[None]:
-    """Call `tell` once, when the first function has to be compiled instead of loaded from the cache."""
-    with install_listener("numba:compile", _FirstOne(tell)):
-        yield
-
-
-class _FirstOne(Listener):  # type: ignore[misc]  # numba has no types
-    def __init__(self, tell: Callable[[], None]) -> None:
-        self._tell: Callable[[], None] | None = tell
-
+class _Notice(Listener):  # type: ignore[misc]  # numba has no types
     def on_start(self, event: Event) -> None:
-        if self._tell is not None:
-            self._tell()
-            self._tell = None
+        begin_to_compile()
 
     def on_end(self, event: Event) -> None:
         """Nothing to tell."""
+
+
+register("numba:compile", _Notice())  # at import, because who waits to be told has long said so

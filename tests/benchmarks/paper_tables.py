@@ -21,10 +21,10 @@ from rich.progress import track
 
 from inspection import NominalProfile, NurbsCurve, Registration, RigidTransform, register_coarse, register_fine
 from inspection.coarse import mean_square
-from inspection.deviations import feet_on
 from inspection.kernels.layout import OPEN_END
 from inspection.methods import Method
 from inspection.rigid import best_motion
+from inspection.signed_deviations import feet_on
 from inspection.synthetic import even_stations
 from tests.benchmarks import published_method
 from tests.benchmarks.machine import machine

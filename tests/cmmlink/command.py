@@ -49,7 +49,7 @@ def cmmlink(*arguments: object) -> Ended:
     words = ["cmmlink", *map(str, arguments)]
     with (
         tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as records,
-        patch("cmmlink.commands.options.default_folder", lambda: Path(records)),
+        patch("cmmlink.record.default_folder", lambda: Path(records)),
         patch.object(sys, "argv", words),
         redirect_stdout(io.StringIO()) as out,
         redirect_stderr(io.StringIO()) as err,

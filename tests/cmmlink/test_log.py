@@ -40,7 +40,7 @@ def test_a_run_leaves_its_plan_device_link_id_and_verdict_in_the_log_and_no_poin
     assert run.evidence is not None
     for expected in (small_plan().part.name, "serial COM3", "unplugged", run.evidence.run, run.evidence.chain_sha256, "received=612"):
         assert expected in text
-    assert re.search(r" WARNING cmmlink\.log: link: LinkDown", text)
+    assert re.search(r" WARNING cmmlink\.run_log: link: LinkDown", text)
     assert not re.search(f"{PointBatch.__name__}|Damaged|Rejected|secret", text)
     assert len(text.splitlines()) < 12
 

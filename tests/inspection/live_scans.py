@@ -6,7 +6,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from inspection import InspectionResult, LiveInspection, LiveUpdate, NominalProfile, ToleranceZone
-from inspection.terms import FitName
+from inspection.methods import FitName
 from tests.inspection.profiles import Array
 from tests.inspection.test_placements import nominal_of, scan, stations
 

@@ -8,9 +8,9 @@ import pytest
 
 from inspection import LiveInspection, RigidTransform, ToleranceZone, Verdict, discretize
 from inspection.cloud import MANY
+from inspection.methods import FitName
 from inspection.prefix import PrefixWatch
 from inspection.telling_points import telling_rows
-from inspection.terms import FitName
 from tests.inspection import profiles
 from tests.inspection.live_scans import ZONE, LiveScan, live_scan, proven_at
 from tests.inspection.profiles import Array

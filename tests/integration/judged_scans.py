@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from cmmlink.events import Counts, Event, Judged, RunFinished, RunStarted
 from cmmlink.pipeline import RunOutcome, run_inspection
 from inspection import LiveInspection, NominalProfile, NurbsCurve, SectionPlane, ToleranceZone, Verdict, discretize
-from inspection.terms import FitName
+from inspection.methods import FitName
 from tests.cmmlink.oval_part import oval_profile
 from tests.inspection import profiles
 from tests.integration.encoded_scans import SOURCES, Source, Transcript, decode, placed

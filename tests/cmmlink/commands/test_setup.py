@@ -54,9 +54,9 @@ def test_check_says_what_was_assumed(tmp_path: Path) -> None:
 
 
 def test_ports_lists_what_the_system_has(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cmmlink.commands.setup.serial_ports", lambda: [("COM3", "USB serial"), ("COM4", "a probe")])
+    monkeypatch.setattr("cmmlink.devices.serial_ports", lambda: [("COM3", "USB serial"), ("COM4", "a probe")])
     assert cmmlink("ports") == Ended(0, "COM3\tUSB serial\nCOM4\ta probe\n", "")
-    monkeypatch.setattr("cmmlink.commands.setup.serial_ports", list)
+    monkeypatch.setattr("cmmlink.devices.serial_ports", list)
     assert cmmlink("ports") == Ended(0, "no serial port was found\n", "")
 
 

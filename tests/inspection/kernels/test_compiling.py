@@ -23,7 +23,7 @@ def outer(x):
     return inner(x) + 1
 """
 CALL = """
-from inspection.kernels.compiling import while_compiling
+from inspection.kernels.compile_notice import while_compiling
 from inspection.kernels.outer import outer
 
 told = []
@@ -46,7 +46,7 @@ def package(tmp_path: Path) -> Path:
     """A package of two kernels in two files, with the product's own way to compile."""
     package = tmp_path / "inspection" / "kernels"
     package.mkdir(parents=True)
-    for name in ("compiling", "cache_folder", "layout"):
+    for name in ("compiling", "compile_notice", "cache_folder", "layout"):
         source = Path(compiling.__file__).with_name(f"{name}.py").read_text(encoding="utf-8")
         (package / f"{name}.py").write_text(source, encoding="utf-8")
     (package.parent / "__init__.py").touch()

@@ -9,7 +9,7 @@ from inspection import Rejection, Verdict, discretize
 from inspection.foot_grid import FootGrid
 from inspection.kernels import SAMPLE_METHODS, layout, project
 from inspection.methods import Method
-from inspection.result import NOT_JUDGED
+from inspection.verdict import NOT_JUDGED
 from tests.inspection.kernels.places import grid_of
 from tests.inspection.profiles import Array, curve_of, nominal_of
 

@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from inspection import Rejection, SectionPlane, ToleranceZone
 from inspection.kernels import JUDGED_AS, TALLY, Columns, Feet, Judgement, judge_rows, take_in
-from inspection.result import NOT_JUDGED
+from inspection.verdict import NOT_JUDGED
 from tests.inspection.profiles import Array
 
 Codes = NDArray[np.int8]

@@ -1,0 +1,64 @@
+"""What a command does not need it does not load: help and mistakes are told at once, and records are read without the inspection."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+from cmmlink.record.store import FILE_NAME
+from tests.cmmlink.commands.oval_files import TOLERANCE
+from tests.cmmlink.oval_part import oval_points, write_points
+from tests.cmmlink.recorded import Script, record, scan_arrivals
+
+ROOT = Path(__file__).resolve().parents[3]
+DEVICES, PAGE, PICTURES = {"pymodbus", "serial"}, {"starlette", "uvicorn", "websockets", "ssl", "asyncio"}, {"matplotlib"}
+MATHS, PLANS, SPEECH = {"numpy", "scipy", "numba", "llvmlite"}, {"yaml", "cmmlink.plan.scan"}, {"rich"}
+HEAVY = DEVICES | PAGE | PICTURES | MATHS | PLANS | SPEECH | {"simulators", "sqlite3"}
+
+IN_ONE_PROCESS = """
+import contextlib, io, json, sys
+from cmmlink.commands import main
+
+commands, watched = json.loads(sys.argv[1])
+for words in commands:
+    sys.argv = ["cmmlink", *words]
+    try:
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()) as said:
+            main()
+    except SystemExit as ended:
+        print(json.dumps([ended.code or 0, said.getvalue(), sorted(set(watched) & set(sys.modules))]))
+"""
+
+
+def loaded_by(*commands: tuple[object, ...]) -> list[tuple[int, str, set[str]]]:
+    """Exit status, what was said on standard error, and the heavy modules loaded after each of these commands, run one after another."""
+    words = json.dumps([[[str(word) for word in command] for command in commands], sorted(HEAVY)])
+    told = subprocess.run([sys.executable, "-c", IN_ONE_PROCESS, words], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True).stdout
+    return [(code, said, set(loaded)) for code, said, loaded in map(json.loads, told.splitlines())]
+
+
+def test_help_version_and_mistakes_load_nothing_heavy() -> None:
+    working = ("demo", "run", "inspect", "ct", "nominal", "check", "console", "doctor", "ports")
+    commands = (*working, "runs", "show", "export", "replay", "verify")
+    helped = loaded_by(("--version",), ("--help",), *((command, "--help") for command in commands))
+    assert [(code, loaded) for code, _, loaded in helped] == [(0, set())] * (2 + len(commands))
+    mistaken = loaded_by(("inspcet",), ("inspect", "points.csv"), ("inspect", "points.csv", "--nominal", "n.dat", "--tolerance", "wide", 1))
+    assert [(code, loaded) for code, _, loaded in mistaken] == [(2, set())] * 3
+    assert all(said.startswith("cmmlink: ") for _, said, _ in mistaken)
+
+
+def test_records_are_listed_shown_and_verified_without_inspection_plans_devices_or_page(tmp_path: Path) -> None:
+    record(tmp_path, Script(*scan_arrivals()))
+    assert (tmp_path / FILE_NAME).exists()
+    read = loaded_by(*((*words, "--records", tmp_path) for words in (("verify",), ("runs",), ("show", "last"))))
+    assert [(code, loaded) for code, _, loaded in read] == [(0, {"numpy", "sqlite3"})] * 3
+
+
+def test_points_are_inspected_without_devices_page_and_pictures_and_pictures_drawn_without_the_page(nominal: Path, tmp_path: Path) -> None:
+    points = write_points(tmp_path / "points.csv", oval_points(0.01))
+    inspect = ("inspect", points, "--nominal", nominal, *TOLERANCE, "--records", tmp_path)
+    (judged, _, plain), (_, _, drawn) = loaded_by((*inspect, "--json"), (*inspect, "--out", tmp_path / "out"))
+    assert judged == 0
+    assert plain & (DEVICES | PAGE | PICTURES | SPEECH | {"simulators"}) == set()
+    assert "matplotlib" in drawn
+    assert drawn & (DEVICES | PAGE | {"simulators"}) == set()
