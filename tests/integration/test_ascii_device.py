@@ -22,7 +22,7 @@ LINES = [
 COUNT = 1000
 
 
-def scanned(device: Simulated, silence_s: float = 3.0) -> Account:
+def scanned(device: Simulated, silence_s: float = 60.0) -> Account:
     return account(SerialScanner(device.address, AsciiDecoder(), LinkSettings(115_200, "N", silence_s=silence_s)).arrivals())
 
 

@@ -27,10 +27,18 @@ MAPS = {"modbus-ring": "generic-ring", "modbus-fifo": "generic-fifo", "gocator":
 
 
 def source(
-    device: Simulated, map_name: str, *, count: int | None = None, silence_s: float = 3.0, reconnect_s: float = 0.0, **waits_s: float
+    device: Simulated,
+    map_name: str,
+    *,
+    count: int | None = None,
+    silence_s: float = 60.0,
+    reconnect_s: float = 0.0,
+    timeout_s: float = 20.0,
+    poll_s: float = 0.002,
 ) -> ModbusScanner:
+    """With patience where a test does not ask for less: an answer may come late on a busy machine."""
     settings = LinkSettings(115_200, "N", silence_s, reconnect_s)
-    return ModbusScanner(device.address, RegisterDecoder(shipped_map(map_name), count=count), settings, **waits_s)  # type: ignore[arg-type]
+    return ModbusScanner(device.address, RegisterDecoder(shipped_map(map_name), count=count), settings, timeout_s=timeout_s, poll_s=poll_s)
 
 
 def kinds(book: Account) -> list[type[Arrival]]:
@@ -41,9 +49,8 @@ def kinds(book: Account) -> list[type[Arrival]]:
 @pytest.mark.parametrize("line", [TCP, RTU])
 @pytest.mark.parametrize("name", ["modbus-ring", "modbus-fifo"])
 def test_every_point_arrives_as_it_was_measured(name: str, line: str, tmp_path: Path) -> None:
-    """With patience: a queue that was read is empty, so an answer that comes too late on a busy machine takes its points along."""
     with simulated(name, line, tmp_path, "--unpaced") as device:
-        book = account(source(device, MAPS[name], silence_s=60.0, timeout_s=20.0).arrivals())
+        book = account(source(device, MAPS[name]).arrivals())
     assert book.sequence == list(range(COUNT))
     only_sent_points(book, device.sent_mm, HALF_UNIT_MM)
     np.testing.assert_allclose(book.time_s, np.arange(COUNT) / 2000.0, atol=0.51e-6)
