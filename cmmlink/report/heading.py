@@ -3,8 +3,11 @@
 import warnings
 from pathlib import Path
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.transforms import ScaledTranslation
 
+_BESIDE_PT, _BELOW_PT = 57.0, 20.0  # of the labels from their axes
 _LONGEST_TITLE = 60  # signs that fit beside the longest verdict
 
 
@@ -16,6 +19,17 @@ def heading_of(title: str, verdict: str) -> str:
 def draw_heading(figure: Figure, heading: str) -> None:
     """Write the heading. A name is drawn as it is spelled: no sign in it means a formula."""
     figure.suptitle(heading, fontsize=15, fontweight="bold", parse_math=False)
+
+
+def fix_labels(axes: Axes) -> None:
+    """Keep the labels of both axes at fixed distances, which leave room for the numbers.
+
+    Without it matplotlib lays out every number several times to find the distances.
+    """
+    figure = axes.figure
+    beside, below = (ScaledTranslation(x / 72, y / 72, figure.dpi_scale_trans) for x, y in ((-_BESIDE_PT, 0), (0, -_BELOW_PT)))
+    axes.yaxis.set_label_coords(0, 0.5, axes.transAxes + beside)
+    axes.xaxis.set_label_coords(0.5, 0, axes.transAxes + below)
 
 
 def short_title(title: str) -> str:

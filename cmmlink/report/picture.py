@@ -4,22 +4,26 @@ Verdicts are those of the result, and they show by mark as well as by colour: a 
 one down is out below it, a diamond is not proven either way.
 """
 
+import pathlib
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.collections import PathCollection, PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.path import Path
 from numpy.typing import NDArray
 
-from cmmlink.report.heading import draw_heading, heading_of, save_picture
+from cmmlink.report.heading import draw_heading, fix_labels, heading_of, save_picture
 from cmmlink.words import headline_of
 from inspection import InspectionResult, JudgedRows, NominalProfile, ToleranceZone, Verdict, telling_rows
 
 Array = NDArray[np.float64]
+Rows = NDArray[np.int64]
 
+# Everything has its place beforehand: to find places for labels of unknown size takes longer than to draw the picture.
+_PLACES = {"height_ratios": (3, 2), "left": 0.09, "right": 0.905, "bottom": 0.08, "top": 0.92, "hspace": 0.32}
 _NOMINAL, _BAND, _GOOD, _UNPROVEN, _ABOVE, _BELOW = "#3a3f45", "#dfe7ee", "#2a7fa5", "#a16207", "#c2410c", "#6d28d9"
 _BAND_SHARE = 0.06  # of the part's size: how wide the magnified tolerance band is drawn
 _NEAR_AN_EDGE = 0.18  # of the width: half a label
@@ -47,19 +51,22 @@ _LOOKS = (
 
 
 def write_picture(
-    result: InspectionResult, nominal: NominalProfile, title: str, path: Path, ending: str = "complete", said: str = ""
+    result: InspectionResult, nominal: NominalProfile, title: str, path: pathlib.Path, ending: str = "complete", said: str = ""
 ) -> None:
     """Draw the profile and the strip of deviations to a PNG file.
 
     ending : how the run ended
     said   : what stands small at the foot, like which run it was and when it was measured
     """
-    figure = Figure(figsize=(12, 8), dpi=110, layout="constrained")
-    profile, strip = figure.subplots(2, 1, height_ratios=[3, 2])
-    _draw_profile(profile, result, nominal)
-    _draw_strip(strip, result, nominal)
+    figure = Figure(figsize=(12, 8), dpi=110)
+    profile, strip = figure.subplots(2, 1, gridspec_kw=_PLACES)
+    telling = _telling(result, nominal)
+    _draw_profile(profile, result, nominal, telling)
+    _draw_strip(strip, result, nominal, telling)
+    for axes in (profile, strip):
+        fix_labels(axes)
     draw_heading(figure, headline_on_picture(result, title, ending))
-    figure.supxlabel(said, x=0.99, ha="right", fontsize=9, parse_math=False)
+    figure.text(0.99, 0.01, said, ha="right", va="bottom", fontsize=9, parse_math=False)
     save_picture(figure, path)
 
 
@@ -76,7 +83,7 @@ def magnification(result: InspectionResult, nominal: NominalProfile) -> float:
     return float(max(step * power for step in (1, 2, 5) if step * power <= wanted))
 
 
-def _draw_profile(axes: Axes, result: InspectionResult, nominal: NominalProfile) -> None:
+def _draw_profile(axes: Axes, result: InspectionResult, nominal: NominalProfile, telling: Rows) -> None:
     factor = magnification(result, nominal)
     outward = nominal.outward * nominal.normal
     points = _loop(nominal.points_mm, nominal)
@@ -85,17 +92,20 @@ def _draw_profile(axes: Axes, result: InspectionResult, nominal: NominalProfile)
     # A collection finds its limits by numpy; `fill` goes through every corner of its polygon in Python.
     axes.add_collection(PolyCollection([np.vstack([edges[0], edges[1][::-1]])], facecolors=_BAND, linewidths=0))
     axes.plot(*points.T, color=_NOMINAL, lw=1.0)
-    shown = result.rows_at(_rows_to_draw(result, nominal))
+    shown = result.rows_at(_rows_to_draw(result, telling))
     tips = shown.foot_mm + factor * (shown.actual_mm - shown.foot_mm)
-    whiskers = list(np.stack([shown.foot_mm, tips], axis=1))
-    axes.add_collection(LineCollection(whiskers, colors=_colours(shown, zone.middle_mm), linewidths=0.7))
+    for look in _LOOKS:
+        chosen = _has_look(shown, look, zone.middle_mm)
+        whiskers = path_of_pieces(shown.foot_mm[chosen], tips[chosen])
+        axes.add_collection(PathCollection([whiskers], facecolors="none", edgecolors=look.colour, linewidths=0.7))
     _mark_worst(axes, result, factor)
     axes.set_aspect("equal")
     axes.autoscale_view()
-    axes.set(xlabel="x (mm)", ylabel="y (mm)", title=f"deviations magnified {factor:g} times, tolerance band shaded")
+    axes.set(xlabel="x (mm)", ylabel="y (mm)")
+    axes.set_title(f"deviations magnified {factor:g} times, tolerance band shaded", y=1.0)
 
 
-def _draw_strip(axes: Axes, result: InspectionResult, nominal: NominalProfile) -> None:
+def _draw_strip(axes: Axes, result: InspectionResult, nominal: NominalProfile, telling: Rows) -> None:
     zone = result.zone
     axes.axhspan(zone.lower_mm, zone.upper_mm, color=_BAND, lw=0)
     for limit, words in names_of_limits(zone):
@@ -105,7 +115,7 @@ def _draw_strip(axes: Axes, result: InspectionResult, nominal: NominalProfile) -
         along = "center" if own else "bottom" if above else "top"
         axes.annotate(words, place, shift, xycoords=("axes fraction", "data"), textcoords="offset points", va=along, fontsize=8)
     axes.axhline(0, color=_NOMINAL, lw=0.8)
-    shown = result.rows_at(_telling(result, nominal))
+    shown = result.rows_at(telling)
     for look in _LOOKS:
         chosen = _has_look(shown, look, zone.middle_mm)
         axes.scatter(shown.station_mm[chosen], shown.deviation_mm[chosen], s=look.size, c=look.colour, marker=look.mark, lw=0)
@@ -119,7 +129,7 @@ def _draw_strip(axes: Axes, result: InspectionResult, nominal: NominalProfile) -
     axes.margins(y=0.2)
     axes.set(xlim=(0, nominal.length_mm), xlabel="station (mm)", ylabel="deviation (mm)")
     basis = f"coverage {result.coverage:.1%}   fit {result.fit}   method {result.method}   out of tolerance {result.out_of_tolerance}"
-    axes.set_title(f"{basis}\n{zone.decision_rule}", fontsize=10)
+    axes.set_title(f"{basis}\n{zone.decision_rule}", fontsize=10, y=1.0)
 
 
 def side_of_label(share: float) -> Literal["left", "center", "right"]:
@@ -146,16 +156,20 @@ def _mark_worst(axes: Axes, result: InspectionResult, factor: float) -> None:
         axes.plot(*tip, "o", ms=9, mfc="none", mec=_ABOVE, mew=1.5)
 
 
-def _telling(result: InspectionResult, nominal: NominalProfile) -> NDArray[np.int64]:
+def path_of_pieces(starts: Array, ends: Array) -> Path:
+    """One path of separate straight pieces, from starts (m, 2) to ends (m, 2): it is drawn in a tenth of the time of m lines."""
+    return Path(np.stack([starts, ends], axis=1).reshape(-1, 2), np.tile([Path.MOVETO, Path.LINETO], len(starts)).astype(np.uint8))
+
+
+def _telling(result: InspectionResult, nominal: NominalProfile) -> Rows:
     """Rows (k,) of the points: of a long scan the lowest and the highest in every few hundredths of a pixel, which hide the others."""
     return telling_rows(result.station_mm, result.deviation_mm, nominal.length_mm, _MOST_POINTS // 2)
 
 
-def _rows_to_draw(result: InspectionResult, nominal: NominalProfile) -> NDArray[np.int64]:
+def _rows_to_draw(result: InspectionResult, telling: Rows) -> Rows:
     """Rows (k,) of the points to draw: thinned, but with every point out of tolerance and the worst one."""
-    judged = _telling(result, nominal)
-    kept = judged[:: max(1, len(judged) // _MOST_WHISKERS)]
-    out = judged[result.verdicts[judged] == Verdict.NONCONFORM]
+    kept = telling[:: max(1, len(telling) // _MOST_WHISKERS)]
+    out = telling[result.verdicts[telling] == Verdict.NONCONFORM]
     worst = [] if result.worst is None else [result.worst]
     return np.unique(np.concatenate([kept, out, worst]).astype(np.int64))
 
@@ -167,13 +181,6 @@ def _has_look(rows: JudgedRows, look: _Look, middle_mm: float) -> NDArray[np.boo
     if look.side == "both":
         return of_verdict
     return of_verdict & above if look.side == "above" else of_verdict & ~above
-
-
-def _colours(rows: JudgedRows, middle_mm: float) -> list[str]:
-    colours = np.full(rows.received, _GOOD)
-    for look in _LOOKS:
-        colours[_has_look(rows, look, middle_mm)] = look.colour
-    return [str(colour) for colour in colours]
 
 
 def _loop(points: Array, nominal: NominalProfile) -> Array:
