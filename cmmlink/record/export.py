@@ -13,6 +13,7 @@ from cmmlink.record.bodies import unpack_judged
 from cmmlink.record.reader import arrivals_of, describe, event_document, points_of, reads_of, recorded_run
 from cmmlink.record.shapes import plain_name
 from cmmlink.record.store import Store
+from cmmlink.result_files import NewFiles, new_files
 
 POINT_COLUMNS = {
     "sequence": "the device's own counter of the point, unwrapped",
@@ -36,25 +37,28 @@ def export_run(store: Store, run: str, folder: Path) -> list[Path]:
     deviations.csv and result.json.
     """
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        return [*_documents(store, run, folder), *_points(store, run, folder), *_wire(store, run, folder), *_result(store, run, folder)]
+        with new_files(folder) as files:
+            _documents(store, run, files)
+            _points(store, run, files)
+            _wire(store, run, files)
+            _result(store, run, files)
+        return [folder / name for name in files.names]
     except OSError as error:
         raise PlanError(f"{folder}: the run cannot be written there ({error.strerror}); choose another folder with --out") from None
 
 
-def _documents(store: Store, run: str, folder: Path) -> list[Path]:
+def _documents(store: Store, run: str, files: NewFiles) -> None:
     recorded = recorded_run(store, run)
-    nominal = folder / f"nominal-{plain_name(recorded.header['nominal'])}"
-    nominal.write_bytes(recorded.nominal)
-    plan = folder / "plan.yaml"
-    plan.write_bytes(recorded.plan.encode())
-    events = [event_document(moment) for moment in arrivals_of(store, run)]
-    return [nominal, plan, _json(folder / "run.json", describe(store, run)), _json(folder / "events.json", events)]
+    files(f"nominal-{plain_name(recorded.header['nominal'])}").write_bytes(recorded.nominal)
+    files("plan.yaml").write_bytes(recorded.plan.encode())
+    _json(files("run.json"), describe(store, run))
+    _json(files("events.json"), [event_document(moment) for moment in arrivals_of(store, run)])
 
 
-def _points(store: Store, run: str, folder: Path) -> list[Path]:
+def _points(store: Store, run: str, files: NewFiles) -> None:
     count = store.totals(run).get("points", (0, 0))[1]
-    with (folder / "points.npy").open("wb") as array, (folder / "points.csv").open("w", newline="", encoding="utf-8") as file:
+    array_path, table_path = files.together("points.npy", "points.csv")
+    with array_path.open("wb") as array, table_path.open("w", newline="", encoding="utf-8") as file:
         np.lib.format.write_array_header_1_0(array, {"descr": "<f8", "fortran_order": False, "shape": (count, 5)})
         writer = csv.writer(file)
         writer.writerow(POINT_COLUMNS)
@@ -62,34 +66,29 @@ def _points(store: Store, run: str, folder: Path) -> list[Path]:
             rows = np.column_stack([batch.sequence, batch.time_s, batch.points_mm])
             array.write(rows.astype("<f8").tobytes())
             writer.writerows((int(row[0]), *row[1:]) for row in rows.tolist())
-    return [folder / "points.npy", folder / "points.csv"]
 
 
-def _wire(store: Store, run: str, folder: Path) -> list[Path]:
+def _wire(store: Store, run: str, files: NewFiles) -> None:
     offset = 0
-    with (folder / "wire.bin").open("wb") as raw, (folder / "wire.csv").open("w", newline="", encoding="utf-8") as index:
+    raw_path, index_path = files.together("wire.bin", "wire.csv")
+    with raw_path.open("wb") as raw, index_path.open("w", newline="", encoding="utf-8") as index:
         writer = csv.writer(index)
         writer.writerow(WIRE_COLUMNS)
         for read in reads_of(store, run):
             raw.write(read.data)
             writer.writerow((read.time_s, offset, len(read.data)))
             offset += len(read.data)
-    return [folder / "wire.bin", folder / "wire.csv"]
 
 
-def _result(store: Store, run: str, folder: Path) -> list[Path]:
+def _result(store: Store, run: str, files: NewFiles) -> None:
     recorded = recorded_run(store, run)
     if recorded.result is None or recorded.end is None:
-        return []
+        return
     ending = str(recorded.end["state"])
     blocks = (unpack_judged(record.body) for record in store.records(run, "deviations"))
-    write_deviations(blocks, folder / "deviations.csv", ending)
-    return [
-        folder / "deviations.csv",
-        _json(folder / "result.json", recorded.result | ({} if ending == "complete" else {"ending": ending})),
-    ]
+    write_deviations(blocks, files("deviations.csv"), ending)
+    _json(files("result.json"), recorded.result | ({} if ending == "complete" else {"ending": ending}))
 
 
-def _json(path: Path, document: Any) -> Path:
+def _json(path: Path, document: Any) -> None:
     path.write_text(json.dumps(document, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-    return path

@@ -9,6 +9,7 @@ from typing import Any
 
 from cmmlink.deviations_csv import write_deviations
 from cmmlink.errors import PlanError
+from cmmlink.result_files import new_files
 from cmmlink.result_folder import fixed_part, make_room
 from cmmlink.run import FinishedRun
 from inspection import InspectionResult, NominalProfile
@@ -35,20 +36,17 @@ def write_results(
 ) -> list[str]:
     """Write result.json and, when points were judged, deviations.csv and profile.png. Returns their names; raises PlanError.
 
-    What an earlier run left there is moved aside, into a folder of its own.
+    What an earlier run left there is moved aside, into a folder of its own; the new files take its place together.
     """
-    with _or_refuse(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-        make_room(folder)
-        (folder / "result.json").write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
-        if result is None or not result.judged:
-            return ["result.json"]
-        from cmmlink.report.picture import write_picture  # noqa: PLC0415 - matplotlib takes half a second that other commands need not pay
+    with _or_refuse(folder), new_files(folder, make_room) as files:
+        files("result.json").write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+        if result is not None and result.judged:
+            from cmmlink.report.picture import write_picture  # noqa: PLC0415 - matplotlib takes half a second that other commands need not pay
 
-        ending = document.get("ending", "complete")
-        write_deviations(result.blocks(), folder / "deviations.csv", ending)
-        write_picture(result, profile, title, folder / "profile.png", ending, _said_at_foot(document))
-    return ["result.json", "deviations.csv", "profile.png"]
+            ending = document.get("ending", "complete")
+            write_deviations(result.blocks(), files("deviations.csv"), ending)
+            write_picture(result, profile, title, files("profile.png"), ending, _said_at_foot(document))
+    return files.names
 
 
 def _said_at_foot(document: dict[str, Any]) -> str:

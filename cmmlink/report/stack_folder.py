@@ -10,6 +10,7 @@ import numpy as np
 from cmmlink.csv_rows import Texts, write_rows
 from cmmlink.deviations_csv import write_deviations
 from cmmlink.errors import PlanError
+from cmmlink.result_files import new_files
 from cmmlink.result_folder import make_room
 from cmmlink.result_keys import SectionInspected
 from cmmlink.stack import SectionOutcome, StackOutcome
@@ -52,23 +53,21 @@ def write_stack(
     from cmmlink.report.stack_picture import write_stack_picture  # noqa: PLC0415
 
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        make_room(folder)
-        (folder / "result.json").write_text(json.dumps(stack.result_json(), indent=2) + "\n", encoding="utf-8")
-        _write_sections(stack, folder / "sections.csv")
-        for number, section in enumerate(stack.sections, start=1):
-            own = folder / section_folder(number, section)
-            own.mkdir(exist_ok=True)
-            write_contours(section.slice.contours, own / "contours.csv")
-            result = section.run.result
-            if result is not None and result.judged:
-                write_deviations(result.blocks(), own / "deviations.csv", section.run.ending)
-                if pictures:
-                    heading = f"{title}, height {section.slice.height_mm:g} mm"
-                    write_picture(result, section.profile, heading, own / "profile.png", section.run.ending)
-            on_section()
-        if pictures:
-            write_stack_picture(stack, zone, title, folder / "stack.png")
+        with new_files(folder, make_room) as files:
+            files("result.json").write_text(json.dumps(stack.result_json(), indent=2) + "\n", encoding="utf-8")
+            _write_sections(stack, files("sections.csv"))
+            for number, section in enumerate(stack.sections, start=1):
+                own = section_folder(number, section)
+                write_contours(section.slice.contours, files(f"{own}/contours.csv"))
+                result = section.run.result
+                if result is not None and result.judged:
+                    write_deviations(result.blocks(), files(f"{own}/deviations.csv"), section.run.ending)
+                    if pictures:
+                        heading = f"{title}, height {section.slice.height_mm:g} mm"
+                        write_picture(result, section.profile, heading, files(f"{own}/profile.png"), section.run.ending)
+                on_section()
+            if pictures:
+                write_stack_picture(stack, zone, title, files("stack.png"))
     except OSError as error:
         raise PlanError(f"{folder}: the results cannot be written ({error.strerror}); choose another folder with --out") from None
 
