@@ -47,11 +47,12 @@ platforms: .venv/test-installed
 upgrade: .venv/test-installed
 	.ci/upgrade $(BIN)/uv
 
-# Every call of every command to the operating system fails once, before and after its work; a run is killed at every call.
+# Every place at which a command calls the operating system fails once, before and after its work, or is where the run is killed;
+# `EVERY=--every` strikes each call of each place.
 faults: .venv/test-installed
-	$(BIN)/python -m tests.integration.fail_once
-	$(BIN)/python -m tests.integration.fail_once --after
-	$(BIN)/python -m tests.integration.fail_once --kill
+	$(BIN)/python -m tests.integration.fail_once $(EVERY)
+	$(BIN)/python -m tests.integration.fail_once --after $(EVERY)
+	$(BIN)/python -m tests.integration.fail_once --kill $(EVERY)
 
 # Power cuts at random moments of what SQLite writes, with unsynchronised sectors lost or swapped.
 CUTS ?= 2000
@@ -91,7 +92,7 @@ proofs: .venv/test-installed
 
 # The two laws over every source, format and surface, with thirty times as many random cases as `make test` tries.
 laws: .venv/test-installed
-	$(BIN)/pytest --hypothesis-profile=laws tests/integration/test_laws.py tests/integration/test_laws_of_files.py
+	$(BIN)/pytest --hypothesis-profile=laws --timeout 7200 tests/integration/test_laws.py tests/integration/test_laws_of_files.py
 
 # The audit of verdicts: live scans, minimum zones, partial scans and mirrored parts whose truth is known.
 audit: .venv/test-installed

@@ -53,7 +53,8 @@ def keep_log(folder: Path) -> Iterator[None]:
         if is_writing:
             writer.stop()
         for handler in writer.handlers:
-            handler.close()
+            with suppress(OSError):  # a disk may say only now that it took nothing
+                handler.close()
 
 
 def log_command(arguments: list[str]) -> None:

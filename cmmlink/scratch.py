@@ -55,11 +55,17 @@ class Scratch:
         return array[:rows] if rows <= len(array) else self._map(memory.file, (rows, *array.shape[1:]), array.dtype.type)
 
     def refusal(self, received: int, announced: int | None = None) -> str:
-        """Why a run cannot go on after so many points, where its disk has no room for the rest of it; nothing where it has."""
-        free = shutil.disk_usage(self.folder).free
+        """Why a run cannot go on after so many points, where its disk has no room for the rest of it; nothing where it has.
+
+        A disk that does not say how much room it has ends no run: what is written next shows whether it has any.
+        """
+        try:
+            free = _free_bytes(self.folder)
+        except StoreError:
+            return ""
         if free < RESERVE_BYTES + FINISHING_BYTES * received:
             told = f"only {free / 1e6:.0f} MB are free after {received:,} points; the run ends here so that it can be kept"
-        elif (announced or 0) - received > (fit := points_that_fit(self.folder, received)):
+        elif (announced or 0) - received > (fit := _points_in(free, received)):
             told = f"the device announces {announced:,} points and there is room for {received + fit:,}"
         else:
             return ""
@@ -107,11 +113,22 @@ class _UnnamedFile:
         return memory
 
 
-def points_that_fit(folder: Path, received: int = 0) -> int:
-    """How many more points a run can measure before the disk of a folder, or of the nearest one above it that exists, is full."""
-    nearest = next(path for path in (folder, *folder.parents) if path.exists())
-    free = shutil.disk_usage(nearest).free - RESERVE_BYTES - FINISHING_BYTES * received
-    return max(0, free) // (RUNNING_BYTES + FINISHING_BYTES)
+def _free_bytes(folder: Path) -> int:
+    """What is free on the disk of a folder, or of the nearest one above it that exists. Raises StoreError where it does not say."""
+    try:
+        nearest = next(path for path in (folder, *folder.parents) if path.exists())
+        return shutil.disk_usage(nearest).free
+    except OSError as error:
+        raise StoreError(f"{folder}: cannot be used: {error}; choose another folder with --records DIR") from error
+
+
+def _points_in(free: int, received: int) -> int:
+    return max(0, free - RESERVE_BYTES - FINISHING_BYTES * received) // (RUNNING_BYTES + FINISHING_BYTES)
+
+
+def points_that_fit(folder: Path) -> int:
+    """How many points a run can measure before the disk of a folder is full. Raises StoreError where it does not say."""
+    return _points_in(_free_bytes(folder), 0)
 
 
 def words_of_room(folder: Path) -> str:
@@ -122,4 +139,7 @@ def words_of_room(folder: Path) -> str:
 
 def scratch_in(folder: Path | None) -> Scratch:
     """Room on the disk of a folder, or with the system's temporary files where nothing can be written there."""
-    return Scratch(folder if folder is not None and folder.is_dir() and os.access(folder, os.W_OK) else None)
+    try:
+        return Scratch(folder if folder is not None and folder.is_dir() and os.access(folder, os.W_OK) else None)
+    except OSError:  # the folder cannot be looked at
+        return Scratch(None)

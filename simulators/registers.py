@@ -90,8 +90,11 @@ def serve_registers(settings: SimulatorSettings, announce: Announce, make: Maker
 class RegisterService:
     """One device being served: what its registers hold at every access, whatever link brings it there."""
 
-    def __init__(self, settings: SimulatorSettings, announce: Announce, make: Maker, scan: Walk) -> None:
+    def __init__(
+        self, settings: SimulatorSettings, announce: Announce, make: Maker, scan: Walk, clock: Callable[[], float] = time.monotonic
+    ) -> None:
         self._settings = settings
+        self._clock = clock
         self._announce = announce
         self._make = make
         self._scan = scan
@@ -110,12 +113,12 @@ class RegisterService:
         server = await self._listen()
         self._announce(self._address)
         finished_s: float | None = None
-        while finished_s is None or time.monotonic() < finished_s + FAREWELL_S:
+        while finished_s is None or self._clock() < finished_s + FAREWELL_S:
             await asyncio.sleep(LOOK_S)
             if self._away_s is not None:
                 server = await self._go_away(server, self._away_s)
             if self.device.done and finished_s is None:
-                finished_s = time.monotonic()
+                finished_s = self._clock()
                 self._announce(json.dumps({"points": self.device.count, **self._injector.tally}))
         await _shut_down(server)
         if self._relay is not None:
@@ -182,7 +185,7 @@ class RegisterService:
     async def _let_time_pass(self, function: int, address: int, count: int) -> None:
         if self._away_s is not None:
             await asyncio.sleep(1e6)  # about to go: no answer any more
-        now_s = time.monotonic()
+        now_s = self._clock()
         self._began_s = now_s if self._began_s is None else self._began_s
         if now_s < self._silent_until_s:
             await asyncio.sleep(self._silent_until_s - now_s)
@@ -190,12 +193,12 @@ class RegisterService:
         if slow_s:
             await asyncio.sleep(slow_s)
         self.device.heartbeat = (self.device.heartbeat + 1) % 65536
-        if time.monotonic() >= self._stalled_until_s:
+        if self._clock() >= self._stalled_until_s:
             self._advance(self.device.points_appearing(function, address, count))
 
     def _advance(self, appearing: int) -> None:
         assert self._began_s is not None
-        device, elapsed_s = self.device, time.monotonic() - self._began_s
+        device, elapsed_s = self.device, self._clock() - self._began_s
         due = int(np.searchsorted(self._scan.time_s, elapsed_s, side="right")) if self._settings.paced else device.taken + appearing
         due = self._injector.next_stop(device.taken, min(due, device.count))
         device.take(max(due, device.taken))
@@ -209,11 +212,11 @@ class RegisterService:
             os._exit(int(status))
         stall_s = self._injector.strike("stall", index)
         if stall_s is not None:
-            self._stalled_until_s = time.monotonic() + stall_s
+            self._stalled_until_s = self._clock() + stall_s
             self._began_s = (self._began_s or 0.0) + stall_s
         silence_s = self._injector.strike("silence", index)
         if silence_s is not None:
-            self._silent_until_s = time.monotonic() + min(silence_s, 1e6)
+            self._silent_until_s = self._clock() + min(silence_s, 1e6)
         away_s = self._injector.strike("unplug", index)
         if away_s is not None:
             self._away_s = away_s

@@ -91,7 +91,10 @@ def stream(settings: SimulatorSettings, device: Device, announce: Announce, move
 class StreamedScan:
     """One scan being streamed."""
 
-    def __init__(self, line: Line, device: Device, scan: Walk, injector: Injector, paced: bool) -> None:
+    def __init__(
+        self, line: Line, device: Device, scan: Walk, injector: Injector, paced: bool, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._clock = clock
         self._line, self._device, self._scan, self._injector, self._paced = line, device, scan, injector, paced
         self._unplugged = False
         self._fresh = copy.deepcopy(device)
@@ -105,7 +108,7 @@ class StreamedScan:
             if restart_s is not None:
                 start_s, index = self._begin_anew(restart_s), 0
             start_s += self._trouble(index)
-            due = self._due(time.monotonic() - start_s, index)
+            due = self._due(self._clock() - start_s, index)
             step = self._device.samples_per_frame
             self._send(b"".join(self._frame(first, min(first + step, due)) for first in range(index, due, step)))
             index = due
@@ -121,7 +124,7 @@ class StreamedScan:
         """Open the scan when the client is there; return the time of its beginning."""
         self._wait_for_client()
         self._send(self._device.opening(len(self._scan.time_s)))
-        return time.monotonic()
+        return self._clock()
 
     def _begin_anew(self, away_s: float) -> float:
         """Go, forget everything, and come back."""
@@ -136,8 +139,8 @@ class StreamedScan:
         self._wait_until(lambda: not self._line.is_connected())
 
     def _wait_until(self, met: Callable[[], bool]) -> None:
-        end_s = time.monotonic() + FAREWELL_S
-        while not met() and time.monotonic() < end_s:
+        end_s = self._clock() + FAREWELL_S
+        while not met() and self._clock() < end_s:
             self._listen(0.02)
 
     def _due(self, elapsed_s: float, index: int) -> int:
@@ -162,7 +165,7 @@ class StreamedScan:
 
     def _trouble(self, index: int) -> float:
         """Let the faults of this point happen; return for how long the scan stood still."""
-        began_s = time.monotonic()
+        began_s = self._clock()
         status = self._injector.strike("die", index)
         if status is not None:
             sys.stdout.flush()
@@ -179,12 +182,12 @@ class StreamedScan:
             self._unplugged = True
             self._pause(away_s, index, alive=False)
             return 0.0  # the device goes on measuring; nobody hears it
-        return time.monotonic() - began_s
+        return self._clock() - began_s
 
     def _pause(self, seconds: float, index: int, *, alive: bool) -> None:
-        end_s = time.monotonic() + seconds
-        next_beat_s = time.monotonic()
-        while (now_s := time.monotonic()) < end_s:
+        end_s = self._clock() + seconds
+        next_beat_s = self._clock()
+        while (now_s := self._clock()) < end_s:
             if alive and now_s >= next_beat_s:
                 self._send(self._device.heartbeat(index, float(self._scan.time_s[index])))
                 next_beat_s += HEARTBEAT_S
@@ -197,9 +200,9 @@ class StreamedScan:
 
     def _wait_for_client(self) -> None:
         begin_s = math.inf
-        while not self._device.told_to_begin() and time.monotonic() < begin_s:
+        while not self._device.told_to_begin() and self._clock() < begin_s:
             if not self._line.is_connected():
                 begin_s = math.inf
             elif begin_s == math.inf:
-                begin_s = time.monotonic() + IMPATIENCE_S
+                begin_s = self._clock() + IMPATIENCE_S
             self._listen(0.02)

@@ -2,13 +2,9 @@
 
 import sys
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
 
 import pytest
 from hypothesis import settings
-
-if TYPE_CHECKING:
-    from inspection import NominalProfile, NurbsCurve
 
 settings.register_profile("no deadline", deadline=None)  # machines are noisy: no test asserts a time
 settings.register_profile("laws", deadline=None, max_examples=3000)  # of `make laws`
@@ -58,24 +54,7 @@ def _preparations_made_once() -> Iterator[None]:
     if "cmmlink.run" not in sys.modules:  # no test that was collected runs anything
         yield
         return
-    from inspection import discretize, rehearse
+    from tests.cmmlink.prepared import preparations_made_once
 
-    made: dict[tuple[object, ...], NominalProfile] = {}
-    rehearsed: set[tuple[object, ...]] = set()
-
-    def discretize_once(curve: "NurbsCurve", *chosen: Any) -> "NominalProfile":
-        arrays = (curve.control_points_mm, curve.knots, curve.weights)
-        key = (curve.degree, curve.closed, *(b"" if array is None else array.tobytes() for array in arrays), *chosen)
-        if key not in made:
-            made[key] = discretize(curve, *chosen)
-        return made[key]
-
-    def rehearse_once(nominal: "NominalProfile", *chosen: Any) -> None:
-        if chosen not in rehearsed:
-            rehearse(nominal, *chosen)
-            rehearsed.add(chosen)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("cmmlink.from_plan.discretize", discretize_once)
-        patch.setattr("cmmlink.run.rehearse", rehearse_once)
+    with preparations_made_once():
         yield

@@ -9,9 +9,9 @@ file and nothing else:
 """
 
 import importlib
-import pkgutil
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from importlib import resources
 from pathlib import Path
 from typing import Literal, Protocol, cast
 
@@ -108,10 +108,12 @@ def _checked(file: NominalFile) -> NominalFile:
 
 
 def _formats() -> Iterator[NominalFormat]:
-    for found in pkgutil.iter_modules(__path__):
-        module = importlib.import_module(f"{__name__}.{found.name}")
-        if hasattr(module, "SUFFIXES"):
-            yield cast(NominalFormat, module)
+    """The modules of formats. Raises OSError where the folder cannot be read, which `pkgutil.iter_modules` takes for an empty one."""
+    for name in sorted(file.name for file in resources.files(__name__).iterdir()):
+        if name.endswith(".py") and name != "__init__.py":
+            module = importlib.import_module(f"{__name__}.{name.removesuffix('.py')}")
+            if hasattr(module, "SUFFIXES"):
+                yield cast(NominalFormat, module)
 
 
 def _format_of(path: Path) -> NominalFormat:

@@ -21,7 +21,7 @@ from cmmlink.record.chain import Record, is_damaged
 from cmmlink.record.recorder import end_draft
 from cmmlink.record.shapes import End, Header, Result, checked
 from cmmlink.record.station_lock import PATIENCE_S
-from cmmlink.record.store import FILE_NAME, Store
+from cmmlink.record.store import Store, has_records
 from drivers import Arrival, PointBatch, Rejected, WireBytes
 
 _FROM_HEADER = ("run", "started", "part", "serial_number", "simulated")
@@ -63,7 +63,7 @@ def open_to_record(folder: Path, now: Callable[[], datetime], patience_s: float 
 @contextmanager
 def open_to_read(folder: Path, now: Callable[[], datetime], *, close_interrupted: bool = True) -> Iterator[Store]:
     """Open the records to read them. Raises RunError where there are none."""
-    if not (folder / FILE_NAME).is_file():
+    if not has_records(folder):
         raise RunError(f"{folder}: there are no records here; --records DIR says where they are")
     with Store(folder, writing=False, epoch_s=lambda: now().timestamp()) as store:
         unfinished = any(end is None for _, end in store.begins_and_ends())
@@ -86,7 +86,7 @@ def list_runs(folder: Path, now: Callable[[], datetime]) -> list[dict[str, Any]]
 
     The state of a run that another process records just now is "running"; a run that gave no result has no verdict.
     """
-    if not (folder / FILE_NAME).is_file():
+    if not has_records(folder):
         return []
     with open_to_read(folder, now) as store:
         return [_entry(store, begin, end) for begin, end in store.begins_and_ends()]

@@ -141,6 +141,7 @@ class Recorder:
         self._pack = _Packing()
         self._last_pose: tuple[str, float] = ("", float("-inf"))
         self._closing = threading.Event()
+        self._has_begun = threading.Event()
         self._failure: Exception | None = None
         self._writer: threading.Thread | None = None
 
@@ -204,6 +205,7 @@ class Recorder:
         try:
             head = [self._draft("run", pack_document(header)), self._draft("plan", plan), self._draft("nominal", inputs.nominal)]
             self._store.append(head)
+            self._has_begun.set()
         except BaseException:
             self._stop_writing()
             raise
@@ -274,6 +276,9 @@ class Recorder:
 
     def _write(self) -> None:
         try:
+            while not self._has_begun.wait(self._commit_s):  # a lost link may wait already, and the head stands before everything else
+                if self._closing.is_set():
+                    return
             while not self._closing.wait(self._commit_s):
                 self._commit(self._queue.take(0.0))
             self._commit(self._queue.take(0.0))

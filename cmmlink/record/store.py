@@ -8,6 +8,7 @@ import os
 import re
 import shutil
 import sqlite3
+import stat
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -61,8 +62,8 @@ class Store:
         self._epoch_s = epoch_s
         self._lock: StationLock | None = None
         self._head: tuple[int, bytes] = (0, GENESIS)  # number and hash of the last record
-        self._found_empty = self.path.is_file() and not self.path.stat().st_size
         try:
+            self._found_empty = self.path.is_file() and not self.path.stat().st_size
             if writing:
                 folder.mkdir(parents=True, exist_ok=True)
                 self._lock = StationLock(folder / "station.lock", patience_s)
@@ -265,13 +266,31 @@ def _translate_errors(path: Path) -> Iterator[None]:
         raise StoreError(f"{path}: this computer has too little memory left; close other programs") from error
 
 
+def has_records(folder: Path) -> bool:
+    """Tell whether there is a file of records in a folder. Raises StoreError where the system does not say."""
+    try:
+        return stat.S_ISREG((folder / FILE_NAME).stat().st_mode)
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    except OSError as error:
+        raise StoreError(f"{folder / FILE_NAME}: cannot be opened: {error}; choose another folder with --records DIR") from None
+
+
 def _reason(error: sqlite3.Error, path: Path) -> str:
     code = getattr(error, "sqlite_errorcode", 0) & 0xFF
     if code in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR):
-        free = shutil.disk_usage(path.parent).free / 1e6
-        return f"{error} ({free:.1f} MB free); free some space, or keep the records elsewhere with --records DIR"
+        mend = "free some space" if code == sqlite3.SQLITE_FULL else "look whether the disk is sound"
+        return f"{error}{_words_of_room(path.parent)}; {mend}, or keep the records elsewhere with --records DIR"
     if code in (sqlite3.SQLITE_READONLY, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_PERM):
         return f"{error}; is the folder writable? --records DIR chooses another"
     if code in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB):
         return f"{error}: the file is damaged; keep it as it is and choose another folder with --records DIR"
     return str(error)
+
+
+def _words_of_room(folder: Path) -> str:
+    """How much room the disk of a folder has, in brackets; nothing where it does not say."""
+    try:
+        return f" ({shutil.disk_usage(folder).free / 1e6:.1f} MB free)"
+    except OSError:
+        return ""

@@ -5,8 +5,8 @@ A format that cannot show every loss or every damage says so in `UNSEEN`, by its
 
 import importlib
 import inspect
-import pkgutil
 from collections.abc import Callable, Iterator, Mapping
+from importlib import resources
 from math import isfinite
 from types import ModuleType
 from typing import get_args
@@ -28,9 +28,10 @@ def unseen_in(name: str) -> tuple[str, ...]:
 
 
 def _modules() -> Iterator[ModuleType]:
-    for module in pkgutil.iter_modules(__path__):
-        if module.name.endswith("_frames"):
-            yield importlib.import_module(f"{__name__}.{module.name}")
+    """The modules of formats. Raises OSError where the folder cannot be read, which `pkgutil.iter_modules` takes for an empty one."""
+    for name in sorted(file.name for file in resources.files(__name__).iterdir()):
+        if name.endswith("_frames.py"):
+            yield importlib.import_module(f"{__name__}.{name.removesuffix('.py')}")
 
 
 def _require_kind(name: str, option: inspect.Parameter, given: object) -> None:

@@ -43,7 +43,7 @@ def device_address(text: str) -> HostPort | str:
     if WORD.fullmatch(text):
         return text
     if "://" not in text and text.isprintable() and text.startswith("/") and not text.startswith("//"):  # a share of another computer
-        if os.path.exists(text) and not _is_character_device(text):
+        if os.path.exists(text) and not _may_be_character_device(text):
             raise ValueError(f"address {text!r:.200} is no serial port but another file; `cmmlink ports` lists the ports")
         return text
     known = "neither host:port nor the name of a serial port like COM3 or /dev/ttyUSB0"
@@ -52,8 +52,11 @@ def device_address(text: str) -> HostPort | str:
 
 def require_port(name: str) -> None:
     """Raise LinkError unless `name` is a serial port that this computer has now."""
-    if WINDOWS_PORT.fullmatch(name) or (name.startswith("/") and _is_character_device(name)):
-        return
+    try:
+        if WINDOWS_PORT.fullmatch(name) or (name.startswith("/") and _is_character_device(name)):
+            return
+    except OSError as error:
+        raise LinkError(f"{name}: cannot be opened: {error}") from error
     hint = "is it plugged in, and named right? `cmmlink ports` lists the ports"
     raise LinkError(f"{name}: cannot be opened: this computer has no such port; {hint}")
 
@@ -67,6 +70,7 @@ def _is_character_device(name: str) -> bool:
     """Tell whether `name`, or what it is a link to, is a character device below /dev, as ports and pseudo-terminals are.
 
     Where the system says what kind of device it is (Linux), only terminals are: to open a watchdog restarts the computer.
+    Raises OSError where it cannot be looked at.
     """
     try:
         path = Path(name).resolve()
@@ -75,5 +79,13 @@ def _is_character_device(name: str) -> bool:
             return False
         kind = KINDS / f"{os.major(status.st_rdev)}:{os.minor(status.st_rdev)}" / "subsystem"
         return not kind.exists() or kind.resolve().name == "tty"
-    except (OSError, RuntimeError, ValueError):
+    except (FileNotFoundError, NotADirectoryError, RuntimeError, ValueError):
         return False
+
+
+def _may_be_character_device(name: str) -> bool:
+    """The same, and true where it cannot be looked at: `require_port` looks again and says why."""
+    try:
+        return _is_character_device(name)
+    except OSError:
+        return True

@@ -10,7 +10,7 @@ import struct
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import closing, suppress
+from contextlib import closing
 from math import inf
 from typing import Protocol
 
@@ -174,7 +174,8 @@ class ModbusScanner:
             client = _PortClient(place, timeout=timeout_s, retries=0, baudrate=self._settings.baud_rate, parity=self._settings.parity)
         client.register(FifoAnswer)
         if not client.connect():
-            raise LinkError(f"{self._address}: no Modbus device opens there; is it switched on, plugged in, free, and named right?")
+            why = f": {client.failure}" if client.failure else ""
+            raise LinkError(f"{self._address}: no Modbus device opens there{why}; is it switched on, plugged in, free, and named right?")
         return closing(client)
 
 
@@ -183,6 +184,7 @@ class _TimedClient(ModbusBaseSyncClient):
 
     _end_s = inf
     heard = 0
+    failure = ""  # why the link did not open, where that is known
 
     def within(self, seconds: float) -> None:
         """Set the time for opening the link, or for the whole of the next answer; `heard` counts the bytes that come in it."""
@@ -207,8 +209,10 @@ class _TcpClient(_TimedClient, ModbusTcpClient):
     def connect(self) -> bool:
         """Open the connection, if there is none."""
         if self.socket is None:
-            with suppress(OSError, LinkError):
+            try:
                 self.socket = open_tcp(self._place, self._left_s, self._stopped)
+            except (OSError, LinkError) as error:
+                self.failure = str(error)
         return self.socket is not None
 
     def recv(self, size: int | None) -> bytes:

@@ -6,10 +6,12 @@ long a scan may be silent.
 
 import errno
 import os
+import queue
 import selectors
 import socket
 import threading
 import time
+from collections.abc import Sequence
 
 from drivers.errors import LinkError
 from drivers.links.address import HostPort
@@ -17,18 +19,17 @@ from drivers.links.address import HostPort
 POLL_S = 0.05  # how long a read waits before it looks whether to stop
 WRITE_S = 1.0
 LARGEST_READ = 1 << 16
+Address = tuple[socket.AddressFamily, socket.SocketKind, int, str, tuple[str, int] | tuple[str, int, int, int] | tuple[int, bytes]]
 UNDER_WAY = (0, errno.EINPROGRESS, errno.EWOULDBLOCK, errno.EAGAIN)
 
 
 def open_tcp(place: HostPort, within_s: float, stopped: threading.Event) -> socket.socket:
     """Connect to the first address of a host that answers, each of them with its share of the time.
 
-    The look-up of a host's name is the system's, and takes as long as the system waits for it; an address of numbers needs none.
-
-    Raises OSError where none answers, and LinkError when told to stop.
+    Raises OSError where none answers, or none is found, and LinkError when told to stop.
     """
     end_s = time.monotonic() + within_s
-    found = socket.getaddrinfo(place.host.strip("[]"), place.port, type=socket.SOCK_STREAM)
+    found = _addresses_of(place, within_s, stopped)
     failure: OSError = TimeoutError(f"no answer within {within_s:.2g} s")
     for left, (family, kind, protocol, _, address) in zip(range(len(found), 0, -1), found, strict=True):
         connection = socket.socket(family, kind, protocol)
@@ -42,6 +43,43 @@ def open_tcp(place: HostPort, within_s: float, stopped: threading.Event) -> sock
             continue
         return connection
     raise failure
+
+
+def _addresses_of(place: HostPort, within_s: float, stopped: threading.Event) -> Sequence[Address]:
+    """Look a host up, in a thread of its own: the system may wait much longer for a server of names than a scan may be silent."""
+    host = place.host.strip("[]")
+    try:
+        return socket.getaddrinfo(host, place.port, type=socket.SOCK_STREAM, flags=socket.AI_NUMERICHOST)
+    except socket.gaierror as error:
+        if error.errno != socket.EAI_NONAME:
+            raise
+    answers: queue.SimpleQueue[Sequence[Address] | OSError] = queue.SimpleQueue()
+
+    def look_up() -> None:
+        try:
+            answers.put(socket.getaddrinfo(host, place.port, type=socket.SOCK_STREAM))
+        except OSError as error:
+            answers.put(error)
+        except UnicodeError as error:
+            answers.put(OSError(str(error)))
+
+    try:
+        threading.Thread(target=look_up, name="look-up", daemon=True).start()
+    except RuntimeError as error:
+        raise OSError(f"{error}; close other programs") from error
+    end_s = time.monotonic() + within_s
+    while True:
+        try:
+            found = answers.get(timeout=POLL_S)
+        except queue.Empty:
+            if stopped.is_set():
+                raise LinkError("told to stop before the host was found") from None
+            if time.monotonic() >= end_s:
+                raise TimeoutError(f"the network did not say within {within_s:.2g} s which address {host} has") from None
+            continue
+        if isinstance(found, OSError):
+            raise found
+        return found
 
 
 def _connect(connection: socket.socket, address: tuple[object, ...], within_s: float, stopped: threading.Event) -> None:

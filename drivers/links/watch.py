@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator
 from math import inf
 
 from drivers.errors import LinkError, ProtocolError
-from drivers.source import HARMLESS_REASONS, Arrival, Damaged, Heartbeat, PointBatch, Rejected, ScanClosed
+from drivers.source import HARMLESS_REASONS, Arrival, Damaged, Heartbeat, LinkDown, Lost, PointBatch, Rejected, ScanClosed
 
 
 def is_news(arrival: Arrival) -> bool:
@@ -59,28 +59,52 @@ def explained(address: str, arrivals: Iterable[Arrival]) -> Iterator[Arrival]:
 
     Raises ProtocolError at the end of such a scan, and the link's own error with the explanation behind it.
     """
-    points, rejected, damaged = 0, Counter[str](), Counter[str]()
+    points, became = 0, _Became()
     try:
         for arrival in arrivals:
             if isinstance(arrival, PointBatch):
                 points += len(arrival)
-            elif isinstance(arrival, Rejected) and arrival.reason not in HARMLESS_REASONS:
-                rejected[arrival.reason] += arrival.count
-            elif isinstance(arrival, Damaged):
-                damaged[arrival.reason] += arrival.byte_count
+            became.note(arrival)
             yield arrival
-            if isinstance(arrival, ScanClosed) and not points and (rejected or damaged):
-                raise ProtocolError(f"{address}: not one point of the scan can be used: {_became(rejected, damaged)}")
+            if isinstance(arrival, ScanClosed) and not points and became.is_worth_telling:
+                raise ProtocolError(f"{address}: not one point of the scan can be used: {became.words}")
     except (LinkError, ProtocolError) as error:
-        if points or not (rejected or damaged) or isinstance(arrival, ScanClosed):
+        if points or not became.is_worth_telling or isinstance(arrival, ScanClosed):
             raise
-        raise type(error)(f"{error}; not one usable point came: {_became(rejected, damaged)}") from error
+        raise type(error)(f"{error}; not one usable point came: {became.words}") from error
 
 
-def _became(rejected: Counter[str], damaged: Counter[str]) -> str:
-    parts = []
-    if rejected:
-        parts.append(f"{rejected.total():,} points rejected ({rejected.most_common(1)[0][0]})")
-    if damaged:
-        parts.append(f"{damaged.total():,} bytes damaged ({damaged.most_common(1)[0][0]})")
-    return ", ".join(parts)
+class _Became:
+    """What became of the points of a scan, the largest share first."""
+
+    def __init__(self) -> None:
+        self._links, self._lost = list[str](), Counter[str]()
+        self._rejected, self._damaged = Counter[str](), Counter[str]()
+
+    def note(self, arrival: Arrival) -> None:
+        if isinstance(arrival, LinkDown):
+            self._links.append(arrival.reason)
+        elif isinstance(arrival, Lost):
+            self._lost[arrival.reason] += arrival.count
+        elif isinstance(arrival, Rejected) and arrival.reason not in HARMLESS_REASONS:
+            self._rejected[arrival.reason] += arrival.count
+        elif isinstance(arrival, Damaged):
+            self._damaged[arrival.reason] += arrival.byte_count
+
+    @property
+    def is_worth_telling(self) -> bool:
+        return bool(self._rejected or self._damaged)
+
+    @property
+    def words(self) -> str:
+        of_points = sorted(((self._lost, "lost"), (self._rejected, "rejected")), key=lambda told: -told[0].total())
+        counts = [*((counted, f"points {what}") for counted, what in of_points), (self._damaged, "bytes damaged")]
+        parts = [f"{told.total():,} {what} ({told.most_common(1)[0][0]})" for told, what in counts if told.total() > 0]
+        if self._links:
+            parts.append(f"the link was lost {_times(len(self._links))} ({self._links[0]})")
+        return ", ".join(parts)
+
+
+def _times(count: int) -> str:
+    """How often something happened, for people."""
+    return "once" if count == 1 else f"{count} times"

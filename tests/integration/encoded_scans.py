@@ -5,6 +5,7 @@ kept as a transcript, so that the same bytes can be read again in other pieces.
 """
 
 import asyncio
+import itertools
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -38,6 +39,7 @@ Array = NDArray[np.float64]
 Transcript = list[bytes | None]  # what passed over the wire, a read each; None where the link was lost
 
 RATE_HZ = 1000.0
+TICK_S = 2e-5
 MOST_REQUESTS = 1500
 ALONG_X = Beam((0.0, 0.0, 0.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))
 
@@ -60,6 +62,12 @@ class Source:
     follows: bool = False
     sound: bool = False
     upright: bool = False
+
+
+def ticks() -> Callable[[], float]:
+    """A clock that goes on by as much whenever it is asked: what passes over the wire does not depend on how busy this computer is."""
+    asked = itertools.count(1)
+    return lambda: next(asked) * TICK_S
 
 
 def walk_of(points_mm: Array) -> Walk:
@@ -110,7 +118,7 @@ def streaming(device: Callable[[], Device], made: Callable[[int], Decoder]) -> C
 
     def encode(points_mm: Array, faults: Sequence[Fault], seed: int) -> Transcript:
         wire = Wire(made(len(points_mm)))
-        scan = StreamedScan(wire, device(), walk_of(points_mm), Injector(faults, seed), paced=False)
+        scan = StreamedScan(wire, device(), walk_of(points_mm), Injector(faults, seed), paced=False, clock=ticks())
         with suppress(SystemExit, DeviceError, ScanEndedError):  # the device died, or the driver is through: what follows is not heard
             scan.run()
         return wire.transcript
@@ -167,7 +175,7 @@ def registers(
 
     def encode(points_mm: Array, faults: Sequence[Fault], seed: int) -> Transcript:
         settings = SimulatorSettings("memory:0", points_mm[:2], Motion(1.0, RATE_HZ, seed=seed), tuple(faults), paced=False)
-        service = RegisterService(settings, lambda _: None, device, walk_of(points_mm))
+        service = RegisterService(settings, lambda _: None, device, walk_of(points_mm), ticks())
         return asyncio.run(_asked(service, made(len(points_mm)), Injector(faults, seed + 1)))
 
     return encode

@@ -1,9 +1,10 @@
-"""Every call to the operating system fails once: a command is run again and again, and in each run one call more goes well.
+"""Every call to the operating system fails once: a command is run again and again, and in each run another call fails.
 
-`python -m tests.integration.fail_once` runs every command until nothing fails any more; a thinned sample is in
-test_every_call_fails_once.py. After each run: the exit status is one that is documented for such a failure, standard error holds no
-traceback, what was committed to the record is in it and its chain is whole, no temporary file, thread or descriptor is left, and the
-next run of the command works.
+`python -m tests.integration.fail_once [COMMAND ...] [--after | --kill] [--every]` strikes every place at which a command calls the
+system: a line of cmmlink, or of a library below it, and the lines that lead there. A place in a loop is struck at its first call;
+`--every` strikes every call of it. A sample is in test_every_call_fails_once.py. After each run: the exit status is one that is
+documented for such a failure, standard error names what failed and holds no traceback, what was committed to the record is in it and
+its chain is whole, no temporary file, thread or descriptor is left, and the next run of the command works.
 """
 
 import faulthandler
@@ -11,83 +12,37 @@ import gc
 import json
 import os
 import shutil
-import socket
 import sqlite3
 import sys
 import tempfile
 import threading
 import time
 import traceback
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 from unittest.mock import patch
 
 from cmmlink.commands import main
 from tests.cmmlink.command import Ended, cmmlink
 from tests.cmmlink.oval_part import oval_points, write_nominal, write_points
-from tests.drivers.codecs.wire_bytes import ascii_line
+from tests.cmmlink.prepared import preparations_made_once
+from tests.integration.counter_parties import CounterParty, LineScanner, PortScanner, RingScanner, lines_of
 from tests.integration.failing_calls import NOT_OURS, Faults, failing, intercepted, take
 
 LONGEST_RUN_S = 300.0
-
-
-class Device:
-    """A scanner on a socket of this computer, of the ASCII line format; over a new link it goes on behind what it has sent.
-
-    It shares no line with the simulators of the project.
-    """
-
-    def __init__(self, lines: list[bytes], pieces: int = 6) -> None:
-        self._opening, self._points, self._closing = lines[0], lines[1:-1], lines[-1]
-        self._step = -(-len(self._points) // pieces)
-        self._listener = socket.create_server(("127.0.0.1", 0))
-        self.address = f"127.0.0.1:{self._listener.getsockname()[1]}"
-        self._thread = threading.Thread(target=self._serve, name=NOT_OURS, daemon=True)
-        self._thread.start()
-
-    def __enter__(self) -> "Device":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._listener.close()
-
-    def _serve(self) -> None:
-        sent = 0
-        while True:
-            try:
-                link, _ = self._listener.accept()
-            except OSError:
-                return
-            with link:
-                try:
-                    if not link.recv(16):
-                        continue
-                    link.sendall(self._opening)
-                    while sent < len(self._points):
-                        link.sendall(b"".join(self._points[sent : sent + self._step]))
-                        sent += self._step
-                        time.sleep(0.003)
-                    link.sendall(self._closing)
-                    link.settimeout(2.0)
-                    link.recv(16)  # until the host has closed
-                except OSError:
-                    continue
-
-
-def lines_of(deviation_mm: float) -> list[bytes]:
-    """The oval's points as lines of the ASCII format."""
-    points = oval_points(deviation_mm)
-    told = [ascii_line(f"P,{i},{1000 * i},{x:.9f},{y:.9f},0,0") for i, (x, y) in enumerate(points.tolist())]
-    return [ascii_line(f"S,oval scanner,1,mm,{len(points)}"), *told, ascii_line(f"E,{len(points)}")]
+FEWEST = 300  # points of a whole scan
+OF_TIDYING = ("unlink", "rmdir", "scandir", "lstat")  # where one of these fails, a temporary file may stay
 
 
 PLAN = """\
 part: {{name: oval, serial_number: 7}}
 nominal: {{file: oval.yaml}}
 tolerance: {{lower_mm: -0.05, upper_mm: 0.05}}
-device: {{type: serial, address: "{address}", reconnect_s: 2, silence_s: 1}}
+device: {{type: {kind}, address: "{address}", reconnect_s: 2, silence_s: 1{more}}}
 out: null
 registration: {{datum: {{}}}}
 discretisation: {{samples: 400}}
@@ -111,12 +66,15 @@ def _oval(folder: Path) -> Path:
     return write_nominal(folder / "oval.yaml")
 
 
-def _run(folder: Path, stack: ExitStack) -> list[object]:
-    _oval(folder)
-    device = stack.enter_context(Device(lines_of(0.01)))
-    plan = folder / "plan.yaml"
-    plan.write_text(PLAN.format(address=device.address), encoding="utf-8")
-    return ["run", plan, "--headless", "--json", "--records", folder / "records"]
+def _run(scanner: Callable[[], CounterParty], kind: str = "serial", more: str = "") -> Callable[[Path, ExitStack], list[object]]:
+    def make(folder: Path, stack: ExitStack) -> list[object]:
+        _oval(folder)
+        device = stack.enter_context(scanner())
+        plan = folder / "plan.yaml"
+        plan.write_text(PLAN.format(address=device.address, kind=kind, more=more), encoding="utf-8")
+        return ["run", plan, "--headless", "--json", "--records", folder / "records"]
+
+    return make
 
 
 def _inspect(folder: Path, _: ExitStack) -> list[object]:
@@ -151,21 +109,24 @@ def _ct(folder: Path, _: ExitStack) -> list[object]:
         for corners in (((x, y, 0), (p, q, 0), (p, q, 20)), ((x, y, 0), (p, q, 20), (x, y, 20))):
             lines += ["facet normal 0 0 0", "outer loop", *(f"vertex {a!r} {b!r} {c!r}" for a, b, c in corners), "endloop", "endfacet"]
     (folder / "tube.stl").write_text("\n".join([*lines, "endsolid oval"]) + "\n", encoding="utf-8")
-    where = ("--normal", 0, 0, 1, "--heights", 10, "--cutter", "numpy")
-    return ["ct", folder / "tube.stl", "--nominal", _oval(folder), "--tolerance", -0.05, 0.05, *where, "--json", "--out", folder / "out"]
+    where = ("--normal", 0, 0, 1, "--heights", 10, "--cutter", "numpy", "--tolerance", -0.05, 0.05, "--records", folder / "records")
+    return ["ct", folder / "tube.stl", "--nominal", _oval(folder), *where, "--json", "--out", folder / "out"]
 
 
 UNUSABLE, DEVICE, RECORD = 2, 4, 5
+OF_A_RUN = frozenset({UNUSABLE, 3, DEVICE, RECORD})
 COMMANDS = {
     command.name: command
     for command in (
-        Command("run", _run, frozenset({UNUSABLE, 3, DEVICE, RECORD})),
+        Command("run", _run(lambda: LineScanner(lines_of(0.01))), OF_A_RUN),
+        Command("run-port", _run(lambda: PortScanner(lines_of(0.01))), OF_A_RUN),
+        Command("run-modbus", _run(RingScanner, "modbus", ", map: generic-ring"), OF_A_RUN),
         Command("inspect", _inspect, frozenset({UNUSABLE, DEVICE, RECORD})),
         Command("export", _recorded("export", "last", "--out", "OUT"), frozenset({UNUSABLE, RECORD})),
         Command("replay", _recorded("replay", "last", "--json", "--out", "OUT"), frozenset({UNUSABLE, RECORD})),
         Command("verify", _recorded("verify"), frozenset({UNUSABLE, RECORD})),
         Command("show", _recorded("show", "last"), frozenset({UNUSABLE, RECORD})),
-        Command("ct", _ct, frozenset({UNUSABLE})),
+        Command("ct", _ct, frozenset({UNUSABLE, RECORD})),
     )
 }
 
@@ -174,7 +135,7 @@ def prepared(folder: Path) -> Path:
     """Record one run without failures; its records are where every later run begins."""
     folder.mkdir()
     with ExitStack() as stack:
-        ended = cmmlink(*_run(folder, stack))
+        ended = cmmlink(*COMMANDS["run"].make(folder, stack))
         assert ended.code == 0, ended
     return folder / "records"
 
@@ -188,15 +149,15 @@ class Trial:
     wrong: tuple[str, ...]
 
 
-def attempt(command: Command, fails: int, records: Path, *, only: str = "", after: bool = False, again: bool = True) -> Trial:
-    """Run a command with its call number `fails` failing, and look at what it left."""
+def attempt(command: Command, faults: Faults, records: Path, *, again: bool = True) -> Trial:
+    """Run a command with one of its calls failing, and look at what it left."""
     with tempfile.TemporaryDirectory() as place, ExitStack() as stack:
         folder, scratch = Path(place) / "work", Path(place) / "scratch"
         folder.mkdir()
         scratch.mkdir()
         shutil.copytree(records, folder / "records")
         words = command.make(folder, stack)
-        faults = take(Faults(fails, only, after))
+        take(faults)
         threads, descriptors = _others(), _descriptors()
         faulthandler.dump_traceback_later(LONGEST_RUN_S, exit=True)
         with patch.object(tempfile, "tempdir", str(scratch)), intercepted(), patch("tests.cmmlink.command.main", failing(main)):
@@ -205,12 +166,9 @@ def attempt(command: Command, fails: int, records: Path, *, only: str = "", afte
             except Exception:
                 ended = Ended(1, "", traceback.format_exc())
         faulthandler.cancel_dump_traceback_later()
-        wrong = [*_said_wrongly(command, ended, faults), *_kept_wrongly(folder / "records", faults)]
-        wrong += (
-            [f"left behind: {path.name}" for path in scratch.iterdir()]
-            if "unlink" not in faults.failed and "rmdir" not in faults.failed
-            else []
-        )
+        wrong = [*_said_wrongly(command, ended, faults), *_kept_wrongly(folder / "records", records, faults)]
+        if faults.failed not in OF_TIDYING:
+            wrong += [f"left behind: {path.name}" for path in scratch.iterdir()]
         wrong += [f"thread left: {name}" for name in _others() - threads]
         if (left := _descriptors() - descriptors) > 0:
             wrong.append(f"{left} descriptors left open")
@@ -221,24 +179,25 @@ def attempt(command: Command, fails: int, records: Path, *, only: str = "", afte
     return Trial(ended, faults, tuple(wrong))
 
 
-def killed(command: Command, fails: int, records: Path, *, only: str = "") -> Trial:
-    """Kill a process that runs a command at its call number `fails`, and look at what it left. POSIX systems only."""
+def killed(command: Command, faults: Faults, records: Path) -> Trial:
+    """Kill a process that runs a command at one of its calls, and look at what it left. POSIX systems only."""
     with tempfile.TemporaryDirectory() as place, ExitStack() as stack:
         folder, said = Path(place) / "work", Path(place) / "said"
         folder.mkdir()
         shutil.copytree(records, folder / "records")
         words = command.make(folder, stack)
+        write = os.write
         if (child := os.fork()) == 0:
             with said.open("ab", buffering=0) as told, intercepted():
                 descriptor = told.fileno()
-                take(Faults(fails, only, kills=True, tell=lambda rows: os.write(descriptor, _lines(rows))))
+                take(replace(faults, kills=True, tell=lambda rows: write(descriptor, _lines(rows))))
                 with patch("tests.cmmlink.command.main", failing(main)):
                     cmmlink(*words)
             os._exit(0)
         _, status = os.waitpid(child, 0)
-        faults = Faults(fails, failed=f"killed at {only or 'call'} {fails}" if os.WIFSIGNALED(status) else "")
+        faults.failed = "killed" if os.WIFSIGNALED(status) else ""
         faults.committed = {int(line.split()[0]): bytes.fromhex(line.split()[1]) for line in said.read_text().splitlines()}
-        wrong = list(_kept_wrongly(folder / "records", faults))
+        wrong = list(_kept_wrongly(folder / "records", records, faults))
         again = cmmlink(*command.make(folder, stack))
         if again.code != 0:
             wrong.append(f"the next run ends with {again.code}: {again.err}")
@@ -267,25 +226,46 @@ def _descriptors() -> int:
 def _said_wrongly(command: Command, ended: Ended, faults: Faults) -> Iterator[str]:
     if "Traceback" in ended.err or "defect of cmmlink" in ended.err:
         yield f"a traceback: {ended.err[-1500:]}"
+        return
     if not faults.failed:
         if ended.code != 0:
             yield f"nothing failed, yet it ends with {ended.code}: {ended.err}"
         return
     if ended.code not in command.statuses | {0}:
         yield f"exit status {ended.code}: {ended.err}"
-    if ended.code not in (0, 3) and not ended.err.startswith("cmmlink: "):
-        yield f"no message: {ended.err!r}"
+    if ended.code not in (0, 3):
+        if not ended.err.startswith("cmmlink: "):
+            yield f"no message: {ended.err!r}"
+        if not any(words in ended.err for words in _words_of(faults.error)) or "the answer could not be written" in ended.err:
+            yield f"a false cause: {ended.err!r}"
+    if f"{os.sep}records" in str(getattr(faults.error, "filename", "")) and ended.code not in (0, RECORD):
+        yield f"the folder of the records failed, yet it ends with {ended.code}: {ended.err}"
     if "sqlite INSERT" in faults.failed and ended.code != RECORD:
         yield f"the record failed, yet it ends with {ended.code}"
     if ended.out.startswith("{") and ended.code in (0, 1, 3):
-        facts = json.loads(ended.out)
-        whole = facts.get("received") == facts.get("judged", 0) + facts.get("rejected", 0)
-        if not whole or (facts["verdict"] == "conform") != (ended.code == 0) or (ended.code == 0 and facts["received"] < 300):
-            yield f"a verdict that is not the result's: {ended.code}, {facts}"
+        for facts in _judged_in(json.loads(ended.out)):
+            whole = facts.get("received") == facts.get("judged", 0) + facts.get("rejected", 0)
+            if not whole or (facts["verdict"] == "conform") != (ended.code == 0) or (ended.code == 0 and facts["received"] < FEWEST):
+                yield f"a verdict that is not the result's: {ended.code}, {facts}"
 
 
-def _kept_wrongly(folder: Path, faults: Faults) -> Iterator[str]:
-    """What was committed must be in the file, which is read by SQLite alone."""
+def _words_of(error: BaseException | None) -> tuple[str, ...]:
+    """The words of which one must stand in the message, so that it names the true cause."""
+    if isinstance(error, MemoryError):
+        return ("memory",)
+    return (getattr(error, "strerror", None) or str(error),)
+
+
+def _judged_in(facts: dict[str, Any]) -> list[dict[str, Any]]:
+    """The results of one section, or of each of several."""
+    found: list[dict[str, Any]] = facts.get("slices", [facts])
+    return found
+
+
+def _kept_wrongly(folder: Path, before: Path, faults: Faults) -> Iterator[str]:
+    """What was committed must be in the file, which is read by SQLite alone; a file that is the same as before is as sound."""
+    if not faults.committed and _bytes_of(folder) == _bytes_of(before):
+        return
     store = sqlite3.connect(folder / "station.sqlite")
     try:
         kept = dict(store.execute("SELECT number, sha256 FROM record"))
@@ -302,50 +282,52 @@ def _kept_wrongly(folder: Path, faults: Faults) -> Iterator[str]:
         yield f"verify: {ended.err}"
 
 
-def sweep(names: list[str], *, after: bool) -> int:
-    """Let every call of the named commands fail once; returns how many runs went wrong."""
+def _bytes_of(folder: Path) -> list[bytes]:
+    """What the files of records hold; a log of SQLite that is empty is none."""
+    names = ("station.sqlite", "station.sqlite-wal")
+    return [path.read_bytes() if (path := folder / name).is_file() else b"" for name in names]
+
+
+def places_of(command: Command, records: Path) -> Counter[str]:
+    """Every place at which a command calls the system, and how often, as two runs without failures show."""
+    attempt(command, Faults(0), records, again=False)  # what is loaded only when it is used is loaded now
+    runs = [attempt(command, Faults(0), records, again=False) for _ in range(2)]
+    for run in runs:
+        assert not run.wrong, run.wrong
+    return runs[0].faults.places | runs[1].faults.places
+
+
+def sweep(names: list[str], mode: str, *, every: bool) -> int:
+    """Let the calls of the named commands fail, one a run, or kill a run at each; returns how many runs went wrong."""
     wrong = 0
-    with tempfile.TemporaryDirectory() as place:
-        records = prepared(Path(place) / "prepared")
+    with tempfile.TemporaryDirectory() as folder, preparations_made_once():
+        records = prepared(Path(folder) / "prepared")
         for name in names:
-            attempt(COMMANDS[name], 0, records)  # what is loaded only when it is used is loaded now
-            fails, told = 1, dict[tuple[str, int], list[int]]()
-            while True:
-                trial = attempt(COMMANDS[name], fails, records, after=after, again=fails % 5 == 0)
-                if not trial.faults.failed:
-                    break
+            began_s, places = time.monotonic(), places_of(COMMANDS[name], records)
+            strikes = [(place, number) for place, calls in places.items() for number in range(1, calls + 1 if every else 2)]
+            told, unmet = Counter[tuple[str, int]](), 0
+            for place, number in strikes:
+                faults = Faults(number, place=place, after=mode == "after")
+                trial = (killed if mode == "kill" else attempt)(COMMANDS[name], faults, records)
                 for words in trial.wrong:
                     wrong += 1
-                    print(f"{name}, call {fails} ({trial.faults.failed}): {words}", flush=True)
-                told.setdefault((trial.faults.failed, trial.ended.code), []).append(fails)
-                fails += 1
-            print(f"{name}: {fails - 1} calls failed, one a run", flush=True)
+                    print(f"{name}, {place}, number {number}: {words}", flush=True)
+                unmet += not trial.faults.failed
+                told[place.partition(" at ")[0], trial.ended.code] += 1
+                print(f"    {place}: {trial.ended.code} {trial.ended.err.strip()}", flush=True)
+            took_s = time.monotonic() - began_s
+            print(
+                f"{name}: {len(strikes)} of {places.total()} calls struck at {len(places)} places, {unmet} unmet, {took_s:.0f} s",
+                flush=True,
+            )
             for (what, code), calls in sorted(told.items()):
-                print(f"    {what:18} exit {code}: {len(calls)}", flush=True)
+                print(f"    {what:18} {'killed' if mode == 'kill' else f'exit {code}'}: {calls}", flush=True)
     print(f"{wrong} runs went wrong")
-    return wrong
-
-
-def sweep_of_kills() -> int:
-    """Kill a run at every one of its calls; returns how many left something wrong."""
-    wrong = fails = 0
-    with tempfile.TemporaryDirectory() as place:
-        records = prepared(Path(place) / "prepared")
-        while True:
-            fails += 1
-            trial = killed(COMMANDS["run"], fails, records)
-            for words in trial.wrong:
-                wrong += 1
-                print(f"killed at call {fails}: {words}", flush=True)
-            if not trial.faults.failed:
-                break
-    print(f"killed at each of {fails - 1} calls; {wrong} went wrong")
     return wrong
 
 
 if __name__ == "__main__":
     os.environ["XDG_STATE_HOME"] = os.environ["XDG_DATA_HOME"] = tempfile.mkdtemp()
     chosen = [word for word in sys.argv[1:] if word in COMMANDS] or list(COMMANDS)
-    if "--kill" in sys.argv:
-        sys.exit(1 if sweep_of_kills() else 0)
-    sys.exit(1 if sweep(chosen, after="--after" in sys.argv) else 0)
+    given = next((mode for mode in ("after", "kill") if f"--{mode}" in sys.argv), "before")
+    sys.exit(1 if sweep(chosen, given, every="--every" in sys.argv) else 0)

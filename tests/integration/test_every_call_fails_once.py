@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from tests.integration.fail_once import COMMANDS, attempt, killed, prepared
+from tests.integration.failing_calls import Faults
 
 SAMPLE = [
     ("run", "sqlite INSERT", 3),
@@ -16,7 +17,15 @@ SAMPLE = [
     ("run", "open to read", 8),
     ("export", "file write", 9),
     ("verify", "sqlite SELECT", 4),
+    ("show", "file close", 1),
+    ("show", "stat", 8),
+    ("inspect", "statvfs", 1),
+    ("inspect", "listdir", 1),
+    ("run", "listdir", 1),
 ]
+
+
+PORTS = [("stat", 10), ("stat", 20), ("write", 1), ("read", 2)]
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +37,15 @@ def records(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_call_that_fails_ends_as_documented_and_costs_nothing_that_was_acknowledged(
     records: Path, command: str, call: str, number: int
 ) -> None:
-    trial = attempt(COMMANDS[command], number, records, only=call)
+    trial = attempt(COMMANDS[command], Faults(number, only=call), records)
+    assert trial.faults.failed == call
+    assert not trial.wrong
+
+
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="a port is played by a pseudo-terminal")
+@pytest.mark.parametrize(("call", "number"), PORTS)
+def test_a_call_to_a_port_that_fails_is_told_as_what_it_is(records: Path, call: str, number: int) -> None:
+    trial = attempt(COMMANDS["run-port"], Faults(number, only=call), records, again=False)
     assert trial.faults.failed == call
     assert not trial.wrong
 
@@ -36,6 +53,6 @@ def test_a_call_that_fails_ends_as_documented_and_costs_nothing_that_was_acknowl
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="a process is killed at a call of its own on POSIX systems only")
 @pytest.mark.parametrize(("call", "number"), [("sqlite INSERT", 2), ("sqlite COMMIT", 3), ("socket recv", 5)])
 def test_a_run_that_is_killed_at_a_call_has_kept_what_was_acknowledged(records: Path, call: str, number: int) -> None:
-    trial = killed(COMMANDS["run"], number, records, only=call)
+    trial = killed(COMMANDS["run"], Faults(number, only=call), records)
     assert trial.faults.failed
     assert not trial.wrong

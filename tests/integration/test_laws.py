@@ -141,3 +141,13 @@ def test_what_takes_nothing_away_changes_no_verdict(name: str, fault: str) -> No
         said = judge(name, source.encode(scan_of(source, 70, 70 + width), [Fault(fault, share, 20, 150)], 1))
         assert (said.verdict, said.outcome.failure, said.missing) == (verdict, None, False)
         assert said.outcome.counts.judged == COUNT
+
+
+# ---- what the laws stand on
+
+
+@pytest.mark.parametrize("name", SOURCES)
+def test_a_busy_computer_changes_nothing_of_what_passes_over_the_wire(name: str) -> None:
+    """So the laws are decided by content, and a case that fails once fails again."""
+    source, faults = SOURCES[name], [Fault("stall", SHORT_S, 20), Fault("flip", 0.02, 10, 40), Fault("silence", SHORT_S, 60)]
+    assert source.encode(scan_of(source), faults, 7) == source.encode(scan_of(source), faults, 7)

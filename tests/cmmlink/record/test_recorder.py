@@ -26,7 +26,7 @@ from cmmlink.record.reader import (
 )
 from cmmlink.record.recorder import Acknowledged, Recorder, RunInputs
 from cmmlink.record.store import FILE_NAME, Store
-from drivers.source import Arrival, Heartbeat, PointBatch, Rejected, WireBytes
+from drivers.source import Arrival, Heartbeat, LinkDown, LinkUp, PointBatch, Rejected, WireBytes
 from tests.cmmlink.recorded import Script, record, scan_arrivals, today
 
 
@@ -231,3 +231,35 @@ def test_a_run_killed_between_its_judged_rows_and_its_result_was_interrupted(tmp
         assert recorded_run(store, str(begin.run)).result is None
         assert store.totals(str(begin.run))["deviations"][1] == len(found)
         assert check_chain(store, None)["altered"] is False
+
+
+@pytest.mark.parametrize("is_disk_full", [False, True])
+def test_what_waits_before_the_device_is_there_stands_behind_the_head_of_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_disk_full: bool
+) -> None:
+    """A device that is switched on late, and a disk that takes its time for the head: nobody else writes meanwhile, nor after a failure."""
+    append, others = Store.append, threading.Event()
+    kinds: list[str] = []
+
+    def slow_append(store: Store, drafts: Sequence[Draft]) -> list[Record]:
+        kinds.extend(draft.kind for draft in drafts)
+        if drafts[0].kind != "run":
+            others.set()
+        else:
+            others.wait(0.3)
+            if is_disk_full:
+                raise StoreError("disk full")
+        return append(store, drafts)
+
+    monkeypatch.setattr(Store, "append", slow_append)
+    script = Script(LinkDown("switched off"), LinkUp(1.0), *scan_arrivals(20))
+    if is_disk_full:
+        with pytest.raises(StoreError, match="disk full"):
+            record(tmp_path, script, commit_s=0.01)
+        assert kinds == ["run", "plan", "nominal"]
+        return
+    _, recorder = record(tmp_path, script, commit_s=0.01)
+    assert kinds[:3] == ["run", "plan", "nominal"]
+    with open_to_read(tmp_path, today) as store:
+        assert not check_chain(store, None)["altered"]
+        assert isinstance(next(iter(arrivals_of(store, recorder.run))).arrival, LinkDown)
