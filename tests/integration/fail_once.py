@@ -20,7 +20,7 @@ import time
 import traceback
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -170,8 +170,7 @@ def attempt(command: Command, faults: Faults, records: Path, *, again: bool = Tr
         if faults.failed not in OF_TIDYING:
             wrong += [f"left behind: {path.name}" for path in scratch.iterdir()]
         wrong += [f"thread left: {name}" for name in _others() - threads]
-        if (left := _descriptors() - descriptors) > 0:
-            wrong.append(f"{left} descriptors left open")
+        wrong += [f"left open: {path}" for path in _descriptors() - descriptors]
         stack.close()
         following = cmmlink(*command.make(folder, stack)) if again else Ended(0, "", "")
         if following.code != 0:
@@ -212,15 +211,14 @@ def _others() -> set[str]:
     return {thread.name for thread in threading.enumerate() if thread.name != NOT_OURS}
 
 
-def _descriptors() -> int:
-    """How many descriptors this process holds, but for those of the device; 0 where the system does not tell."""
+def _descriptors() -> Counter[str]:
+    """What the descriptors of this process lead to, but for those of sockets; nothing where the system does not tell."""
     gc.collect()
-    found = Path("/proc/self/fd")
-    return (
-        sum(not os.path.realpath(entry).startswith(("socket:", "/proc/self/fd/socket:")) for entry in found.iterdir())
-        if found.is_dir()
-        else 0
-    )
+    found, leading = Path("/proc/self/fd"), list[str]()
+    for entry in found.iterdir() if found.is_dir() else ():
+        with suppress(FileNotFoundError):  # the one by which the folder was read
+            leading.append(os.readlink(entry))
+    return Counter(where for where in leading if not where.startswith("socket:"))
 
 
 def _said_wrongly(command: Command, ended: Ended, faults: Faults) -> Iterator[str]:
