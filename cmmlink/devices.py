@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from cmmlink.errors import PlanError
 from cmmlink.plan import Device, FileDevice, ModbusDevice, Plan, SerialDevice, map_of
+from cmmlink.scratch import Scratch, scratch_in
 from drivers import Decoder, PointFileSource, RegisterDecoder, ScanSource, decoder, unseen_in
 from drivers.links.axis import Beam, ConstantFeed, FollowedAxis
 from drivers.links.link_settings import LinkSettings
@@ -26,9 +27,12 @@ Connect = Callable[[Plan], AbstractContextManager[Connected]]
 
 
 @contextmanager
-def connect(plan: Plan) -> Iterator[Connected]:
-    """Make the real device of a plan ready for one scan. Raises PlanError where the plan describes none."""
-    source, device = source_of(plan), plan.device
+def connect(plan: Plan, scratch: Scratch | None = None) -> Iterator[Connected]:
+    """Make the real device of a plan ready for one scan. Raises PlanError where the plan describes none.
+
+    scratch : gives the points of a long file their room; None takes it in the folder of the plan's records
+    """
+    source, device = source_of(plan, scratch), plan.device
     if isinstance(source, PointFileSource) and isinstance(device, FileDevice):
         notes = tuple(f"{device.file.name}: {note}" for note in source.notes)
     else:
@@ -55,11 +59,12 @@ def words_of(device: Device) -> str:
     return f"file {device.file.name}" if isinstance(device, FileDevice) else f"{device.type} {device.address}"
 
 
-def source_of(plan: Plan) -> ScanSource:
-    """The source of a plan's device; a file of points is read here. Raises PlanError or PointFileError."""
+def source_of(plan: Plan, scratch: Scratch | None = None) -> ScanSource:
+    """The source of a plan's device; a file of points is read here. Raises PlanError, PointFileError, or StoreError for want of room."""
     device = plan.device
     if isinstance(device, FileDevice):
-        return PointFileSource(device.file, device.scale, unit=device.unit, columns=device.columns, invalid=device.invalid)
+        room = scratch or scratch_in(plan.records)
+        return PointFileSource(device.file, device.scale, unit=device.unit, columns=device.columns, invalid=device.invalid, room=room)
     try:
         return _source_with_axis(device)
     except ValueError as error:

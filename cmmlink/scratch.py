@@ -116,8 +116,7 @@ class _UnnamedFile:
 def _free_bytes(folder: Path) -> int:
     """What is free on the disk of a folder, or of the nearest one above it that exists. Raises StoreError where it does not say."""
     try:
-        nearest = next(path for path in (folder, *folder.parents) if path.exists())
-        return shutil.disk_usage(nearest).free
+        return shutil.disk_usage(_nearest(folder)).free
     except OSError as error:
         raise StoreError(f"{folder}: cannot be used: {error}; choose another folder with --records DIR") from error
 
@@ -138,8 +137,18 @@ def words_of_room(folder: Path) -> str:
 
 
 def scratch_in(folder: Path | None) -> Scratch:
-    """Room on the disk of a folder, or with the system's temporary files where nothing can be written there."""
+    """Room on the disk of a folder that is there or will be, or with the system's temporary files where nothing can be written there.
+
+    Temporary files may lie in memory; records never do.
+    """
     try:
-        return Scratch(folder if folder is not None and folder.is_dir() and os.access(folder, os.W_OK) else None)
+        place = None if folder is None else _nearest(folder)
+        return Scratch(place if place is not None and place.is_dir() and os.access(place, os.W_OK) else None)
     except OSError:  # the folder cannot be looked at
         return Scratch(None)
+
+
+def _nearest(folder: Path) -> Path:
+    """The folder itself, or the nearest one above it that exists."""
+    folder = folder.absolute()
+    return next(path for path in (folder, *folder.parents) if path.exists())

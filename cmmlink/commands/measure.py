@@ -189,6 +189,7 @@ def inspect(
     from cmmlink.plan import Plan
     from cmmlink.report import prepare
     from cmmlink.run import carry_out
+    from cmmlink.scratch import scratch_in
 
     settings = {
         "part": {"name": printable((points.stem.strip() or points.name).replace("\n", " "))},
@@ -207,13 +208,13 @@ def inspect(
     }
     plan = plan_from_options(Plan, settings, _OPTION_OF)
     profile = profile_of(plan)
-    with connect(plan) as device, stop_on_ctrl_c() as stop:
+    folder = None if no_record else records_folder(records)
+    with connect(plan, scratch_in(folder)) as device, stop_on_ctrl_c() as stop:
         try:
             inspection_of(plan, profile)
         except ValueError as error:
             raise PlanError(f"--tip-radius {tip_radius:g}: {error}") from None
         prepare(out)
-        folder = None if no_record else records_folder(records)
         finished = carry_out(plan, profile, device, records=folder, clock=time.monotonic, now=now, stop=stop, patience_s=_PATIENCE_S)
     if finished.outcome.refusal is not None:
         refusal = finished.outcome.refusal

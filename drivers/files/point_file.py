@@ -5,10 +5,11 @@ stay rows: their coordinates are NaN, so that the inspection rejects and counts 
 """
 
 import tokenize
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,10 @@ _NPY_ERRORS = (
     FloatingPointError,
     tokenize.TokenError,
 )
+Room = Callable[[tuple[int, ...], type[np.generic]], NDArray[Any]]
+"""Gives an array of a shape and a type, whose values are not set: numpy.empty, or what keeps long arrays on a disk."""
+
+_ROWS_AT_ONCE = 1 << 16
 _LARGEST_MM = 1e6  # a kilometre: beyond it the unit or the scale is wrong, and a float64 no longer resolves a tenth of a nanometre
 
 
@@ -51,6 +56,8 @@ class PointFileSource:
     """A file of points as a scan: the sequence is the row, from 0. A file has no clock: every time is 0 s.
 
     The file is read here, so that a bad one is refused (PointFileError) before a run begins.
+
+    room : gives the arrays that are as long as the file, like numpy.empty
     """
 
     def __init__(
@@ -62,13 +69,14 @@ class PointFileSource:
         unit: UnitName | None = None,
         columns: Mapping[AxisName, int] | None = None,
         invalid: Collection[float] = (),
+        room: Room = np.empty,
     ) -> None:
         if batch_points < 1:
             raise ValueError(f"a batch holds at least one point, not {batch_points}")
         self._name = path.name
         self._batch_points = batch_points
         self._stopped = Event()
-        self._file = read_points(path, scale, unit=unit, columns=columns, invalid=invalid)
+        self._file = read_points(path, scale, unit=unit, columns=columns, invalid=invalid, room=room)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -98,6 +106,7 @@ def read_points(
     unit: UnitName | None = None,
     columns: Mapping[AxisName, int] | None = None,
     invalid: Collection[float] = (),
+    room: Room = np.empty,
 ) -> PointFile:
     """Read measured points (m, 3) in mm from csv, txt, asc, xyz or npy. Two columns are x and y, at z = 0.
 
@@ -105,6 +114,7 @@ def read_points(
     unit    : the same in words, above whatever the file states; not beside a scale
     columns : which columns (from 1) are x, y and z, where the file itself does not tell
     invalid : values that mean no point, as they stand in the file; a row with one of them as a coordinate has no numbers
+    room    : gives the arrays that are as long as the file, like numpy.empty; those of a long one may lie on a disk
 
     Raises PointFileError: file, line, what was found, what is expected.
     """
@@ -113,7 +123,7 @@ def read_points(
     if npy and not read_bytes(path):
         raise PointFileError(f"{path}: the file is empty")
     try:
-        read = _Asked(scale, unit, columns, tuple(invalid))
+        read = _Asked(scale, unit, columns, tuple(invalid), room)
         return _read_npy(path, read) if npy else _read_table(text, read)
     except PointFileError as error:
         raise PointFileError(f"{path}: {error}") from None
@@ -127,30 +137,20 @@ class _Asked:
     unit: UnitName | None
     columns: Mapping[AxisName, int] | None
     invalid: tuple[float, ...]
+    room: Room
+
+    @property
+    def notes(self) -> list[str]:
+        """What was asked, as far as the reader of the verdict has to know it."""
+        return [f"read in {self.unit}, as asked"] if self.unit else []
 
 
 def _read_table(text: str, asked: _Asked) -> PointFile:
     table = parse_columns(text, axes_of(asked.columns).values())
     chosen, notes = choose_axes(table, asked.columns)
-    values, marked = _without_marks(table.values, chosen, asked.invalid)
-    points = _points_with_gaps(values, chosen, table.line_numbers, _mm_per_unit(table, asked.scale, asked.unit))
-    _refuse_fewer_than_two(points)
-    read_in = [f"read in {asked.unit}, as asked"] if asked.unit else []
-    unit = [*read_in, *_note_of_other_unit(table, asked.scale, asked.unit)]
-    return PointFile(points, (*table.notes, *notes, *unit, *marked, *_note_of_gaps(table.values, chosen)))
-
-
-def _without_marks(values: Array, chosen: Mapping[AxisName, int], invalid: Sequence[float]) -> tuple[Array, list[str]]:
-    """Values (m, c) whose rows are NaN where a chosen column holds a value that means no point, and how many rows each of them took."""
-    if not invalid:
-        return values, []
-    kept, notes = values.copy(), []
-    for value in dict.fromkeys(invalid):
-        rows = (values[:, list(chosen.values())] == value).any(axis=1)
-        kept[rows] = np.nan
-        count = count_of(int(np.count_nonzero(rows)), "row")
-        notes.append(f"{count} {'holds' if count == '1 row' else 'hold'} {value:g}, which means no point: rejected")
-    return kept, notes
+    points, found = _points(table.values, chosen, asked, _mm_per_unit(table, asked.scale, asked.unit), table.line_numbers)
+    unit = [*asked.notes, *_note_of_other_unit(table, asked.scale, asked.unit)]
+    return PointFile(points, (*table.notes, *notes, *unit, *found))
 
 
 def points_of(columns: Columns, scale: float, unit: UnitName | None = None) -> tuple[Array, tuple[str, ...]]:
@@ -197,24 +197,45 @@ def _note_of_other_unit(table: Columns, scale: float, unit: UnitName | None) -> 
     return [f"{others[0].place} {others[0].word}: not followed, since {f'unit {unit}' if unit else f'scale {scale:g}'} was asked for"]
 
 
-def _points_with_gaps(
-    values: Array, chosen: Mapping[AxisName, int], line_numbers: NDArray[np.int64], factor: float, place: str = "line"
-) -> Array:
-    """Points (m, 3) in mm of the chosen columns; a row that lacks a number is NaN as a whole. Axes that are not there are 0."""
-    columns = values[:, list(chosen.values())]
-    there = np.isfinite(columns).all(axis=1)
-    if not there.any():
+def _points(
+    values: NDArray[Any], chosen: Mapping[AxisName, int], asked: _Asked, factor: float, line_numbers: NDArray[np.int64] | None
+) -> tuple[Array, list[str]]:
+    """Points (m, 3) in mm of the chosen columns, NaN for rows without numbers, and notes on these. Axes that are not there are 0.
+
+    The values (m, c) are gone through in pieces: only the points are held. A row that holds a value which means no point has no numbers.
+
+    line_numbers : (m,) where the rows stand; None for an array, whose rows are counted from 0
+    """
+    _refuse_fewer_than_two(values)
+    points = asked.room((len(values), 3), np.float64)
+    rows_with, gaps, usable = dict.fromkeys(asked.invalid, 0), 0, 0
+    for first in range(0, len(values), _ROWS_AT_ONCE):
+        rows = slice(first, min(first + _ROWS_AT_ONCE, len(values)))
+        with np.errstate(invalid="ignore", over="ignore"):  # what is no number stays none
+            read = np.asarray(values[rows], dtype=np.float64)[:, list(chosen.values())]
+        gaps += int(np.count_nonzero(~np.isfinite(read).all(axis=1)))
+        there = np.isfinite(read).all(axis=1)
+        for value in rows_with:
+            marked = (read == value).any(axis=1)
+            rows_with[value] += int(np.count_nonzero(marked))
+            there &= ~marked
+        numbers = np.arange(rows.start, rows.stop) if line_numbers is None else line_numbers[rows]
+        part = np.full((len(read), 3), np.nan)
+        part[there] = 0.0
+        in_mm = convert_to_mm(read[there], numbers[there], factor, "row" if line_numbers is None else "line")
+        for column, axis in enumerate(chosen):
+            part[there, "xyz".index(axis)] = in_mm[:, column]
+        points[rows] = part
+        usable += len(in_mm)
+    if not usable:
         raise PointFileError("no row holds numbers for all coordinates; expected coordinates in mm")
-    points = np.full((len(values), 3), np.nan)
-    points[there] = 0.0
-    for column, axis in enumerate(chosen):
-        points[there, "xyz".index(axis)] = convert_to_mm(columns[there][:, [column]], line_numbers[there], factor, place)[:, 0]
-    return points
+    return points, [*_notes_on_marks(rows_with), *([f"{count_of(gaps, 'row')} without numbers: rejected"] if gaps else [])]
 
 
-def _note_of_gaps(values: Array, chosen: Mapping[AxisName, int]) -> list[str]:
-    missing = int(np.count_nonzero(~np.isfinite(values[:, list(chosen.values())]).all(axis=1)))
-    return [f"{count_of(missing, 'row')} without numbers: rejected"] if missing else []
+def _notes_on_marks(rows_with: Mapping[float, int]) -> Iterator[str]:
+    """Say how many rows each value took that means no point."""
+    for value, count in rows_with.items():
+        yield f"{count_of(count, 'row')} {'holds' if count == 1 else 'hold'} {value:g}, which means no point: rejected"
 
 
 def convert_to_mm(values: Array, line_numbers: NDArray[np.int64], scale: float, place: str = "line") -> Array:
@@ -253,11 +274,6 @@ def _read_npy(path: Path, asked: _Asked) -> PointFile:
         found = f"{array.dtype} array of shape {array.shape}" if isinstance(array, np.ndarray) else "an archive"
         raise PointFileError(f"{found}; expected numbers of shape (m, 2) or (m, 3)")
     refuse_places(columns, array.shape[1])
-    with np.errstate(invalid="ignore", over="ignore"):  # what is no number stays none
-        values = np.array(array, dtype=np.float64)
-    _refuse_fewer_than_two(values)
-    chosen = axes_of(columns) or dict(zip(("x", "y", "z"), range(values.shape[1]), strict=False))
-    kept, marked = _without_marks(values, chosen, asked.invalid)
-    points = _points_with_gaps(kept, chosen, np.arange(len(values)), _mm_per_unit(None, asked.scale, asked.unit), "row")
-    read_in = [f"read in {asked.unit}, as asked"] if asked.unit else []
-    return PointFile(points, (*read_in, *marked, *_note_of_gaps(values, chosen)))
+    chosen = axes_of(columns) or dict(zip(("x", "y", "z"), range(array.shape[1]), strict=False))
+    points, found_rows = _points(array, chosen, asked, _mm_per_unit(None, asked.scale, asked.unit), None)
+    return PointFile(points, (*asked.notes, *found_rows))

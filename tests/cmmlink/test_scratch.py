@@ -151,5 +151,7 @@ def test_how_many_points_fit_is_told_and_a_run_that_cannot_be_kept_is_refused(tm
 
 def test_where_nothing_can_be_written_the_system_s_folder_serves(tmp_path: Path) -> None:
     assert scratch_in(tmp_path).folder == tmp_path
-    assert scratch_in(tmp_path / "missing").folder == scratch_in(None).folder != tmp_path
+    assert scratch_in(tmp_path / "not" / "yet").folder == tmp_path, "the disk on which the records will be"
+    (file := tmp_path / "file").touch()
+    assert scratch_in(file).folder == scratch_in(None).folder != tmp_path
     assert ROWS_IN_MEMORY >= 100_000

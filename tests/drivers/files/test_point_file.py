@@ -2,6 +2,7 @@
 
 import io
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -480,3 +481,32 @@ def test_a_unit_or_a_scale_that_was_asked_for_goes_above_what_the_file_states_an
     assert read_points(path, unit="um").notes == ("read in um, as asked", "line 1 states inch: not followed, since unit um was asked for")
     assert read_points(path, 2.0).notes == ("line 1 states inch: not followed, since scale 2 was asked for",)
     assert read_points(path, 25.4).notes == ()
+
+
+@pytest.mark.parametrize("kind", ["csv", "npy"])
+def test_a_file_gone_through_in_pieces_gives_the_same_points_and_notes(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    values = np.sin(np.arange(300.0)).reshape(100, 3)
+    values[[7, 40, 99], 1], values[[3, 77], 2] = np.nan, -9999.0
+    path = tmp_path / f"points.{kind}"
+    if kind == "npy":
+        np.save(path, values)
+    else:
+        path.write_text("\n".join(",".join(map(str, row)) for row in values.tolist()), encoding="utf-8")
+    whole = read_points(path, unit="inch", invalid=[-9999.0])
+    asked: list[tuple[int, ...]] = []
+
+    def room(shape: tuple[int, ...], kind: type[np.generic]) -> Any:
+        asked.append(shape)
+        return np.empty(shape, kind)
+
+    monkeypatch.setattr("drivers.files.point_file._ROWS_AT_ONCE", 7)
+    pieces = read_points(path, unit="inch", invalid=[-9999.0], room=room)
+    assert (100, 3) in asked
+    assert (
+        pieces.notes
+        == whole.notes
+        == ("read in inch, as asked", "2 rows hold -9999, which means no point: rejected", "3 rows without numbers: rejected")
+    )
+    np.testing.assert_array_equal(pieces.points_mm, whole.points_mm)
+    assert np.flatnonzero(np.isnan(whole.points_mm).all(axis=1)).tolist() == [3, 7, 40, 77, 99]
+    assert whole.points_mm[50].tolist() == (25.4 * values[50]).tolist()
