@@ -4,17 +4,20 @@ Ctrl-C ends it with exit status 130 and one line, also while libraries are being
 closed, Ctrl-Break) leaves as an error does: temporary folders are removed, and processes that were started are ended.
 """
 
+import gc
 import os
 import signal
 import sys
 
 _STOPPED = 130
 _REQUESTS = ("SIGTERM", "SIGHUP", "SIGBREAK")  # as far as the system has them
+_OBJECTS_BETWEEN_LOOKS = 10_000  # for garbage; libraries make some hundred thousand objects, and all of them stay
 
 
 def main() -> None:
     """Run the command line."""
     interruptible = signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    gc.set_threshold(_OBJECTS_BETWEEN_LOOKS)
     try:
         if interruptible:
             signal.signal(signal.SIGINT, _end_at_once)
@@ -30,6 +33,7 @@ def main() -> None:
         _say_stopped()
         sys.exit(_STOPPED)
     finally:
+        gc.freeze()  # the memory goes back to the system as it is: to look through it once more takes a sixth of a short command
         if interruptible:
             signal.signal(signal.SIGINT, signal.SIG_DFL)  # all is done; what is left is Python's own end
 
