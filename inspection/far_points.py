@@ -113,7 +113,7 @@ def far_points(rows: ScanRows, points: Cloud, away: Away) -> NDArray[np.bool_]:
 
 def words_of_far(rows: ScanRows, points: Cloud, far: NDArray[np.bool_]) -> str:
     """Which points lie far from all others, and what to do about them."""
-    which = rows.usable_rows()[far]
+    which = np.concatenate([usable[is_far] for usable, is_far in rows.usable_rows(far)])
     named = ", ".join(str(row + 1) for row in which[:_NAMED_ROWS]) + (" ..." if len(which) > _NAMED_ROWS else "")
     x, y = rows.points[which[0]]
     few = f"{len(which)} of {len(points)} points lie" if len(which) > 1 else f"1 of {len(points)} points lies"

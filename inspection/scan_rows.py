@@ -5,6 +5,7 @@ and worked out again for whoever asks.
 """
 
 import math
+from collections.abc import Iterator
 from functools import partial
 from typing import Any, Protocol, runtime_checkable
 
@@ -147,9 +148,13 @@ class ScanRows:
             left_out[rows] = ~np.isin(self.rejection[rows], _USABLE)
         return Cloud(self.points[: self.count], left_out, self.room)
 
-    def usable_rows(self) -> Rows:
-        """Rows (k,) of points that a registration may use."""
-        return np.flatnonzero(np.isin(self.rejection[: self.count], _USABLE))
+    def usable_rows(self, marked: NDArray[np.bool_]) -> Iterator[tuple[Rows, NDArray[np.bool_]]]:
+        """Rows (k,) of points that a registration may use, piece by piece, with the marks (k,) of what is marked of all of them (m,)."""
+        at = 0
+        for part in row_blocks(self.count):
+            usable = part.start + np.flatnonzero(np.isin(self.rejection[part], _USABLE))
+            yield usable, marked[at : at + len(usable)]
+            at += len(usable)
 
     def copy(self) -> "ScanRows":
         """The rows so far in columns of their own, as they were when they were taken in: none is judged, and no outlier is rejected."""

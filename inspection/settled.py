@@ -78,9 +78,13 @@ def settle(rows: ScanRows, terms: Terms, complete: bool, missing: Missing) -> In
 
 def _reject_outliers(rows: ScanRows, far: NDArray[np.bool_], registration: Registration) -> None:
     """Reject the points that lie far from all others, and of the rest those that the registration left out."""
-    if far.any() or registration.outliers.any():
-        usable = rows.usable_rows()
-        rows.reject(np.concatenate([usable[far], usable[~far][registration.outliers]]))
+    if not far.any() and not registration.outliers.any():
+        return
+    at = 0
+    for usable, is_far in rows.usable_rows(far):
+        near = usable[~is_far]
+        rows.reject(np.concatenate([usable[is_far], near[registration.outliers[at : at + len(near)]]]))
+        at += len(near)
 
 
 def _judge_at(rows: ScanRows, registration: Registration, fit: str, terms: Terms) -> _Settled:

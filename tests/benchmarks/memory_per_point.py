@@ -1,4 +1,5 @@
-"""What a long scan takes of memory: bytes a point of a run, its replay, its export and a look at it, each in a process of its own.
+"""What a long scan takes of memory: bytes a point of a run and its end, of its check, its replay, its export, a look at it, and of a
+file of as many points that is inspected, each in a process of its own.
 
     python -m tests.benchmarks.memory_per_point 1e6 4e6 1.6e7 3.6e7
 
@@ -23,14 +24,15 @@ import numpy as np
 
 from cmmlink.console.past_runs import PastRuns
 from cmmlink.demo import plan_file
-from cmmlink.devices import Connected
+from cmmlink.devices import Connected, connect
 from cmmlink.events import Arrived, Event
 from cmmlink.from_plan import profile_of
-from cmmlink.plan import Plan, load_plan
-from cmmlink.record import describe, export_run, find_run, open_to_read, recorded_run, replay_run
+from cmmlink.plan import FileDevice, Plan, load_plan
+from cmmlink.record import check_chain, describe, export_run, find_run, open_to_read, recorded_run, replay_run
 from cmmlink.report import write_run
 from cmmlink.run import carry_out
 from cmmlink.run_view import RunContext, RunView
+from cmmlink.scratch import Scratch
 from drivers import Arrival, PointBatch, ScanClosed, ScanOpened
 from inspection import NominalProfile, RigidTransform
 from tests.benchmarks.machine import machine
@@ -39,7 +41,7 @@ BATCH = 1000
 AHEAD = 20  # batches that wait for the run at most: a device that sends 10,000 points/s is not far ahead either
 ROUND = 100_000  # points once round the profile
 WAVES = ((0.006, 3), (0.004, 11))  # height in mm and number of the form's waves
-STEPS = ("run", "show", "export", "replay")
+STEPS = ("run", "show", "verify", "export", "replay", "inspect")
 
 
 class Rounds:
@@ -84,12 +86,19 @@ class Rounds:
 
 
 class Memory:
-    """The most that the process held for itself, and of files, while the context was entered."""
+    """The most that the process held for itself, and of files, while the context was entered: in each of its phases."""
 
-    def __init__(self) -> None:
-        self.own = self.files = 0
+    def __init__(self, phase: str) -> None:
+        self.most: dict[str, tuple[int, int]] = {phase: (0, 0)}
+        self.began_s = {phase: time.monotonic()}
+        self._phase = phase
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._look, daemon=True)
+
+    def begin(self, phase: str) -> None:
+        """What is held from now on belongs to another phase."""
+        self.most[phase], self.began_s[phase] = (0, 0), time.monotonic()
+        self._phase = phase
 
     def __enter__(self) -> "Memory":
         self.before = held()[0]
@@ -99,11 +108,13 @@ class Memory:
     def __exit__(self, *_: object) -> None:
         self._over.set()
         self._thread.join()
+        self.began_s[""] = time.monotonic()
 
     def _look(self) -> None:
         while not self._over.wait(0.02):
-            own, files = held()
-            self.own, self.files = max(self.own, own), max(self.files, files)
+            (own, files), phase = held(), self._phase
+            most = self.most[phase]
+            self.most[phase] = max(most[0], own), max(most[1], files)
 
 
 def held() -> tuple[int, int]:
@@ -127,8 +138,13 @@ def the_plan(records: Path) -> Plan:
     return plan.model_copy(update={"records": records, "probe": plan.probe.model_copy(update={"tip_radius_mm": 0.0})})
 
 
-def acquire(points: int, folder: Path, profile: NominalProfile, plan: Plan) -> str:
+def acquire(points: int, folder: Path, profile: NominalProfile, plan: Plan, memory: Memory) -> str:
     """Measure so many points with everything that a run has: record, page's view, result files."""
+
+    def note_end(event: Event) -> None:
+        if isinstance(event, Arrived) and isinstance(event.arrival, ScanClosed):
+            memory.begin("finish")
+
     view = RunView(RunContext.of(plan, profile, now(), "1", "memory"), time.monotonic, now)
     source = Rounds(profile, points)
     finished = carry_out(
@@ -139,21 +155,21 @@ def acquire(points: int, folder: Path, profile: NominalProfile, plan: Plan) -> s
         clock=time.monotonic,
         now=now,
         stop=threading.Event(),
-        sinks=[view, source.take],
+        sinks=[view, source.take, note_end],
     )
     if points >= ROUND:
         write_run(folder / "out", finished)
     return f"{finished.outcome.counts.judged} judged, {finished.outcome.ending}, {finished.result_json()['verdict']}"
 
 
-def replay(points: int, folder: Path, profile: NominalProfile, plan: Plan) -> str:
+def replay(points: int, folder: Path, profile: NominalProfile, plan: Plan, memory: Memory) -> str:
     """Replay the run."""
     with open_to_read(folder, now) as store:
         again = replay_run(store, recorded_run(store, find_run(store, "last")), lambda _: None)
     return f"identical: {again.identical}"
 
 
-def export(points: int, folder: Path, profile: NominalProfile, plan: Plan) -> str:
+def export(points: int, folder: Path, profile: NominalProfile, plan: Plan, memory: Memory) -> str:
     """Export the run."""
     with open_to_read(folder, now) as store:
         files = export_run(store, find_run(store, "last"), folder / "export")
@@ -163,7 +179,7 @@ def export(points: int, folder: Path, profile: NominalProfile, plan: Plan) -> st
     return f"{len(files)} files, {size / 1e9:.2f} GB"
 
 
-def show(points: int, folder: Path, profile: NominalProfile, plan: Plan) -> str:
+def show(points: int, folder: Path, profile: NominalProfile, plan: Plan, memory: Memory) -> str:
     """Look at the run, by command and on the page."""
     past = PastRuns(folder, lambda _: None, time.monotonic, now)
     with open_to_read(folder, now) as store:
@@ -174,27 +190,62 @@ def show(points: int, folder: Path, profile: NominalProfile, plan: Plan) -> str:
     return f"{told['received']} received, {len(past.runs())} runs"
 
 
-STEP_OF: dict[str, Callable[[int, Path, NominalProfile, Plan], str]] = dict(zip(STEPS, (acquire, show, export, replay), strict=True))
+def verify(points: int, folder: Path, profile: NominalProfile, plan: Plan, memory: Memory) -> str:
+    """Check the whole file of records."""
+    with open_to_read(folder, now) as store:
+        told = check_chain(store, None)
+    return f"{told['records']} records, altered: {told['altered']}"
 
 
-def measure(step: str, points: int, folder: Path) -> dict[str, object]:
-    """Do one step and say what it took."""
+def inspect(points: int, folder: Path, profile: NominalProfile, plan: Plan, memory: Memory) -> str:
+    """Inspect a text file of so many points, as `cmmlink inspect --out` does."""
+    plan = plan.model_copy(update={"device": FileDevice(type="file", file=folder / "points.csv")})
+    with connect(plan, Scratch(folder)) as device:
+        finished = carry_out(plan, profile, device, records=folder / "of-file", clock=time.monotonic, now=now, stop=threading.Event())
+    write_run(folder / "out", finished)
+    return f"{finished.outcome.counts.judged} judged, {finished.outcome.ending}, {finished.result_json()['verdict']}"
+
+
+def write_points(points: int, file: Path, profile: NominalProfile) -> None:
+    """Write the points of a scan as text."""
+    source = Rounds(profile, points)
+    with file.open("wb") as text:
+        text.write(b"x,y,z\r\n")
+        for arrival in source.arrivals():
+            if isinstance(arrival, PointBatch):
+                text.write(b"\r\n".join(b"%.6f,%.6f,%.6f" % tuple(row) for row in arrival.points_mm.tolist()) + b"\r\n")
+                source.take(Arrived(0.0, arrival))
+
+
+STEP_OF: dict[str, Callable[[int, Path, NominalProfile, Plan, Memory], str]] = dict(
+    zip(STEPS, (acquire, show, verify, export, replay, inspect), strict=True)
+)
+
+
+def measure(step: str, points: int, folder: Path) -> list[dict[str, object]]:
+    """Do one step and say what its phases took."""
     plan = the_plan(folder)
     profile = profile_of(plan)
     with tempfile.TemporaryDirectory() as small:  # everything is compiled and loaded before the memory is looked at
-        acquire(20_000, Path(small), profile, plan)
-        for name in STEPS[1:]:
-            STEP_OF[name](20_000, Path(small), profile, plan)
-    began = time.monotonic()
-    with Memory() as memory:
-        said = STEP_OF[step](points, folder, profile, plan)
-    return {
-        "own": memory.own - memory.before,
-        "files": memory.files,
-        "resident": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
-        "seconds": time.monotonic() - began,
-        "said": said,
-    }
+        write_points(20_000, Path(small) / "points.csv", profile)
+        for name in STEPS:
+            STEP_OF[name](20_000, Path(small), profile, plan, Memory(name))
+    if step == "inspect":
+        write_points(points, folder / "points.csv", profile)
+    with Memory(step) as memory:
+        said = STEP_OF[step](points, folder, profile, plan, memory)
+    phases, began_s = list(memory.most), list(memory.began_s.values())
+    return [
+        {
+            "phase": phase,
+            "own": memory.most[phase][0] - memory.before,
+            "files": memory.most[phase][1],
+            "resident": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
+            "seconds": began_s[at + 1] - began_s[at],
+            "said": said,
+        }
+        for at, phase in enumerate(phases)
+    ]
 
 
 def main(numbers: list[str]) -> None:
@@ -208,13 +259,13 @@ def main(numbers: list[str]) -> None:
                 told = subprocess.run(
                     [sys.executable, "-m", __spec__.name, "--step", step, str(points), folder], check=True, capture_output=True, text=True
                 )
-                found = json.loads(told.stdout.splitlines()[-1])
-                megabytes = [f"{found[name] / 1e6:.0f}" for name in ("own", "files", "resident")]
-                print(
-                    f"| {points:,} | {step} | {megabytes[0]} | {found['own'] / points:.1f} | {megabytes[1]} | {megabytes[2]} | "
-                    f"{found['seconds']:.0f} | {found['said']} |",
-                    flush=True,
-                )
+                for found in json.loads(told.stdout.splitlines()[-1]):
+                    megabytes = [f"{found[name] / 1e6:.0f}" for name in ("own", "files", "resident")]
+                    a_point, told_of = found["own"] / points, f"{found['seconds']:.0f} | {found['said']}"
+                    print(
+                        f"| {points:,} | {found['phase']} | {megabytes[0]} | {a_point:.1f} | {' | '.join(megabytes[1:])} | {told_of} |",
+                        flush=True,
+                    )
 
 
 if __name__ == "__main__":

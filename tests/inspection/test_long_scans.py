@@ -65,6 +65,20 @@ def test_the_pieces_of_a_scan_never_show_in_its_result(kind: Any, seed: int, opt
             assert everything(finish(scan, points, **options)) == expected
 
 
+def test_outliers_and_far_points_are_rejected_alike_whatever_the_pieces() -> None:
+    scan = live_scan("good", 3, 700)
+    points = scan.points_mm.copy()
+    points[20::101] += 3.0  # beyond the zone, on the part
+    points[[7, 65, 400]] = (5000.0, 4000.0)  # far from all others
+    points[5::97] = np.nan
+    with pieces_of(FULL, FULL, FULL):
+        expected = finish(scan, points, reject_outliers=True)
+    assert isinstance(expected, InspectionResult)
+    assert expected.rejected_by_reason["outlier"] == len(points[20::101]) + 3
+    with pieces_of(64, 64, BLOCK):
+        assert everything(finish(scan, points, reject_outliers=True)) == everything(expected)
+
+
 def traced_mb(count: int) -> tuple[float, float]:
     """The most that was allocated until a scan of so many points was finished, and what its result holds, in MB."""
     curve, rng = curve_of("P1"), np.random.default_rng(1)

@@ -1,5 +1,7 @@
 """Rows of a scan: what is taken in, what is kept when they grow, and that judging touches nothing else."""
 
+from unittest.mock import patch
+
 import numpy as np
 
 from inspection import NOT_JUDGED, Rejection, RigidTransform, SectionPlane, ToleranceZone, Verdict
@@ -115,4 +117,9 @@ def test_usable_rows_are_those_a_pose_may_still_bring_onto_the_profile() -> None
     points[1] = np.nan
     rows = rows_of(points)
     rows.rejection[2:5] = (Rejection.OFF_SECTION, Rejection.BEYOND_END, Rejection.OUTLIER)
-    assert rows.usable_rows().tolist() == [0, 3, 5]
+    marked = np.array([True, False, True])
+    (found,) = rows.usable_rows(marked)
+    assert [each.tolist() for each in found] == [[0, 3, 5], marked.tolist()]
+    with patch("inspection.cloud.ROWS_AT_ONCE", 4):
+        pieces = [(usable.tolist(), are.tolist()) for usable, are in rows.usable_rows(marked)]
+    assert pieces == [([0, 3], [True, False]), ([5], [True])]
