@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.errors import PointFileError
+from drivers.files.row_reading import shorten
 from drivers.files.stated_units import axis_letters
-from drivers.files.text_table import Array, Columns, shorten
+from drivers.files.text_table import Array, Columns
 
 AxisName = Literal["x", "y", "z"]
 

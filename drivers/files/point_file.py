@@ -6,6 +6,7 @@ stay rows: their coordinates are NaN, so that the inspection rejects and counts 
 
 import tokenize
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from drivers.errors import PointFileError
 from drivers.files.column_choice import AxisName, axes_of, choose_axes, refuse_places
 from drivers.files.stated_units import MM_PER_UNIT, UNITS, UnitName, units_of_names
-from drivers.files.text_table import Array, Columns, count_of, parse_columns, read_bytes, read_text
+from drivers.files.text_table import Array, Columns, count_of, parse_columns, read_bytes, read_plain, read_text
 from drivers.source import Arrival, PointBatch, ScanClosed, ScanOpened
 
 # What numpy's reader of npy headers lets through on files that are none; RecursionError and MemoryError come from its literal_eval.
@@ -118,13 +119,23 @@ def read_points(
 
     Raises PointFileError: file, line, what was found, what is expected.
     """
+    asked = _Asked(scale, unit, columns, tuple(invalid), room)
     npy = path.suffix.lower() == ".npy"
-    text = "" if npy else read_text(path)
+    with _name_file(path):
+        places = axes_of(columns).values()
+    plain = None if npy else read_plain(path, places)
+    text = "" if npy or plain else read_text(path)
     if npy and not read_bytes(path):
         raise PointFileError(f"{path}: the file is empty")
+    with _name_file(path):
+        return _read_npy(path, asked) if npy else _read_table(plain or parse_columns(text, places), asked)
+
+
+@contextmanager
+def _name_file(path: Path) -> Iterator[None]:
+    """Put the name of the file before what is wrong with it."""
     try:
-        read = _Asked(scale, unit, columns, tuple(invalid), room)
-        return _read_npy(path, read) if npy else _read_table(text, read)
+        yield
     except PointFileError as error:
         raise PointFileError(f"{path}: {error}") from None
 
@@ -145,8 +156,7 @@ class _Asked:
         return [f"read in {self.unit}, as asked"] if self.unit else []
 
 
-def _read_table(text: str, asked: _Asked) -> PointFile:
-    table = parse_columns(text, axes_of(asked.columns).values())
+def _read_table(table: Columns, asked: _Asked) -> PointFile:
     chosen, notes = choose_axes(table, asked.columns)
     points, found = _points(table.values, chosen, asked, _mm_per_unit(table, asked.scale, asked.unit), table.line_numbers)
     unit = [*asked.notes, *_note_of_other_unit(table, asked.scale, asked.unit)]

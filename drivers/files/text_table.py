@@ -19,13 +19,18 @@ from numpy.typing import NDArray
 
 from drivers.errors import PointFileError
 from drivers.files.no_numbers import is_no_number, name_errors
+from drivers.files.plain_rows import read_plain_rows
+from drivers.files.row_reading import HINT, NUMBER, READINGS, Reading, number_of, shorten
 from drivers.files.stated_units import StatedUnit, axis_letters, units_of_lines, units_of_row
 
 Array = NDArray[np.float64]
 Numbered = list[tuple[int, str]]  # line number and what stands on the line
 
 _SNIFFED_LINES = 100
-_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eEdD][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
+_HEAD_BYTES = 1 << 16  # of a long file, from which it is understood what its rows are
+_UTF_16 = (b"\xff\xfe", b"\xfe\xff")
+_UTF_8 = b"\xef\xbb\xbf"
+_STRANGE = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 _COMMENT = re.compile(r"#|%|!|//")
 _COMMENT_STARTS = ("#", "%", "!", "/")
 _REMARK = re.compile(r"(?<!\s)\s*(?:#|!|//).*")  # behind the numbers of a row; blanks are looked through once, from their first on
@@ -59,19 +64,22 @@ class Columns:
 
 def read_text(path: Path) -> str:
     """Read the text of a file in UTF-8, UTF-16 with a byte order mark, or Latin-1. Raises PointFileError, also when it is no text."""
-    data = read_bytes(path)
-    try:
-        text = data.decode("utf-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
-    except UnicodeDecodeError:
-        text = data.decode("latin-1")
-    text = text.replace("\u2212", "-").replace("\r\n", "\n").replace("\r", "\n").rstrip("\x1a\0")  # the end marks of old systems
-    strange = re.search(r"[\x00-\x08\x0e-\x1f\x7f]", text)
+    text = _decode(read_bytes(path)).rstrip("\x1a\0")  # the end marks of old systems
+    strange = _STRANGE.search(text)
     if strange:
         line = text.count("\n", 0, strange.start()) + 1
         raise PointFileError(f"{path}: line {line}: not a text file (byte {ord(strange[0]):#04x}); expected plain text")
     if not text.strip():
         raise PointFileError(f"{path}: the file is empty")
     return text
+
+
+def _decode(data: bytes) -> str:
+    try:
+        text = data.decode("utf-16" if data[:2] in _UTF_16 else "utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+    return text.replace("\u2212", "-").replace("\r\n", "\n").replace("\r", "\n")
 
 
 def read_bytes(path: Path) -> bytes:
@@ -102,97 +110,69 @@ def parse_columns(text: str, places: Collection[int] = ()) -> Columns:
     notes: list[str] = []
     data = _drop_count(_without_edges(data, reading, bool(wanted), notes), reading, notes)
     values = _values(data, reading, wanted)
-    columns = values.shape[1]
-    _refuse_unclear_commas(data, reading, columns)
+    _refuse_unclear_commas(data, reading, values.shape[1])
+    return _columns(values, np.array([number for number, _ in data], dtype=np.int64), header, remarks, reading, notes)
+
+
+def read_plain(path: Path, places: Collection[int] = ()) -> Columns | None:
+    """Read the columns of a long file of plain numbers, as `parse_columns` does, but without its text ever being held as a whole.
+
+    What its rows are, and everything above them, is understood from its beginning. None where anything in it has to be read with care.
+    """
+    try:
+        if not path.is_file() or path.stat().st_size <= _HEAD_BYTES:
+            return None
+        with path.open("rb") as file:
+            head, end, _ = file.read(_HEAD_BYTES).rpartition(b"\n")
+            head += end
+            header, data, remarks, reading = _understand(head, tuple(sorted(places)))
+            first = data[0][0]
+            above = b"".join(head.splitlines(keepends=True)[: first - 1])
+            file.seek(len(above) if above or not head.startswith(_UTF_8) else len(_UTF_8))
+            values = read_plain_rows(file, reading.delimiter, reading.decimal)
+    except (OSError, ValueError):  # PointFileError is a ValueError
+        return None
+    return _columns(values, np.arange(first, first + len(values)), header, remarks, reading, [])
+
+
+def _understand(head: bytes, places: tuple[int, ...]) -> tuple[Numbered, Numbered, Numbered, Reading]:
+    """Header lines, lines of data and remarks at the beginning of a file, and how its rows are read.
+
+    Raises ValueError where that may depend on what follows.
+    """
+    text = _decode(head)
+    if head[:2] in _UTF_16 or _STRANGE.search(text) or head.count(b"\r") != head.count(b"\r\n"):
+        raise ValueError("an unusual text")
+    header, data, remarks, wanted = _split_lines(text, places)
+    if len(data) < _SNIFFED_LINES or _COUNT.fullmatch(data[0][1]):
+        raise ValueError("too few rows, or their number")
+    reading, _ = _find_reading(data, wanted)
+    if not _has_points_or_powers(data, reading):
+        raise ValueError("commas may be decimal ones")
+    return header, data, remarks, reading
+
+
+def _columns(
+    values: Array, line_numbers: NDArray[np.int64], header: Numbered, remarks: Numbered, reading: Reading, notes: list[str]
+) -> Columns:
+    """The columns of values (m, c) with what stands above and beside them."""
     if reading.decimal == ",":
         notes.append("decimal commas")
-    names, units, understood = _names_and_units(header, remarks, data[0][0], reading, columns)
+    names, units, understood = _names_and_units(header, remarks, int(line_numbers[0]), reading, values.shape[1])
     notes += [f"line {number} taken as a header: '{shorten(line)}'" for number, line in header if number not in understood]
-    return Columns(values, np.array([number for number, _ in data], dtype=np.int64), names, tuple(notes), tuple(units))
+    return Columns(values, line_numbers, names, tuple(notes), tuple(units))
 
 
 def numbers_of(line: str) -> list[float]:
     """Return the numbers of one line, as `parse_columns` reads them, without a remark behind; none if anything else stands on it."""
     line = _REMARK.sub("", _without_quotes(line.strip()), count=1)
-    fields = next((reading.fields(line) for reading in _READINGS if reading.explains(line)), [line])
-    return [] if len(fields) == 1 and not _NUMBER.fullmatch(line) else [_number(field) for field in fields]
-
-
-def shorten(text: str) -> str:
-    """Return at most 40 characters of a text, for a message."""
-    return text if len(text) <= 40 else text[:37] + "..."
+    fields = next((reading.fields(line) for reading in READINGS if reading.explains(line)), [line])
+    return [] if len(fields) == 1 and not NUMBER.fullmatch(line) else [number_of(field) for field in fields]
 
 
 def count_of(count: int, noun: str) -> str:
     """Return a count with its noun in the right number: 1 point, 2 points."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
-
-
-@dataclass(frozen=True, slots=True)
-class _Reading:
-    """One way to read a line: what stands between the columns (None: blanks), and the decimal mark."""
-
-    delimiter: str | None
-    decimal: str
-
-    def fields(self, line: str) -> list[str]:
-        """Split a line into its columns; a delimiter at the very end begins no further column."""
-        fields = [field.strip() for field in line.split(self.delimiter)]
-        return fields[:-1] if len(fields) > 1 and not fields[-1] else fields
-
-    def is_number(self, field: str) -> bool:
-        if self.decimal == ",":
-            field = "?" if "." in field else field.replace(",", ".")
-        return _NUMBER.fullmatch(field) is not None
-
-    def explains(self, line: str, wanted: Collection[int] = ()) -> bool:
-        """Tell whether all fields of a line are numbers, or those in the wanted places."""
-        fields = self.fields(line)
-        if not wanted:
-            return len(fields) > 1 and all(map(self.is_number, fields))
-        return len(fields) > max(wanted) and all(self.is_number(fields[place]) for place in wanted)
-
-    def row(self, number: int, line: str, wanted: Collection[int] = ()) -> list[float]:
-        """Return the numbers of a line, NaN for words not wanted and for what says that there is none.
-
-        Raises PointFileError, naming the word.
-        """
-        fields = self.fields(line)
-        if wanted and len(fields) == max(wanted):
-            fields.append("")  # the last field, which is empty
-        asked = wanted if wanted and len(fields) > max(wanted) else range(len(fields))
-        if len(fields) > 1 and all(is_no_number(fields[place]) for place in asked):
-            return [float("nan")] * len(fields)
-        for place in asked:
-            field = fields[place]
-            if not self.is_number(field) and not is_no_number(field):
-                found = f"'{shorten(field)}' is not a number"
-                raise PointFileError(f"line {number}: {found}; expected numbers {self}{_hint_of_labels(fields, self)}")
-        return [_number(field) if self.is_number(field) else float("nan") for field in fields]
-
-    def __str__(self) -> str:
-        between = {None: "blanks", "\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars"}[self.delimiter]
-        return f"with {between} between them and decimal {'commas' if self.decimal == ',' else 'points'}"
-
-
-# In order of preference where several explain as many lines: a semicolon or a tab is never part of a number.
-_MARKS = ((";", "."), (";", ","), ("\t", "."), ("\t", ","), ("|", "."), ("|", ","), (",", "."), (None, "."), (None, ","))
-_READINGS = tuple(_Reading(*marks) for marks in _MARKS)
-
-
-def _number(field: str) -> float:
-    return float(field.replace(",", ".").replace("d", "e").replace("D", "e"))
-
-
-_HINT = "; name the columns in a header line, like name,x,y,z, or say which are x and y (columns x=2,y=3)"
-
-
-def _hint_of_labels(fields: Sequence[str], reading: _Reading) -> str:
-    """Say what to do where words stand beside two numbers or more: a label has a column of its own."""
-    words = [field for field in fields if not reading.is_number(field)]
-    if len(fields) - len(words) < 2 or not all(re.match(r"[^\W\d_]{2}", word) for word in words):
-        return ""
-    return _HINT
 
 
 def _split_lines(text: str, wanted: tuple[int, ...]) -> tuple[Numbered, Numbered, Numbered, tuple[int, ...]]:
@@ -221,7 +201,7 @@ def _split_lines(text: str, wanted: tuple[int, ...]) -> tuple[Numbered, Numbered
     return header, data, remarks, wanted
 
 
-def _without_edges(data: Numbered, reading: _Reading, labels: bool, notes: list[str]) -> Numbered:
+def _without_edges(data: Numbered, reading: Reading, labels: bool, notes: list[str]) -> Numbered:
     """Leave out rows of nothing but delimiters at both ends, as spreadsheets write them, and lines of words behind the last row."""
     filled = [i for i, (_, line) in enumerate(data) if any(reading.fields(line))]
     first, stop = filled[0], filled[-1] + 1
@@ -237,7 +217,7 @@ def _without_edges(data: Numbered, reading: _Reading, labels: bool, notes: list[
     return kept
 
 
-def _is_footer(line: str, reading: _Reading, labels: bool) -> bool:
+def _is_footer(line: str, reading: Reading, labels: bool) -> bool:
     """Tell whether a line behind the data is words: no number is on it, nor anything in place of one alone, and it is no labelled row."""
     fields = [field for field in re.split(r"[;,|\s]+", line) if field]
     if (reading.delimiter and reading.delimiter in line) or (labels and not reading.delimiter):
@@ -247,7 +227,7 @@ def _is_footer(line: str, reading: _Reading, labels: bool) -> bool:
 
 def _is_data(line: str, wanted: Sequence[int], below_header: bool) -> bool:
     """Tell whether a line may begin the data: it is no header, or holds numbers where they are wanted."""
-    if wanted and any(reading.explains(line, wanted) for reading in _READINGS):
+    if wanted and any(reading.explains(line, wanted) for reading in READINGS):
         return True
     return not _is_header(line) and not (below_header and _UNDERLINE.fullmatch(line))
 
@@ -276,7 +256,7 @@ def _named_places(line: str) -> tuple[int, ...]:
     return ()
 
 
-def _values(data: Numbered, reading: _Reading, wanted: Sequence[int]) -> Array:
+def _values(data: Numbered, reading: Reading, wanted: Sequence[int]) -> Array:
     """Return the numbers (m, c) of the lines. numpy reads plain files; what it cannot read is looked at line by line."""
     if reading.decimal == ".":
         try:
@@ -305,30 +285,30 @@ def _is_header(line: str) -> bool:
     words = [word for word in re.split(r"[;,\t ]+", line) if word]
     if len(words) > 1 and all(map(is_no_number, words)):
         return False
-    numbers = [_NUMBER.fullmatch(word) is not None for word in words]
+    numbers = [NUMBER.fullmatch(word) is not None for word in words]
     return line[0] != "#" and re.search(r"[^\W\d_]", line) is not None and not numbers[0] and 2 * sum(numbers) <= len(numbers)
 
 
-def _find_reading(data: Numbered, wanted: tuple[int, ...]) -> tuple[_Reading, tuple[int, ...]]:
+def _find_reading(data: Numbered, wanted: tuple[int, ...]) -> tuple[Reading, tuple[int, ...]]:
     """Find the reading that explains most of the first lines, and the places that it wants: none named where that explains fewer.
 
     Raises PointFileError when none explains any.
     """
     sample = [line for _, line in data[:_SNIFFED_LINES]]
     for places in ((), wanted) if wanted else ((),):
-        score = {reading: sum(reading.explains(line, places) for line in sample) for reading in _READINGS}
-        best = max(_READINGS, key=lambda reading: score[reading])
+        score = {reading: sum(reading.explains(line, places) for line in sample) for reading in READINGS}
+        best = max(READINGS, key=lambda reading: score[reading])
         if score[best]:
             as_wanted = sum(best.explains(line, wanted) for line in sample) if wanted else 0
             return best, wanted if as_wanted >= score[best] else ()
     number, line = data[0]
-    if re.fullmatch(_NUMBER, line) or re.fullmatch(r"[+-]?\d+,\d+", line):
+    if re.fullmatch(NUMBER, line) or re.fullmatch(r"[+-]?\d+,\d+", line):
         raise PointFileError(f"line {number}: one column ('{shorten(line)}'); expected two or three: x, y and perhaps z")
-    labels = next((_HINT for reading in _READINGS if sum(map(reading.is_number, reading.fields(line))) > 1), "")
+    labels = next((HINT for reading in READINGS if sum(map(reading.is_number, reading.fields(line))) > 1), "")
     raise PointFileError(f"line {number}: '{shorten(line)}' is not a row of numbers; expected two or three columns of numbers{labels}")
 
 
-def _drop_count(data: Numbered, reading: _Reading, notes: list[str]) -> Numbered:
+def _drop_count(data: Numbered, reading: Reading, notes: list[str]) -> Numbered:
     """Drop a first line that counts the points (pts and xyz files), and refuse a file that holds another number of them."""
     number, line = data[0]
     if len(data) < 2 or not _COUNT.fullmatch(line) or not reading.explains(data[1][1]):
@@ -339,9 +319,9 @@ def _drop_count(data: Numbered, reading: _Reading, notes: list[str]) -> Numbered
     return data[1:]
 
 
-def _refuse_unclear_commas(data: Numbered, reading: _Reading, columns: int) -> None:
+def _refuse_unclear_commas(data: Numbered, reading: Reading, columns: int) -> None:
     """Refuse lines like 1,5,2,5, which may be four whole numbers or two with decimal commas."""
-    if reading.delimiter != "," or any("." in line or "e" in line.lower() for _, line in data):
+    if _has_points_or_powers(data, reading):
         return
     for number, line in data:
         if (columns > 3 and columns % 2 == 0) or re.search(r"(?<!\d)0\d", line):
@@ -351,8 +331,13 @@ def _refuse_unclear_commas(data: Numbered, reading: _Reading, columns: int) -> N
             )
 
 
+def _has_points_or_powers(data: Numbered, reading: Reading) -> bool:
+    """Tell whether commas can only stand between the numbers."""
+    return reading.delimiter != "," or any("." in line or "e" in line.lower() for _, line in data)
+
+
 def _names_and_units(
-    header: Numbered, remarks: Numbered, first: int, reading: _Reading, columns: int
+    header: Numbered, remarks: Numbered, first: int, reading: Reading, columns: int
 ) -> tuple[tuple[str, ...], list[StatedUnit], set[int]]:
     """Return the names of the columns, the units that the text states, and the header lines that are understood so.
 
@@ -371,7 +356,7 @@ def _names_and_units(
     return names, units, understood
 
 
-def _names(header: Numbered, remarks: Numbered, reading: _Reading, columns: int) -> tuple[tuple[str, ...], int]:
+def _names(header: Numbered, remarks: Numbered, reading: Reading, columns: int) -> tuple[tuple[str, ...], int]:
     """Return the names of the columns and their line, 0 where nothing names an axis.
 
     Words apart by blanks are names only if x and y are among them; else they are a title of as many words.

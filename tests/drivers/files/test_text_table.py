@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from drivers.errors import PointFileError
 from drivers.files.point_file import points_of
+from drivers.files.row_reading import shorten
 from drivers.files.stated_units import axis_letters
-from drivers.files.text_table import count_of, numbers_of, parse_columns, read_bytes, read_text, shorten
+from drivers.files.text_table import count_of, numbers_of, parse_columns, read_bytes, read_text
 
 ROWS = [[1.5, -2.25], [3.0, 4.125]]
 
