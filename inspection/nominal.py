@@ -41,6 +41,7 @@ class NominalProfile(ProfileSamples):
     curve              : the exact curve
     material           : the side of the curve, seen along its direction, on which the material lies
     pole_angle_min_deg : the limit of the pole angles, 0 where there is none
+    hollowness         : the least and the greatest curvature (1/mm) of the samples, positive where the profile is hollow
     grid               : finds the closest point of the curve
     search, packed     : what is looked up on the samples, made when it is first asked for: see `tree` and `sample_table`
     """
@@ -48,6 +49,7 @@ class NominalProfile(ProfileSamples):
     curve: NurbsCurve
     material: Material
     pole_angle_min_deg: float
+    hollowness: tuple[float, float]
     grid: FootGrid
     search: "OnFirstUse[cKDTree]"
     packed: OnFirstUse[SampleTable]
@@ -74,7 +76,7 @@ class NominalProfile(ProfileSamples):
     @property
     def outward(self) -> float:
         """+1 when the normal (left) points out of the material, -1 when it points into it."""
-        return -1.0 if self.material == "left" else 1.0
+        return _outward(self.material)
 
     @property
     def length_mm(self) -> float:
@@ -89,8 +91,12 @@ class NominalProfile(ProfileSamples):
     @property
     def smallest_concave_radius_mm(self) -> float:
         """Radius of the tightest hollow a probe has to enter; infinite when the profile is convex throughout."""
-        hollow = float((self.curvature * self.outward).max())
+        hollow = self.hollowness[1]
         return 1.0 / hollow if hollow > 0 else float("inf")
+
+
+def _outward(material: Material) -> float:
+    return -1.0 if material == "left" else 1.0
 
 
 def discretize(
@@ -142,11 +148,13 @@ def discretize(
 
 def _profile(curve: NurbsCurve, material: Material, samples: ProfileSamples, pole_angle_min_deg: float) -> NominalProfile:
     """The profile of these samples."""
+    hollow = samples.curvature * _outward(material)
     return NominalProfile(
         **{field.name: getattr(samples, field.name) for field in fields(samples)},
         curve=curve,
         material=material,
         pole_angle_min_deg=pole_angle_min_deg,
+        hollowness=(float(hollow.min()), float(hollow.max())),
         grid=build_foot_grid(curve),
         search=OnFirstUse(lambda: _search_tree(samples.points_mm)),
         packed=OnFirstUse(lambda: pack_samples(samples, curve)),

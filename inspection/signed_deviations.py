@@ -7,12 +7,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inspection.inversion import invert_points
-from inspection.kernels import Feet, project, project_on_samples
-from inspection.kernels.layout import INSIDE, OPEN_END
+from inspection.kernels import Feet, project, project_on_samples, turn_outward
 from inspection.methods import Method
 from inspection.nominal import NominalProfile
 
 Array = NDArray[np.float64]
+
+_METHODS = get_args(Method)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,16 +41,14 @@ class Deviations:
 
     def __post_init__(self) -> None:
         m = len(self.deviation_mm)
-        for name, shape in self._shapes(m).items():
-            array = getattr(self, name)
-            if array.shape != shape:
-                raise ValueError(f"{name}: expected {shape}, got {array.shape}")
+        for array in (self.deviation_mm, self.parameter, self.station_mm, self.curvature, self.beyond_end, self.at_vertex):
+            if array.shape != (m,):
+                raise ValueError(f"expected {m} values, got an array of shape {array.shape}")
             array.setflags(write=False)
-
-    @staticmethod
-    def _shapes(m: int) -> dict[str, tuple[int, ...]]:
-        flat = ("deviation_mm", "parameter", "station_mm", "curvature", "beyond_end", "at_vertex")
-        return dict.fromkeys(flat, (m,)) | {"foot_mm": (m, 2), "normal": (m, 2)}
+        for array in (self.foot_mm, self.normal):
+            if array.shape != (m, 2):
+                raise ValueError(f"expected an array of shape {(m, 2)}, got {array.shape}")
+            array.setflags(write=False)
 
     def __len__(self) -> int:
         return len(self.deviation_mm)
@@ -72,20 +71,14 @@ def deviations(points_mm: ArrayLike, nominal: NominalProfile, method: Method = "
                     on the bottom: that stretch stays unmeasured. Raises ValueError for a radius that no ball has,
                     and for a ball that fits nowhere.
     """
-    points = check_points(points_mm)
+    points = _pairs(points_mm)
     check_tip_radius(tip_radius_mm, nominal)
     check_method(method)
     feet = feet_on(points, nominal, method)
-    return Deviations(
-        deviation_mm=nominal.outward * feet.distance_mm - tip_radius_mm,
-        foot_mm=feet.foot_mm,
-        parameter=feet.parameter,
-        station_mm=feet.station_mm,
-        normal=nominal.outward * feet.gradient,
-        curvature=feet.curvature,
-        beyond_end=feet.vertex == OPEN_END,
-        at_vertex=feet.vertex != INSIDE,
-    )
+    beyond_end, at_vertex, are_numbers = turn_outward(feet, nominal.outward, tip_radius_mm)
+    if not are_numbers:  # as for a point that is not finite: the points are gone through only then
+        check_points(points)
+    return Deviations(feet.distance_mm, feet.foot_mm, feet.parameter, feet.station_mm, feet.gradient, feet.curvature, beyond_end, at_vertex)
 
 
 def feet_on(points_mm: Array, nominal: NominalProfile, method: Method) -> Feet:
@@ -99,18 +92,24 @@ def feet_on(points_mm: Array, nominal: NominalProfile, method: Method) -> Feet:
 
 def check_method(method: str) -> None:
     """Raise ValueError when there is no such method of projection."""
-    if method not in get_args(Method):
-        raise ValueError(f"method must be one of {', '.join(get_args(Method))}, not {method!r}")
+    if method not in _METHODS:
+        raise ValueError(f"method must be one of {', '.join(_METHODS)}, not {method!r}")
 
 
 def check_points(points_mm: ArrayLike) -> Array:
     """Points as a finite float array (m, 2). Raises ValueError naming the first bad row."""
-    points = np.asarray(points_mm, dtype=np.float64)
-    if points.ndim != 2 or points.shape[1] != 2:
-        raise ValueError(f"points must have shape (m, 2), got {points.shape}")
+    points = _pairs(points_mm)
     if not np.isfinite(points).all():
         bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
         raise ValueError(f"point {bad[0] + 1} is not finite: {points[bad[0]]}")
+    return points
+
+
+def _pairs(points_mm: ArrayLike) -> Array:
+    """Points as a float array (m, 2)."""
+    points = np.asarray(points_mm, dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] != 2:
+        raise ValueError(f"points must have shape (m, 2), got {points.shape}")
     return points
 
 
@@ -118,7 +117,7 @@ def check_tip_radius(tip_radius_mm: float, nominal: NominalProfile) -> None:
     """Raise ValueError for a radius that no ball has, or one that fits nowhere into the profile."""
     if not 0 <= tip_radius_mm < np.inf:
         raise ValueError(f"tip radius {tip_radius_mm:g} mm: must be a finite number, zero or more")
-    widest = float((nominal.curvature * nominal.outward).min())  # the least hollow place
+    widest = nominal.hollowness[0]  # the least hollow place
     if widest * tip_radius_mm >= 1:
         raise ValueError(
             f"tip radius {tip_radius_mm:g} mm: the ball touches the profile nowhere, whose widest hollow has {1 / widest:.4g} mm"

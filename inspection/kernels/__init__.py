@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from inspection.kernels.blocks import CurveTables, project
     from inspection.kernels.compile_notice import while_compiling
     from inspection.kernels.compiling import compiled_code_folder
-    from inspection.kernels.feet import Feet, Marks, Room
+    from inspection.kernels.feet import Feet, Marks, Room, turn_outward
     from inspection.kernels.growing import GrowingSums
     from inspection.kernels.layout import SAMPLE_METHODS
     from inspection.kernels.on_samples import SampleTables, project_on_samples
@@ -26,7 +26,7 @@ else:
         "inspection.kernels.blocks": ("CurveTables", "project"),
         "inspection.kernels.compile_notice": ("while_compiling",),
         "inspection.kernels.compiling": ("compiled_code_folder",),
-        "inspection.kernels.feet": ("Feet", "Marks", "Room"),
+        "inspection.kernels.feet": ("Feet", "Marks", "Room", "turn_outward"),
         "inspection.kernels.growing": ("GrowingSums",),
         "inspection.kernels.layout": ("SAMPLE_METHODS",),
         "inspection.kernels.on_samples": ("SampleTables", "project_on_samples"),
@@ -68,5 +68,6 @@ __all__ = [
     "project_on_samples",
     "strides",
     "take_in",
+    "turn_outward",
     "while_compiling",
 ]

@@ -10,6 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from inspection import Deviations, Material, Method, NominalProfile, NurbsCurve, deviations, discretize, profile_error_mm
+from inspection.kernels import project
+from inspection.kernels.layout import INSIDE, OPEN_END
 from tests.inspection import profiles
 from tests.inspection.oracle import Closest, closest_point
 from tests.inspection.profiles import Array, curve_of, moved_curve, nominal_of
@@ -432,3 +434,18 @@ def test_no_points_give_no_deviations() -> None:
         found = deviations(np.empty((0, 2)), nominal_of("P1", 10_000), method)
         assert found.deviation_mm.shape == (0,)
         assert found.foot_mm.shape == (0, 2)
+
+
+@pytest.mark.parametrize("material", get_args(Material))
+def test_deviations_are_those_of_the_feet_whatever_thread_turns_them(material: Material) -> None:
+    name, tip_mm = "NACA 2412 sharp", 0.25
+    nominal, rng = nominal_of(name, material=material), np.random.default_rng(21)
+    points = curve_of(name).point(rng.uniform(0, 1, 70_000)) + rng.normal(0, 1.0, (70_000, 2))  # shared out among all threads
+    found, feet = deviations(points, nominal, tip_radius_mm=tip_mm), project(points, nominal.grid, threads=1)
+    assert np.array_equal(found.deviation_mm, nominal.outward * feet.distance_mm - tip_mm)
+    assert np.array_equal(found.normal, nominal.outward * feet.gradient)
+    assert np.array_equal(found.beyond_end, feet.vertex == OPEN_END)
+    assert np.array_equal(found.at_vertex, feet.vertex != INSIDE)
+    points[[7, 69_999]] = np.nan, 1.0
+    with pytest.raises(ValueError, match=r"point 8 is not finite"):
+        deviations(points, nominal)
