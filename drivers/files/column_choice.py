@@ -17,6 +17,7 @@ from drivers.files.text_table import Array, Columns
 
 AxisName = Literal["x", "y", "z"]
 
+_BEGINNING = 1 << 16  # rows that show nearly always what columns are not
 _FEWEST_ROWS = 3  # that show whether a column counts
 _UNIT_LENGTH = 1e-2  # a normal may be rounded to two digits
 _EVEN = 1e-6  # of a step: steps that differ by less are equal
@@ -71,7 +72,9 @@ def _notes_of(chosen: Mapping[AxisName, int], table: Columns, why: str) -> list[
 
 def _first_ones(table: Columns, count: int) -> tuple[dict[AxisName, int], list[str]]:
     """The first two or three columns of a table that names none."""
-    values = table.values[np.isfinite(table.values).all(axis=1)]
+    values = _with_numbers(table.values[:_BEGINNING])
+    if len(values) < _FEWEST_ROWS or any(_counts(values[:, place]) for place in (0, count - 1)):
+        values = _with_numbers(table.values)  # what the beginning does not count, all do not either
     first_three: dict[AxisName, int] = {"x": 0, "y": 1, "z": 2}
     if count == 2:
         return {"x": 0, "y": 1}, []
@@ -84,7 +87,7 @@ def _first_ones(table: Columns, count: int) -> tuple[dict[AxisName, int], list[s
             f"the first column counts the rows ({counted} ...); expected x, y, z first, or a header line that names the columns x, y, z, "
             "or say which they are (columns x=2,y=3,z=4)"
         )
-    if (count == 6 and _are_directions(values[:, 3:])) or (count == 4 and _counts(values[:, 3])):
+    if (count == 6 and _are_directions(table.values)) or (count == 4 and _counts(values[:, 3])):
         return first_three, [f"the first three of {count} columns taken as x, y, z"]
     raise PointFileError(
         f"{count} columns without names: which of them are x, y and z? Expected a header line that names them, "
@@ -113,7 +116,17 @@ def _counts(column: Array) -> bool:
     return even or bool(np.all(column == np.round(column)))
 
 
-def _are_directions(vectors: Array) -> bool:
-    """Tell whether vectors (m, 3) all have length 1."""
-    length: NDArray[np.float64] = np.linalg.norm(vectors, axis=1)
-    return bool(len(length)) and bool(np.all(np.abs(length - 1.0) <= _UNIT_LENGTH))
+def _with_numbers(values: Array) -> Array:
+    """The rows (k, c) whose numbers are all there."""
+    return values[np.isfinite(values).all(axis=1)]
+
+
+def _are_directions(values: Array) -> bool:
+    """Tell whether the last three of six columns are vectors that all have length 1, in rows whose numbers are all there."""
+    count = 0
+    for first in range(0, len(values), _BEGINNING):
+        length: NDArray[np.float64] = np.linalg.norm(_with_numbers(values[first : first + _BEGINNING])[:, 3:], axis=1)
+        if not np.all(np.abs(length - 1.0) <= _UNIT_LENGTH):
+            return False
+        count += len(length)
+    return count > 0

@@ -5,7 +5,7 @@ stay rows: their coordinates are NaN, so that the inspection rejects and counts 
 """
 
 import tokenize
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from drivers.errors import PointFileError
 from drivers.files.column_choice import AxisName, axes_of, choose_axes, refuse_places
+from drivers.files.plain_rows import Room
 from drivers.files.stated_units import MM_PER_UNIT, UNITS, UnitName, units_of_names
-from drivers.files.text_table import Array, Columns, count_of, parse_columns, read_bytes, read_plain, read_text
+from drivers.files.text_table import Array, Columns, count_of, parse_columns, read_bytes, read_plain, read_text, refuse_long_text
 from drivers.source import Arrival, PointBatch, ScanClosed, ScanOpened
 
 # What numpy's reader of npy headers lets through on files that are none; RecursionError and MemoryError come from its literal_eval.
@@ -35,9 +36,6 @@ _NPY_ERRORS = (
     FloatingPointError,
     tokenize.TokenError,
 )
-Room = Callable[[tuple[int, ...], type[np.generic]], NDArray[Any]]
-"""Gives an array of a shape and a type, whose values are not set: numpy.empty, or what keeps long arrays on a disk."""
-
 _ROWS_AT_ONCE = 1 << 16
 _LARGEST_MM = 1e6  # a kilometre: beyond it the unit or the scale is wrong, and a float64 no longer resolves a tenth of a nanometre
 
@@ -123,9 +121,11 @@ def read_points(
     npy = path.suffix.lower() == ".npy"
     with _name_file(path):
         places = axes_of(columns).values()
-    plain = None if npy else read_plain(path, places)
+    plain = None if npy else read_plain(path, places, room)
+    if plain is None and not npy:
+        refuse_long_text(path, places, room)
     text = "" if npy or plain else read_text(path)
-    if npy and not read_bytes(path):
+    if npy and not read_bytes(path, 1):
         raise PointFileError(f"{path}: the file is empty")
     with _name_file(path):
         return _read_npy(path, asked) if npy else _read_table(plain or parse_columns(text, places), asked)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from drivers.errors import PointFileError
 from drivers.files.no_numbers import is_no_number, name_errors
-from drivers.files.plain_rows import read_plain_rows
+from drivers.files.plain_rows import Room, read_plain_rows
 from drivers.files.row_reading import HINT, NUMBER, READINGS, Reading, number_of, shorten
 from drivers.files.stated_units import StatedUnit, axis_letters, units_of_lines, units_of_row
 
@@ -27,7 +27,9 @@ Array = NDArray[np.float64]
 Numbered = list[tuple[int, str]]  # line number and what stands on the line
 
 _SNIFFED_LINES = 100
+_ROWS_AT_ONCE = 1 << 16
 _HEAD_BYTES = 1 << 16  # of a long file, from which it is understood what its rows are
+_LARGEST_WITH_CARE = 256 << 20  # bytes of text: about 3 GB of memory while it is read
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 _UTF_8 = b"\xef\xbb\xbf"
 _STRANGE = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
@@ -82,14 +84,17 @@ def _decode(data: bytes) -> str:
     return text.replace("\u2212", "-").replace("\r\n", "\n").replace("\r", "\n")
 
 
-def read_bytes(path: Path) -> bytes:
-    """Read a regular file as it is. Raises PointFileError where there is none, or where it cannot be read."""
+def read_bytes(path: Path, most: int = -1) -> bytes:
+    """Read a regular file as it is, or its first bytes. Raises PointFileError where there is none, or where it cannot be read."""
     try:
         if path.is_dir():
             raise PointFileError(f"{path}: is a folder; expected a file")
         if path.exists() and not path.is_file():
             raise PointFileError(f"{path}: is not a regular file")
-        return path.read_bytes() if path.stat().st_size else b""  # what the system makes while it is read has no size, and may have no end
+        if not path.stat().st_size:
+            return b""  # what the system makes while it is read has no size, and may have no end
+        with path.open("rb") as file:
+            return file.read(most)
     except FileNotFoundError:
         raise PointFileError(f"{path}: no such file") from None
     except (OSError, ValueError) as error:  # ValueError: a NUL in the path, and PointFileError
@@ -114,25 +119,46 @@ def parse_columns(text: str, places: Collection[int] = ()) -> Columns:
     return _columns(values, np.array([number for number, _ in data], dtype=np.int64), header, remarks, reading, notes)
 
 
-def read_plain(path: Path, places: Collection[int] = ()) -> Columns | None:
+def read_plain(path: Path, places: Collection[int] = (), room: Room = np.empty) -> Columns | None:
     """Read the columns of a long file of plain numbers, as `parse_columns` does, but without its text ever being held as a whole.
 
     What its rows are, and everything above them, is understood from its beginning. None where anything in it has to be read with care.
+
+    room : gives the arrays of a long file, like numpy.empty
     """
     try:
-        if not path.is_file() or path.stat().st_size <= _HEAD_BYTES:
-            return None
-        with path.open("rb") as file:
-            head, end, _ = file.read(_HEAD_BYTES).rpartition(b"\n")
-            head += end
-            header, data, remarks, reading = _understand(head, tuple(sorted(places)))
-            first = data[0][0]
-            above = b"".join(head.splitlines(keepends=True)[: first - 1])
-            file.seek(len(above) if above or not head.startswith(_UTF_8) else len(_UTF_8))
-            values = read_plain_rows(file, reading.delimiter, reading.decimal)
+        return _read_plain(path, places, room) if path.is_file() and path.stat().st_size > _HEAD_BYTES else None
     except (OSError, ValueError):  # PointFileError is a ValueError
         return None
-    return _columns(values, np.arange(first, first + len(values)), header, remarks, reading, [])
+
+
+def refuse_long_text(path: Path, places: Collection[int], room: Room) -> None:
+    """Raise PointFileError where a text that has to be read with care is too long to be held as a whole."""
+    try:
+        if not path.is_file() or path.stat().st_size <= _LARGEST_WITH_CARE:
+            return
+        _read_plain(path, places, room)
+    except ValueError as error:
+        told = f"a text of more than {_LARGEST_WITH_CARE >> 20} MB is read only where all its rows are plain numbers, as many on every line"
+        raise PointFileError(f"{path}: {error}; {told}. Mend it there, or save the points as an npy file") from None
+    except OSError:
+        return  # whoever reads it says why
+
+
+def _read_plain(path: Path, places: Collection[int], room: Room) -> Columns:
+    """Read a file of plain numbers. Raises ValueError where it is none."""
+    with path.open("rb") as file:
+        head, end, _ = file.read(_HEAD_BYTES).rpartition(b"\n")
+        head += end
+        header, data, remarks, reading = _understand(head, tuple(sorted(places)))
+        first = data[0][0]
+        above = b"".join(head.splitlines(keepends=True)[: first - 1])
+        file.seek(len(above) if above or not head.startswith(_UTF_8) else len(_UTF_8))
+        values = read_plain_rows(file, reading.delimiter, reading.decimal, room, first)
+    line_numbers = room((len(values),), np.int64)
+    for begin in range(0, len(values), _ROWS_AT_ONCE):
+        line_numbers[begin : begin + _ROWS_AT_ONCE] = np.arange(first + begin, first + min(begin + _ROWS_AT_ONCE, len(values)))
+    return _columns(values, line_numbers, header, remarks, reading, [])
 
 
 def _understand(head: bytes, places: tuple[int, ...]) -> tuple[Numbered, Numbered, Numbered, Reading]:

@@ -9,8 +9,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from drivers.files import text_table
+from drivers.errors import PointFileError
+from drivers.files import column_choice, plain_rows, text_table
 from drivers.files.plain_rows import read_plain_rows
+from drivers.files.point_file import read_points
 from drivers.files.text_table import Columns, parse_columns, read_plain, read_text
 
 ROWS = 320
@@ -31,6 +33,8 @@ ODD = [
 def _short_beginning(monkeypatch: pytest.MonkeyPatch) -> None:
     """The beginning that is understood line by line ends after 150 to 280 of the rows."""
     monkeypatch.setattr(text_table, "_HEAD_BYTES", 4096)
+    monkeypatch.setattr(text_table, "_ROWS_AT_ONCE", 50)
+    monkeypatch.setattr(plain_rows, "_ROWS_AT_ONCE", 100)
 
 
 def rows_of(seed: int, columns: int, whole: bool = False) -> list[list[str]]:
@@ -98,6 +102,57 @@ def test_whatever_a_long_file_holds_it_is_read_as_a_stream_only_where_care_gives
 def test_what_is_no_long_file_is_read_with_care(tmp_path: Path) -> None:
     (tmp_path / "short.csv").write_text("1,2\n3,4\n" * 50)
     assert [read_plain(tmp_path / name) for name in ("short.csv", "missing.csv", "", "a\0b")] == [None] * 4
+
+
+@pytest.mark.parametrize("odd", ["# remark", "1,2", "1,2,3,4", "1,2,END", "", "1,2,\u00e4", "1,,3", "1,2,0x1"])
+@pytest.mark.parametrize("at", [30, 150, 299, 320])
+def test_a_text_too_long_to_be_read_with_care_is_refused_by_its_first_odd_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, odd: str, at: int
+) -> None:
+    rows = [",".join(row) for row in rows_of(5, 3)]
+    path = tmp_path / "points.csv"
+    path.write_text("\n".join(["x,y,z", *rows[:at], odd, *rows[at:], ""]), encoding="utf-8")
+    monkeypatch.setattr(text_table, "_LARGEST_WITH_CARE", 5000)
+    with pytest.raises(
+        PointFileError, match=rf"points.csv: line {at + 2} \('.*'\) is no row of plain numbers.* save the points as an npy file"
+    ):
+        read_points(path)
+    path.write_text("\n".join(["x,y,z", *rows]), encoding="utf-8")
+    assert len(read_points(path).points_mm) == ROWS
+
+
+@pytest.mark.parametrize("columns", [3, 4, 6])
+@pytest.mark.parametrize("counts", ["nothing", "first", "last", "from the middle on"])
+def test_columns_without_names_are_found_alike_by_the_beginning_and_by_all(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, columns: int, counts: str
+) -> None:
+    values = np.array(rows_of(6, columns), dtype=np.float64)
+    values[:20] = np.nan
+    values[:, 3:] /= np.linalg.norm(values[:, 3:], axis=1, keepdims=True) if columns == 6 else 1.0
+    first, place = {"first": (0, 0), "last": (0, -1), "from the middle on": (160, 0), "nothing": (ROWS, 0)}[counts]
+    values[first:, place] = np.arange(ROWS - first)
+    np.savetxt(path := tmp_path / "points.csv", values, delimiter=",")
+
+    def told() -> object:
+        try:
+            found = read_points(path)
+            return found.points_mm.tobytes(), found.notes
+        except PointFileError as error:
+            return str(error)
+
+    expected = told()
+    monkeypatch.setattr(column_choice, "_BEGINNING", 30)
+    assert told() == expected
+
+
+def test_an_array_is_not_held_beside_its_points(tmp_path: Path) -> None:
+    np.save(path := tmp_path / "points.npy", np.sin(np.arange(3e6)).reshape(-1, 3))
+    read_points(path)
+    tracemalloc.start()
+    found = read_points(path).points_mm
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 24 * len(found) + 14e6 < 2 * 24 * len(found), "the points, and a piece of the array"
 
 
 def test_a_long_file_takes_no_more_memory_than_its_numbers() -> None:
