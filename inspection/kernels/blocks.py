@@ -1,11 +1,27 @@
 """Closest points of many places, a block at a time, and the queue of those that the first pass leaves."""
 
+from functools import cache
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inspection.kernels.compiling import array_at, claim_chunk, kernel, stack_integers, stack_reals
+from inspection.kernels.compiling import (
+    INTEGER,
+    INTEGER_ARRAY,
+    REAL_ARRAY,
+    REAL_TABLE,
+    SHORT_TABLE,
+    array_at,
+    call_of,
+    claim_chunk,
+    code_of,
+    inner_kernel,
+    kernel,
+    stack_integers,
+    stack_reals,
+    type_of,
+)
 from inspection.kernels.feet import Feet, empty_feet, flatten, keep_closer, share_out, store_foot
 from inspection.kernels.lanes import improve, load_pieces, locate, measure, solve, start_in_middle, store_block
 from inspection.kernels.layout import (
@@ -72,12 +88,16 @@ from inspection.kernels.layout import (
     WAITING,
     WAITING_T,
 )
-from inspection.kernels.search import derivatives_at, finish_vertex, search_curve
+from inspection.kernels.search import SEARCH, call_search, derivatives_at, finish_vertex, search_curve
 
 Array = NDArray[np.float64]
 
 _TRIES = 2  # further steps allowed on one piece
-_WALKED = 4  # flag in the count of tries: the neighbouring piece was tried
+_UNTRIED: Any = np.int64(0)  # not a literal: it has a type of its own, for which what it is given to is compiled once more
+_WALKED: Any = np.int64(4)  # flag in the count of tries: the neighbouring piece was tried
+FEET = type_of(empty_feet(0))
+PROJECTION = (REAL_ARRAY, REAL_TABLE, SHORT_TABLE, INTEGER, FEET, INTEGER_ARRAY)  # the types that `project_points` takes
+call_projection = call_of(*PROJECTION)
 
 
 class CurveTables(Protocol):
@@ -101,13 +121,28 @@ def project(points_mm: Array, grid: CurveTables, threads: int | None = None) -> 
     """
     points = flatten(points_mm)
     feet = empty_feet(len(points) // 2)
-    share_out(lambda claimed: project_points(points, grid.reals, grid.integers, feet, claimed), len(feet.vertex), threads)
+    search = search_code()
+    share_out(lambda claimed: project_points(points, grid.reals, grid.integers, search, feet, claimed), len(feet.vertex), threads)
     return feet
 
 
+@cache
+def search_code() -> int:
+    """Where the code of the search along the whole curve is."""
+    return code_of(search_curve, *SEARCH)
+
+
+@cache
+def projection_code() -> int:
+    """Where the code of `project_points` is."""
+    return code_of(project_points, *PROJECTION)
+
+
 @kernel
-def project_points(points: Any, reals: Any, integers: Any, feet: Any, claimed: Any) -> None:
+def project_points(points: Any, reals: Any, integers: Any, search: int, feet: Any, claimed: Any) -> None:
     """Project the flat points (2 m,), chunk by chunk as they are claimed, and write the results into feet.
+
+    search : `search_code()`
 
     All points of a block are solved on the piece that their cell holds; those whose foot is not on that piece, or whose
     cell holds several stretches, queue until they fill a block of their own.
@@ -145,15 +180,15 @@ def project_points(points: Any, reals: Any, integers: Any, feet: Any, claimed: A
             measure(values, j, reals[FIRST_PARAMETER], reals[LAST_PARAMETER], reals[LENGTH_MM])
         if fresh:
             store_block(values, feet, block, lanes)
-            waiting = _queue_unsolved(values, slots, reals, integers, feet, block, lanes, waiting, foot, stack)
+            waiting = _queue_unsolved(values, slots, reals, integers, search, feet, block, lanes, waiting, foot, stack)
             block += lanes
         else:
-            waiting = _settle(values, slots, reals, integers, feet, lanes, waiting, foot, stack)
+            waiting = _settle(values, slots, reals, integers, search, feet, lanes, waiting, foot, stack)
 
 
-@kernel
+@inner_kernel
 def _queue_unsolved(
-    values: Any, slots: Any, reals: Any, integers: Any, feet: Any, block: int, lanes: int, waiting: int, foot: Any, stack: Any
+    values: Any, slots: Any, reals: Any, integers: Any, search: int, feet: Any, block: int, lanes: int, waiting: int, foot: Any, stack: Any
 ) -> int:
     """Queue or search for what the first pass left. Returns the number of items that wait."""
     unsolved = 0
@@ -167,18 +202,18 @@ def _queue_unsolved(
         feet.distance_mm[point] = np.inf
         if content >= 0:
             slots[LANE_POINT + j], slots[LANE_TRIES + j] = point, 0
-            waiting = _advance(values, slots, reals, integers, feet, j, waiting, foot, stack)
+            waiting = _advance(values, slots, reals, integers, search, feet, j, waiting, foot, stack)
         elif content == FAR:
-            search_curve(values[LANE_X + j], values[LANE_Y + j], reals, integers, foot, stack)
+            call_search(search, (values[LANE_X + j], values[LANE_Y + j], reals, integers, foot, stack))
             store_foot(foot, feet, point)
         else:
             place = LISTED - content
             for branch in range(lists[place]):
-                waiting = _push(values, slots, waiting, point, lists[place + 1 + branch], 0, np.nan)
+                waiting = _push(values, slots, waiting, point, int(lists[place + 1 + branch]), _UNTRIED, np.nan)
     return waiting
 
 
-@kernel
+@inner_kernel
 def _push(values: Any, slots: Any, waiting: int, point: int, piece: int, tries: int, t: float) -> int:
     """Put an item at the end of the queue: a point to be solved on a piece, from t on or, where that is NaN, from its middle."""
     item = WAITING + ITEM_WIDTH * waiting
@@ -187,7 +222,7 @@ def _push(values: Any, slots: Any, waiting: int, point: int, piece: int, tries: 
     return waiting + 1
 
 
-@kernel
+@inner_kernel
 def _take(values: Any, slots: Any, points: Any, lanes: int, waiting: int) -> None:
     """Move the last items of the queue into the lanes."""
     for j in range(lanes):
@@ -198,7 +233,7 @@ def _take(values: Any, slots: Any, points: Any, lanes: int, waiting: int) -> Non
         values[LANE_X + j], values[LANE_Y + j] = points[2 * point], points[2 * point + 1]
 
 
-@kernel
+@inner_kernel
 def _resume(values: Any, lanes: int, waiting: int) -> None:
     """Let items that have not converged yet go on from where they were."""
     for j in range(lanes):
@@ -206,8 +241,10 @@ def _resume(values: Any, lanes: int, waiting: int) -> None:
             values[LANE_T + j] = values[WAITING_T + waiting + j]
 
 
-@kernel
-def _settle(values: Any, slots: Any, reals: Any, integers: Any, feet: Any, lanes: int, waiting: int, foot: Any, stack: Any) -> int:
+@inner_kernel
+def _settle(
+    values: Any, slots: Any, reals: Any, integers: Any, search: int, feet: Any, lanes: int, waiting: int, foot: Any, stack: Any
+) -> int:
     """Offer the solved items to their points and send the others on. Returns the number of items that wait."""
     for j in range(lanes):
         if slots[LANE_SOLVED + j] == 1:
@@ -217,12 +254,14 @@ def _settle(values: Any, slots: Any, reals: Any, integers: Any, feet: Any, lanes
             foot[FOOT_VERTEX], foot[FOOT_STATION] = INSIDE, values[LANE_STATION + j]
             keep_closer(foot, feet, slots[LANE_POINT + j])
         else:
-            waiting = _advance(values, slots, reals, integers, feet, j, waiting, foot, stack)
+            waiting = _advance(values, slots, reals, integers, search, feet, j, waiting, foot, stack)
     return waiting
 
 
-@kernel
-def _advance(values: Any, slots: Any, reals: Any, integers: Any, feet: Any, j: int, waiting: int, foot: Any, stack: Any) -> int:
+@inner_kernel
+def _advance(
+    values: Any, slots: Any, reals: Any, integers: Any, search: int, feet: Any, j: int, waiting: int, foot: Any, stack: Any
+) -> int:
     """Choose the next try of an unsolved lane. Returns the number of items that wait.
 
     A foot beyond the piece is sought once on the neighbouring piece, or is the vertex there; one on the piece goes on from its t
@@ -234,7 +273,7 @@ def _advance(values: Any, slots: Any, reals: Any, integers: Any, feet: Any, j: i
     x, y = values[LANE_X + j], values[LANE_Y + j]
     after = t > values[BLOCK * PIECE_LAST + j]
     if after or t < values[BLOCK * PIECE_FIRST + j]:
-        link = integers[integers[LINKS_AT] + PIECE_LINKS * piece + (PIECE_AFTER if after else PIECE_BEFORE)]
+        link = int(integers[integers[LINKS_AT] + PIECE_LINKS * piece + (PIECE_AFTER if after else PIECE_BEFORE)])
         if link >= 0 and tries < _WALKED:
             return _push(values, slots, waiting, point, link, _WALKED, np.nan)
         if link < 0:
@@ -247,6 +286,6 @@ def _advance(values: Any, slots: Any, reals: Any, integers: Any, feet: Any, j: i
                 return waiting
     elif not np.isnan(t) and (tries & (_WALKED - 1)) < _TRIES:
         return _push(values, slots, waiting, point, piece, tries + 1, t)
-    search_curve(x, y, reals, integers, foot, stack)
+    call_search(search, (x, y, reals, integers, foot, stack))
     keep_closer(foot, feet, point)
     return waiting

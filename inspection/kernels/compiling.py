@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from llvmlite import ir
-from numba import carray, njit, types
+from numba import carray, njit, typeof, types
 from numba.core import cgutils, config
 from numba.core.event import Event, Listener, register
 from numba.extending import intrinsic
@@ -21,20 +21,65 @@ from inspection.kernels.layout import BLOCK, CHUNK, INTEGERS, REALS
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 array_at = carray  # the array of a size that begins at a place in memory, without a copy
+type_of = typeof  # what the compiler calls the type of a value
+
+
+def tuple_of(*parts: types.Type) -> types.Type:
+    """The type of a tuple of such values."""
+    return types.Tuple(parts)
+
+
+REAL, INTEGER = types.float64, types.int64
+REAL_ARRAY, INTEGER_ARRAY = REAL[::1], INTEGER[::1]  # that is written to
+REAL_TABLE, INTEGER_TABLE, SHORT_TABLE = (types.Array(of, 1, "C", readonly=True) for of in (REAL, INTEGER, types.int32))
 
 
 def kernel(function: _Function, **options: bool) -> _Function:
     """Compile on the first call and keep the result on disk; where nothing can be written, compile in every process."""
+    options |= {"nogil": True, "no_cfunc_wrapper": True}
     try:
         with _code_kept_in_stamped_folder():
-            return cast(_Function, njit(cache=True, nogil=True, error_model="numpy", **options)(function))
+            return cast(_Function, njit(cache=True, error_model="numpy", **options)(function))
     except RuntimeError:
-        return cast(_Function, njit(nogil=True, error_model="numpy", **options)(function))
+        return cast(_Function, njit(error_model="numpy", **options)(function))
+
+
+def inner_kernel(function: _Function, **options: bool) -> _Function:
+    """Compile for other kernels alone. Python must not call it: the wrapper for that, which takes longer to compile, is left out."""
+    return kernel(function, no_cpython_wrapper=True, **options)
 
 
 def inlined_kernel(function: _Function) -> _Function:
-    """Compile with forced inlining, so that loops calling it vectorise."""
-    return kernel(function, forceinline=True)
+    """Compile for other kernels alone, with forced inlining, so that loops calling it vectorise."""
+    return inner_kernel(function, forceinline=True)
+
+
+def code_of(function: Callable[..., None], *given: types.Type) -> int:
+    """Where in memory the code of a kernel is for arguments of these types. It is compiled, or loaded, where that was not done yet."""
+    compiled = cast(Any, function).get_compile_result(types.void(*given))
+    return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
+
+
+def call_of(*wanted: types.Type) -> Any:
+    """An instruction that calls the code at a place in memory, see `code_of`, with arguments of these types.
+
+    A kernel that is called by its name becomes part of its caller, and is optimised anew with each one; by its place it is compiled
+    once.
+    """
+
+    @instructions
+    def call(typing_context: Any, place: Any, given: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            convention = context.call_conv
+            code = builder.inttoptr(args[0], convention.get_function_type(types.void, wanted).as_pointer())
+            status, _ = convention.call_function(builder, code, types.void, wanted, cgutils.unpack_tuple(builder, args[1], len(wanted)))
+            with cgutils.if_unlikely(builder, status.is_error):
+                convention.return_status_propagate(builder, status)
+            return context.get_dummy_value()
+
+        return types.void(types.int64, types.Tuple(wanted)), generate
+
+    return call
 
 
 @contextmanager

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from inspection.kernels.compiling import claim_chunk, kernel
+from inspection.kernels.compiling import claim_chunk, inner_kernel, kernel
 from inspection.kernels.layout import (
     CHUNK,
     FOOT_CURVATURE,
@@ -110,7 +110,7 @@ def _turn_outward(
         first = claim_chunk(claimed)
 
 
-@kernel
+@inner_kernel
 def store_foot(foot: Any, feet: Any, i: int) -> None:
     """Enter the results of one point as row i."""
     feet.parameter[i], feet.distance_mm[i] = foot[FOOT_U], foot[FOOT_DISTANCE]
@@ -120,7 +120,7 @@ def store_foot(foot: Any, feet: Any, i: int) -> None:
     feet.vertex[i] = np.uint8(foot[FOOT_VERTEX])
 
 
-@kernel
+@inner_kernel
 def keep_closer(foot: Any, feet: Any, point: int) -> None:
     """Enter a foot where it is closer than the one so far. Of equally close feet the same one is kept, in whatever order they come."""
     order = abs(foot[FOOT_DISTANCE]) - abs(feet.distance_mm[point])

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from inspection.kernels.compiling import inlined_kernel, kernel
+from inspection.kernels.compiling import inlined_kernel, inner_kernel, kernel
 from inspection.kernels.layout import (
     BOX_WIDTH,
     LEAF,
@@ -89,7 +89,7 @@ def _in_cell(x: float, y: float, site: int, samples: Any, links: Any) -> bool:
     return inside
 
 
-@kernel
+@inner_kernel
 def _nearest_in_leaf(x: float, y: float, leaf: int, least: float, site: int, samples: Any) -> tuple[float, int]:
     for i in range(leaf * LEAF, min((leaf + 1) * LEAF, len(samples) // SAMPLE_WIDTH)):
         distance = _square_of_distance(samples, i, x, y)

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from inspection.kernels.compiling import kernel
+from inspection.kernels.compiling import inner_kernel, kernel
 from inspection.kernels.layout import BENDING_XX, SLOPE_TURN, SLOPE_X, SLOPE_Y, TANGENTIAL_XX
 
 _FREE = 1e-9  # a motion whose eigenvalue is below this share of the largest changes no deviation: it is undetermined
@@ -52,7 +52,7 @@ def fill_covariance(sums: Any, reach: float, scatter: float, covariance: Any) ->
                 covariance[k, j] += variance * vectors[k, i] * vectors[j, i]
 
 
-@kernel
+@inner_kernel
 def _fill_normal_matrix(sums: Any, bending: float, reach: float, matrix: Any) -> None:
     """Fill in the normal matrix (3, 3), with the rotation counted in mm at the farthest point.
 
@@ -67,7 +67,7 @@ def _fill_normal_matrix(sums: Any, bending: float, reach: float, matrix: Any) ->
             place += 1
 
 
-@kernel
+@inner_kernel
 def _decompose(matrix: Any, values: Any, vectors: Any) -> None:
     """Find the eigenvalues (3,) and eigenvectors, in columns, of a symmetric matrix by Jacobi's rotations. The matrix is used up.
 

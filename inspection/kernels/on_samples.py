@@ -1,12 +1,26 @@
 """The paper's methods: projections made at the nearest sample of the nominal."""
 
+from functools import cache
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inspection.kernels.blocks import CurveTables, project_points
-from inspection.kernels.compiling import claim_chunk, inlined_kernel, kernel
+from inspection.kernels.blocks import FEET, CurveTables, call_projection, project_points, projection_code, search_code
+from inspection.kernels.compiling import (
+    INTEGER,
+    INTEGER_ARRAY,
+    INTEGER_TABLE,
+    REAL_ARRAY,
+    REAL_TABLE,
+    call_of,
+    claim_chunk,
+    code_of,
+    inlined_kernel,
+    inner_kernel,
+    kernel,
+    tuple_of,
+)
 from inspection.kernels.feet import Feet, empty_feet, flatten, share_out, store_foot
 from inspection.kernels.layout import (
     AT_OPEN_END,
@@ -71,6 +85,14 @@ class SampleTables(Protocol):
         ...
 
 
+_TABLES = tuple_of(REAL_TABLE, INTEGER_TABLE, REAL_TABLE, INTEGER_TABLE, REAL_TABLE, INTEGER)
+_ON_SAMPLES = (REAL_ARRAY, _TABLES, FEET, INTEGER_ARRAY)  # the types that `project_points_on_samples` takes
+_call_on_samples = call_of(*_ON_SAMPLES)
+# What stands in for the samples where a method needs none: of the same types, so that one compiled fit serves all methods.
+_NO_REALS, _NO_INTEGERS = np.empty(0), np.empty(0, dtype=np.int64)
+_NO_REALS.setflags(write=False)
+_NO_INTEGERS.setflags(write=False)
+_NO_TABLES = (_NO_REALS, _NO_INTEGERS, _NO_REALS, _NO_INTEGERS, _NO_REALS, 0)
 _SMALL_TURN = 1e-2  # rad; as samples lie densely most turns are smaller, and the next term of the series is below round-off
 
 
@@ -82,9 +104,32 @@ def project_on_samples(points_mm: Array, grid: CurveTables, table: SampleTables,
     points = flatten(points_mm)
     feet = empty_feet(len(points) // 2)
     samples = (*table.flat, SAMPLE_METHODS.index(method))
-    share_out(lambda claimed: project_points(points, grid.reals, grid.integers, feet, claimed), len(feet.vertex), threads)
+    search = search_code()
+    share_out(lambda claimed: project_points(points, grid.reals, grid.integers, search, feet, claimed), len(feet.vertex), threads)
     share_out(lambda claimed: project_points_on_samples(points, samples, feet, claimed), len(feet.vertex), threads)
     return feet
+
+
+@cache
+def _on_samples_code() -> int:
+    """Where the code of `project_points_on_samples` is."""
+    return code_of(project_points_on_samples, *_ON_SAMPLES)
+
+
+def projection_of(table: SampleTables | None, method: str) -> tuple[Any, tuple[int, int, int]]:
+    """A projection for `project_by`: the tables of a method that looks at samples only, and where the code is. No table: exact feet."""
+    if table is None:
+        return _NO_TABLES, (projection_code(), search_code(), 0)
+    return (*table.flat, SAMPLE_METHODS.index(method)), (projection_code(), search_code(), _on_samples_code())
+
+
+@inner_kernel
+def project_by(projection: Any, points: Any, reals: Any, integers: Any, feet: Any) -> None:
+    """Project points in another kernel, by a projection of `projection_of`."""
+    tables, (exact, search, on_samples) = projection
+    call_projection(exact, (points, reals, integers, search, feet, np.zeros(1, dtype=np.int64)))
+    if on_samples != 0:
+        _call_on_samples(on_samples, (points, tables, feet, np.zeros(1, dtype=np.int64)))
 
 
 @kernel
@@ -151,7 +196,7 @@ def _is_faced(ahead: float, site: int, links: Any) -> bool:
     )
 
 
-@kernel
+@inner_kernel
 def _take_sample(x: float, y: float, site: int, samples: Any, links: Any, foot: Any) -> None:
     """Take the sample itself as the foot, its distance signed by the sum of the normals that meet there."""
     row, twin = SAMPLE_WIDTH * site, links[LINK_WIDTH * site + TWIN_SAMPLE]
@@ -204,7 +249,7 @@ def _on_pole_circle(x: float, y: float, site: int, samples: Any) -> tuple[float,
     return side * distance, side * (along * py + across * px), side * (across * py - along * px)
 
 
-@kernel
+@inner_kernel
 def _between_pole_circles(x: float, y: float, site: int, samples: Any, links: Any) -> tuple[float, float, float]:
     """Pole circles of the sample and its neighbour, blended by angles at the end of their Voronoi edge (equations 4 to 6)."""
     ahead, off = _in_frame(x, y, site, samples)
@@ -230,12 +275,12 @@ def _between_pole_circles(x: float, y: float, site: int, samples: Any, links: An
     return share * left + (1.0 - share) * left_other, gx / length, gy / length
 
 
-@kernel
+@inner_kernel
 def _angle_between(ax: float, ay: float, bx: float, by: float) -> float:
     return float(abs(np.arctan2(ax * by - ay * bx, ax * bx + ay * by)))
 
 
-@kernel
+@inner_kernel
 def _on_chords(x: float, y: float, site: int, samples: Any, links: Any) -> tuple[float, float, float]:
     """Projection on the nearer of the two chords that meet at the sample, signed by the side of its normal."""
     row = SAMPLE_WIDTH * site

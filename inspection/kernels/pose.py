@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from inspection.kernels.blocks import CurveTables, project_points
-from inspection.kernels.compiling import array_at, inlined_kernel, kernel, stack_reals
+from inspection.kernels.blocks import CurveTables
+from inspection.kernels.compiling import array_at, inlined_kernel, inner_kernel, kernel, stack_reals
 from inspection.kernels.feet import Feet, Marks, Room, empty_feet, flatten
 from inspection.kernels.layout import (
     BENDING_TT,
@@ -20,7 +20,6 @@ from inspection.kernels.layout import (
     COUNT,
     OPEN_END,
     REALS,
-    SAMPLE_METHODS,
     SLOPE_TURN,
     SLOPE_X,
     SLOPE_Y,
@@ -35,7 +34,7 @@ from inspection.kernels.layout import (
     TANGENTIAL_YY,
 )
 from inspection.kernels.normal_equations import fill_covariance, newton_step
-from inspection.kernels.on_samples import SampleTables, project_points_on_samples
+from inspection.kernels.on_samples import SampleTables, project_by, projection_of
 
 Array = NDArray[np.float64]
 
@@ -47,6 +46,10 @@ _HALVINGS = 12
 _HOVERING_STEPS = 3  # after them points that come and go at an open end in small steps are left out: no pose suits both
 _HOVERING_MM = 0.01
 _LEAST_REACH_MM = 1e-9
+# Not literals: to the compiler each of those has a type of its own, and what it is given to is compiled once more.
+_KNOWN: Any = np.bool_(True)
+_NOT_KNOWN: Any = np.bool_(False)
+_FIRST_ROW: Any = np.int64(0)
 
 
 class PoseEstimate(NamedTuple):
@@ -107,7 +110,7 @@ class PoseFit:
         self.weights[:] = 1.0
         curve = (grid.reals, grid.integers, float(outward), float(tip_radius_mm))
         self._problem = (flatten(points_mm), left_out, self.weights, *curve)
-        self._samples = None if table is None else (*table.flat, SAMPLE_METHODS.index(method))
+        self._projection = projection_of(table, method)
         chunk = min(m, at_once)
         before, after = room((m,), np.uint8), room((m,), np.uint8)
         before[:] = 1
@@ -116,7 +119,7 @@ class PoseFit:
     def settle(self, pose: tuple[float, float, float], most_steps: int) -> PoseEstimate:
         """Go from a pose to the least mean square of the deviations, by at most so many steps."""
         state, covariance = np.array([*pose, 0.0, 0.0, 0.0]), np.empty((3, 3))
-        steps, settled = _settle_pose(self._problem, self._samples, self._memory, state, covariance, most_steps)
+        steps, settled = _settle_pose(self._problem, self._projection, self._memory, state, covariance, most_steps)
         angle, x, y, mean_square, _, _ = state.tolist()
         return PoseEstimate((angle, x, y), steps, settled, mean_square, state[4:], covariance)
 
@@ -125,17 +128,17 @@ class PoseFit:
         m = len(self.weights)
         found, off = self._room((m,), np.bool_), self._room((m,), np.float64)
         found[:] = False
-        _find_outliers(self._problem, self._samples, self._memory, pose, limit, most_steps, found, off)
+        _find_outliers(self._problem, self._projection, self._memory, pose, limit, most_steps, found, off)
         return found
 
 
 @kernel
-def _settle_pose(problem: Any, samples: Any, memory: Any, state: Any, covariance: Any, most_steps: int) -> tuple[int, bool]:
+def _settle_pose(problem: Any, projection: Any, memory: Any, state: Any, covariance: Any, most_steps: int) -> tuple[int, bool]:
     """Make Newton steps, each halved until the mean square falls. Returns their number and whether the pose has settled."""
     weights = problem[2]
     takes_part, new_part, moved, feet = memory
     span, pose, here, trial = _span(problem[0], problem[1], len(weights)), (state[0], state[1], state[2]), np.empty(SUMS), np.empty(SUMS)
-    _evaluate(problem, samples, pose, span, moved, takes_part, takes_part, feet, False, here)
+    _evaluate(problem, projection, pose, span, moved, takes_part, takes_part, feet, _NOT_KNOWN, here)
     steps, settled, lower = 0, False, True
     while lower and not settled and steps < most_steps:
         steps += 1
@@ -146,14 +149,14 @@ def _settle_pose(problem: Any, samples: Any, memory: Any, state: Any, covariance
             settled = share * step[3] <= _STANDSTILL_MM and here[COUNT] > 0.0
             if settled:
                 break
-            _evaluate(problem, samples, next_pose, span, moved, takes_part, new_part, feet, False, trial)
+            _evaluate(problem, projection, next_pose, span, moved, takes_part, new_part, feet, _NOT_KNOWN, trial)
             lower = trial[SQUARE_BEFORE] <= here[SQUARE] * (1.0 + 1e-12)
             if lower:
                 break
             share *= 0.5
         if lower and steps >= _HOVERING_STEPS and share * step[3] < _HOVERING_MM and trial[COUNT] != here[COUNT]:
             _leave_out_hovering(weights, takes_part, new_part)
-            _evaluate(problem, samples, next_pose, span, moved, takes_part, new_part, feet, True, trial)
+            _evaluate(problem, projection, next_pose, span, moved, takes_part, new_part, feet, _KNOWN, trial)
         if lower:
             here, trial = trial, here
             takes_part, new_part = new_part, takes_part
@@ -163,14 +166,14 @@ def _settle_pose(problem: Any, samples: Any, memory: Any, state: Any, covariance
     return steps, settled
 
 
-@kernel
+@inner_kernel
 def _leave_out_hovering(weights: Any, before: Any, after: Any) -> None:
     """Leave out the points that took part at only one of two poses: an open end moves to and fro beside them."""
     for i in range(len(weights)):
         weights[i] *= before[i] * after[i]
 
 
-@kernel
+@inner_kernel
 def _report(sums: Any, pose: Any, span: Any, state: Any, covariance: Any) -> None:
     """Fill in the state (6,): the pose, the mean square of the deviations, the centre of the points; and the covariance."""
     state[0], state[1], state[2] = pose
@@ -180,13 +183,13 @@ def _report(sums: Any, pose: Any, span: Any, state: Any, covariance: Any) -> Non
 
 
 @kernel
-def _find_outliers(problem: Any, samples: Any, memory: Any, pose: Any, wanted: Any, most_steps: int, found: Any, off: Any) -> None:
+def _find_outliers(problem: Any, projection: Any, memory: Any, pose: Any, wanted: Any, most_steps: int, found: Any, off: Any) -> None:
     """Make weighted steps, the weights following from the deviations at every pose, and mark the points beyond the limit."""
     weights = problem[2]
     takes_part, _, moved, feet = memory
     span, sums, m = _span(problem[0], problem[1], len(weights)), np.empty(SUMS), len(weights)
     for _ in range(most_steps):
-        count = _look_at_distances(problem, samples, pose, moved, takes_part, feet, off)
+        count = _look_at_distances(problem, projection, pose, moved, takes_part, feet, off)
         limit = np.inf
         if count > 0:
             limit = max(wanted.mads * _median(off, takes_part), wanted.least_mm, _STANDSTILL_MM)
@@ -194,22 +197,22 @@ def _find_outliers(problem: Any, samples: Any, memory: Any, pose: Any, wanted: A
             share = off[i] / limit
             weights[i] = (1.0 - share * share) ** 2 if off[i] < limit else 0.0
             found[i] = off[i] >= limit and takes_part[i] > 0
-        _evaluate(problem, samples, pose, span, moved, takes_part, takes_part, feet, True, sums)
+        _evaluate(problem, projection, pose, span, moved, takes_part, takes_part, feet, _KNOWN, sums)
         step = newton_step(sums, span[2])
         pose = _move_pose(pose, span, step, 1.0)
         if step[3] <= wanted.settled_mm:
             break
 
 
-@kernel
-def _look_at_distances(problem: Any, samples: Any, pose: Any, moved: Any, takes_part: Any, feet: Any, off: Any) -> int:
+@inner_kernel
+def _look_at_distances(problem: Any, projection: Any, pose: Any, moved: Any, takes_part: Any, feet: Any, off: Any) -> int:
     """Enter how far each point is from the target, and which take part, at a pose. Returns how many do."""
     points, left_out, weights, reals, integers, outward, tip = problem
-    m, row, count = len(weights), 0, 0
+    m, row, count = len(weights), _FIRST_ROW, 0
     for begin in range(0, m, len(feet.vertex)):
         stop = min(begin + len(feet.vertex), m)
         row = _place(points, left_out, row, stop - begin, pose, moved)
-        _project(moved[: 2 * (stop - begin)], samples, reals, integers, _first_feet(feet, stop - begin))
+        project_by(projection, moved[: 2 * (stop - begin)], reals, integers, _first_feet(feet, stop - begin))
         for j in range(stop - begin):
             off[begin + j] = abs(outward * feet.distance_mm[j] - tip)
             takes_part[begin + j] = feet.vertex[j] != OPEN_END
@@ -217,7 +220,7 @@ def _look_at_distances(problem: Any, samples: Any, pose: Any, moved: Any, takes_
     return count
 
 
-@kernel
+@inner_kernel
 def _median(off: Any, takes_part: Any) -> float:
     """The median of the values of points that take part: of many points, of a choice in every stretch of the scan."""
     step = max(1.0, len(off) / MANY)
@@ -232,7 +235,7 @@ def _median(off: Any, takes_part: Any) -> float:
     return float(np.median(chosen[:count])) if count > 0 else np.inf
 
 
-@kernel
+@inner_kernel
 def _span(points: Any, left_out: Any, m: int) -> tuple[float, float, float]:
     """Mean of the flat points (x, y), and the distance of the farthest from it: a motion does not change it."""
     x = y = square = 0.0
@@ -248,14 +251,14 @@ def _span(points: Any, left_out: Any, m: int) -> tuple[float, float, float]:
     return x, y, max(np.sqrt(square), _LEAST_REACH_MM)
 
 
-@kernel
+@inner_kernel
 def _centre(pose: Any, span: Any) -> tuple[float, float]:
     """Where the pose puts the mean of the points."""
     c, s = np.cos(pose[0]), np.sin(pose[0])
     return c * span[0] - s * span[1] + pose[1], s * span[0] + c * span[1] + pose[2]
 
 
-@kernel
+@inner_kernel
 def _move_pose(pose: Any, span: Any, step: Any, share: float) -> tuple[float, float, float]:
     """The pose after a share of a step: its rotation about the centre, which moves by its shift alone."""
     x, y = _centre(pose, span)
@@ -265,7 +268,7 @@ def _move_pose(pose: Any, span: Any, step: Any, share: float) -> tuple[float, fl
     return angle, x + share * step[0] - (c * span[0] - s * span[1]), y + share * step[1] - (s * span[0] + c * span[1])
 
 
-@kernel
+@inner_kernel
 def _place(points: Any, left_out: Any, row: int, count: int, pose: Any, moved: Any) -> int:
     """Move the next points that are not left out, from a row on, to a pose. Returns the row after the last."""
     c, s = np.cos(pose[0]), np.sin(pose[0])
@@ -280,7 +283,7 @@ def _place(points: Any, left_out: Any, row: int, count: int, pose: Any, moved: A
     return row
 
 
-@kernel
+@inner_kernel
 def _first_feet(feet: Any, count: int) -> Any:
     """The memory for the first feet of a chunk."""
     return Feet(
@@ -294,20 +297,9 @@ def _first_feet(feet: Any, count: int) -> Any:
     )
 
 
-@kernel
-def _project(moved: Any, samples: Any, reals: Any, integers: Any, feet: Any) -> None:
-    """Project moved points.
-
-    samples : tables and number of a method that looks at samples only, or None for the exact feet
-    """
-    project_points(moved, reals, integers, feet, np.zeros(1, dtype=np.int64))
-    if samples is not None:
-        project_points_on_samples(moved, samples, feet, np.zeros(1, dtype=np.int64))
-
-
-@kernel
+@inner_kernel
 def _evaluate(
-    problem: Any, samples: Any, pose: Any, span: Any, moved: Any, before: Any, takes_part: Any, feet: Any, known: bool, sums: Any
+    problem: Any, projection: Any, pose: Any, span: Any, moved: Any, before: Any, takes_part: Any, feet: Any, known: bool, sums: Any
 ) -> None:
     """Add up the sums over the points at a pose, chunk by chunk and always in the same order.
 
@@ -316,7 +308,7 @@ def _evaluate(
     known : the points were looked at there before, so that their feet are still known where one chunk holds them all
     """
     points, left_out, weights, reals, integers, outward, tip = problem
-    m, row = len(weights), 0
+    m, row = len(weights), _FIRST_ROW
     lanes = array_at(stack_reals(), REALS)
     for i in range(SUMS * BLOCK):
         lanes[i] = 0.0
@@ -325,7 +317,7 @@ def _evaluate(
         stop = min(begin + len(feet.vertex), m)
         if not known or m > len(feet.vertex):
             row = _place(points, left_out, row, stop - begin, pose, moved)
-            _project(moved[: 2 * (stop - begin)], samples, reals, integers, _first_feet(feet, stop - begin))
+            project_by(projection, moved[: 2 * (stop - begin)], reals, integers, _first_feet(feet, stop - begin))
         for block in range(begin, stop, BLOCK):
             end = min(block + BLOCK, stop)
             near, far = block - begin, end - begin

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from inspection.kernels.compiling import fma, kernel
+from inspection.kernels.compiling import INTEGER_ARRAY, REAL, REAL_ARRAY, REAL_TABLE, SHORT_TABLE, call_of, fma, inner_kernel
 from inspection.kernels.layout import (
     BOUND_WIDTH,
     BOUNDS_AT,
@@ -57,9 +57,12 @@ from inspection.kernels.layout import (
 )
 
 _FINEST = 26  # halvings of a piece, after which an interval is a point
+_FIRST: Any = np.int64(0)  # not a literal: it has a type of its own, for which what it is given to is compiled once more
+SEARCH = (REAL, REAL, REAL_TABLE, SHORT_TABLE, REAL_ARRAY, INTEGER_ARRAY)  # the types that `search_curve` takes
+call_search = call_of(*SEARCH)
 
 
-@kernel
+@inner_kernel
 def search_curve(x: float, y: float, reals: Any, integers: Any, foot: Any, stack: Any) -> None:
     """Find the closest point of the whole curve by branch and bound over its pieces, and write it into foot (FOOT_WIDTH,)."""
     if not (np.isfinite(x) and np.isfinite(y)):
@@ -70,7 +73,7 @@ def search_curve(x: float, y: float, reals: Any, integers: Any, foot: Any, stack
     pieces, bounds, boxes = reals[integers[PIECES_AT] :], reals[integers[BOUNDS_AT] :], reals[integers[BOXES_AT] :]
     stack[0] = 1
     depth = 1
-    least, piece, parameter = np.inf, 0, 0.0
+    least, piece, parameter = np.inf, _FIRST, 0.0
     while depth:
         depth -= 1
         node = stack[depth]
@@ -89,7 +92,7 @@ def search_curve(x: float, y: float, reals: Any, integers: Any, foot: Any, stack
     _finish_foot(x, y, piece, parameter, reals, integers, foot)
 
 
-@kernel
+@inner_kernel
 def box_distance(boxes: Any, node: int, x: float, y: float) -> float:
     """Square of the distance from a box of the search tree."""
     dx = max(boxes[BOX_WIDTH * node + BOX_LOW_X] - x, 0.0, x - boxes[BOX_WIDTH * node + BOX_HIGH_X])
@@ -97,7 +100,7 @@ def box_distance(boxes: Any, node: int, x: float, y: float) -> float:
     return float(dx * dx + dy * dy)
 
 
-@kernel
+@inner_kernel
 def derivatives_at(pieces: Any, row: int, x: float, y: float, t: float) -> tuple[float, ...]:
     """C - M and its first three derivatives at t, C being the piece and M the place."""
     rx = vx = hx = kx = 0.0
@@ -113,7 +116,7 @@ def derivatives_at(pieces: Any, row: int, x: float, y: float, t: float) -> tuple
     return rx, ry, vx, vy, 2.0 * hx, 2.0 * hy, 6.0 * kx, 6.0 * ky
 
 
-@kernel
+@inner_kernel
 def _closest_on_piece(pieces: Any, bounds: Any, piece: int, x: float, y: float, least: float) -> tuple[float, float]:
     """Closest t of one piece and the square of the distance, infinite when certainly above `least`.
 
@@ -162,13 +165,13 @@ def _closest_on_piece(pieces: Any, bounds: Any, piece: int, x: float, y: float, 
         place += 1
 
 
-@kernel
+@inner_kernel
 def _end_distance(pieces: Any, row: int, x: float, y: float, t: float) -> tuple[float, float]:
     rx, ry, _, _, _, _, _, _ = derivatives_at(pieces, row, x, y, t)
     return t, rx * rx + ry * ry
 
 
-@kernel
+@inner_kernel
 def _monotone_root(pieces: Any, row: int, x: float, y: float, low: float, high: float) -> tuple[float, float]:
     """Where the tangential distance changes sign in [low, high], or the nearer end; Newton held inside its bracket."""
     rx, ry, vx, vy, hx, hy, _, _ = derivatives_at(pieces, row, x, y, low)
@@ -196,7 +199,7 @@ def _monotone_root(pieces: Any, row: int, x: float, y: float, low: float, high: 
     return t, rx * rx + ry * ry
 
 
-@kernel
+@inner_kernel
 def _finish_foot(x: float, y: float, piece: int, t: float, reals: Any, integers: Any, foot: Any) -> None:
     """Fill in the results for the foot at t of a piece, or for the vertex at its end."""
     pieces, vertices, links = reals[integers[PIECES_AT] :], reals[integers[VERTICES_AT] :], integers[integers[LINKS_AT] :]
@@ -223,7 +226,7 @@ def _finish_foot(x: float, y: float, piece: int, t: float, reals: Any, integers:
     foot[FOOT_STATION] = min(max(s, 0.0), reals[LENGTH_MM])
 
 
-@kernel
+@inner_kernel
 def finish_vertex(x: float, y: float, vertices: Any, row: int, grain: float, foot: Any) -> None:
     """Fill in the results for a vertex as the foot. The distance is signed by the side of its pseudo-normal on which the place lies."""
     dx, dy = x - vertices[row + VERTEX_X], y - vertices[row + VERTEX_Y]

@@ -1,16 +1,23 @@
 """Compiled code: nothing stale is loaded, whatever file changed; several processes at once; folders that cannot be written."""
 
+import ast
 import os
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
-from numba import njit
+from numba import njit, types
 from numba.core import config
+from numpy.typing import NDArray
 
-from inspection.kernels import cache_folder, compiling
+from inspection.kernels import PoseFit, cache_folder, compiling, pose
+from tests.inspection import profiles
+
+Array = NDArray[Any]
 
 INNER = "from inspection.kernels.compiling import kernel\n\nFACTOR = {}\n\n\n@kernel\ndef inner(x):\n    return FACTOR * x\n"
 OUTER = """
@@ -120,3 +127,55 @@ def test_the_folder_of_the_product_is_that_of_its_stamp() -> None:
     package = Path(compiling.__file__).parent
     assert cache_folder.stamp_of(package)
     assert (package / "__pycache__" / f"compiled-{cache_folder.stamp_of(package)}").is_dir()
+
+
+def test_code_called_by_its_place_gets_its_arguments_as_their_types_and_its_errors_come_back() -> None:
+    wanted = (types.float64, compiling.REAL_TABLE, compiling.INTEGER_ARRAY)
+    call = compiling.call_of(*wanted)
+
+    def scale(factor: float, table: Array, out: Array) -> None:
+        if factor < 0.0:
+            raise ValueError("a negative factor")
+        for i in range(len(table)):
+            out[i] = factor * table[i]
+
+    def use(place: int, factor: int, table: Array, out: Array) -> None:
+        call(place, (factor, table, out))
+
+    place, out, compiled = compiling.code_of(njit(scale), *wanted), np.zeros(3, dtype=np.int64), njit(use)
+    table = np.array([1.0, 2.0, 3.5])  # that can be written to, and the factor is a whole number: both are converted
+    compiled(place, 2, table, out)
+    assert out.tolist() == [2, 4, 7]
+    with pytest.raises(ValueError, match="a negative factor"):
+        compiled(place, -2, table, out)
+
+
+def test_one_compiled_fit_serves_all_methods() -> None:
+    nominal = profiles.nominal_of("P3", 500)
+    points = nominal.points_mm + 0.01
+    compiled = []
+    for method in ("exact", "pcp", "circle"):
+        PoseFit(points, nominal.grid, nominal.table_for(method), method, nominal.outward, 0.0).settle((0.0, 0.0, 0.0), 5)
+        compiled.append(len(pose._settle_pose.signatures))  # type: ignore[attr-defined]  # numba has no types
+    assert compiled[0] == compiled[1] == compiled[2]
+
+
+def kernels_in(path: Path, *kinds: str) -> set[str]:
+    """The functions of a file that are decorated with one of these names."""
+    functions = [node for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, ast.FunctionDef)]
+    return {f.name for f in functions if any(isinstance(node, ast.Name) and node.id in kinds for node in f.decorator_list)}
+
+
+@pytest.mark.parametrize("path", sorted(Path(compiling.__file__).parent.glob("*.py")), ids=lambda path: path.stem)
+def test_python_calls_no_kernel_that_is_there_for_other_kernels_alone(path: Path) -> None:
+    # such a kernel has no way in from Python: a call ends the process
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    inner = kernels_in(path, "inner_kernel", "inlined_kernel")
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("inspection.kernels."):
+            there = path.with_name(f"{(node.module or '').rpartition('.')[2]}.py")
+            inner |= kernels_in(there, "inner_kernel", "inlined_kernel") & {name.name for name in node.names}
+    kernels = kernels_in(path, "kernel", "inner_kernel", "inlined_kernel")
+    for function in (node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef) and node.name not in kernels):
+        called = {node.func.id for node in ast.walk(function) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)}
+        assert not called & inner, function.name
