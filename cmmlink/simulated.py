@@ -14,7 +14,7 @@ from drivers import LinkError
 from inspection import NominalProfile
 
 _ENDS_WITHIN_S = 20.0
-_RATE_HZ, _POINTS = 2000, 4000
+RATE_HZ, _POINTS = 2000, 4000  # so that the scan can be watched for two seconds
 
 
 @contextmanager
@@ -35,8 +35,8 @@ def _motion(plan: Plan, profile: NominalProfile, seed: int, defect: tuple[float,
     """Arguments of the simulator: form error and noise well inside the tolerance, an arbitrary pose on the table."""
     zone = plan.tolerance.zone
     motion = {
-        "rate": _RATE_HZ,
-        "speed": profile.length_mm * _RATE_HZ / _POINTS,
+        "rate": RATE_HZ,
+        "speed": profile.length_mm * RATE_HZ / _POINTS,
         "count": _POINTS,
         "seed": seed,
         "form-error-mm": 0.4 * zone.upper_mm,

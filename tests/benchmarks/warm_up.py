@@ -2,7 +2,7 @@
 
 from typing import get_args
 
-from inspection import discretize, rehearse
+from inspection import RigidTransform, discretize, register_fine, rehearse
 from inspection.methods import Method
 from tests.inspection import profiles
 
@@ -12,6 +12,7 @@ def compile_kernels() -> None:
     nominal = discretize(profiles.p3(), samples=400)
     for method in get_args(Method):
         rehearse(nominal, method, reject_outliers=True)
+        register_fine(nominal.points_mm, nominal, RigidTransform.identity(), method=method)
 
 
 if __name__ == "__main__":

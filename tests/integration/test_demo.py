@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -29,8 +30,9 @@ def kept_in(folder: Path) -> list[str]:
 
 
 def demonstration(folder: Path, *options: str) -> tuple[int, dict[str, Any]]:
-    """Exit code and JSON object of a demonstration without a terminal, in this process; the device is a process of its own."""
-    ended = cmmlink("demo", "--headless", "--json", *kept_in(folder), *options)
+    """Exit code and JSON object of a demonstration that nobody watches, in this process; the device is a process of its own."""
+    with patch("cmmlink.simulated.RATE_HZ", 40_000):
+        ended = cmmlink("demo", "--headless", "--json", *kept_in(folder), *options)
     assert ended.err == ""
     return ended.code, ended.json()
 
