@@ -22,7 +22,7 @@ from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan import CtPlan, FileDevice, Plan, Section
 from cmmlink.record import Recorder, RunInputs, Store
 from cmmlink.words import VERDICT_WORDS
-from drivers import Rejected, ScanClosed, ScanOpened, ScanSource
+from drivers import MeshError, Rejected, ScanClosed, ScanOpened, ScanSource
 from drivers.surface import Contour, ContourSource, SurfaceSection, add_points_between
 from inspection import NominalProfile, Reason, RegistrationError
 
@@ -74,8 +74,11 @@ class StackRecord:
 
         began : when its inspection began; `now` tells when each section did
         """
-        with plan.mesh.file.open("rb") as file:
-            sha256 = hashlib.file_digest(file, "sha256").hexdigest()
+        try:
+            with plan.mesh.file.open("rb") as file:
+                sha256 = hashlib.file_digest(file, "sha256").hexdigest()
+        except OSError as error:
+            raise MeshError(f"{plan.mesh.file}: cannot be read: {error.strerror or error}") from error
         facts = {
             "stack": f"{began:%Y%m%d-%H%M%S}-{sha256[:8]}",
             "sections": sections,
@@ -176,11 +179,17 @@ def measure_section(
     clock: Callable[[], float],
     stop: threading.Event,
 ) -> RunOutcome:
-    """Send the outline of one section through the pipeline. With a doubt about the outline no verdict is proven."""
+    """Send the outline of one section through the pipeline. With a doubt about the outline no verdict is proven.
+
+    Raises MeshError where the outline cannot be read, which is no fault of the outline: the system has no thread to give.
+    """
     live = inspection_of(plan, profile, provisional=False)
     sinks = [recorder] if recorder else []
     watch = recorder.check if recorder else lambda: None
-    return run_inspection(source, live, sinks, started, buffer_points=plan.buffer_points, clock=clock, stop=stop, watch=watch, doubt=doubt)
+    run = run_inspection(source, live, sinks, started, buffer_points=plan.buffer_points, clock=clock, stop=stop, watch=watch, doubt=doubt)
+    if run.failure is not None:
+        raise MeshError(f"{started.device}: a section cannot be inspected: {run.failure}")
+    return run
 
 
 def refuse_section(count: int, refusal: RegistrationError, started: RunStarted, recorder: Recorder | None, now_s: float) -> RunOutcome:

@@ -96,7 +96,7 @@ def _run_command() -> int | str | None:
     except StoreError as error:
         code = fail_as_asked(error, NO_RECORD)
     except OSError as error:
-        code = fail(str(error) if error.filename else f"the answer could not be written: {error}", UNUSABLE)
+        code = fail(_words_of(error), UNUSABLE)
         _silence_stdout()
     except MemoryError:
         code = fail("this computer has too little memory left for it; close other programs, or take fewer points at once", UNUSABLE)
@@ -125,6 +125,14 @@ def _prepare_streams() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")
+
+
+def _words_of(error: OSError) -> str:
+    """What the system refused. Where it names no file, a pipe is always the answer's; anything else may be a file's, too."""
+    if error.filename:
+        return str(error)
+    what = "the answer could not be written" if isinstance(error, BrokenPipeError) else "the answer or a file could not be written or read"
+    return f"{what}: {error}"
 
 
 def _silence_stdout() -> None:

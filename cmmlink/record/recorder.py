@@ -65,7 +65,11 @@ class RunInputs:
         except ValueError as error:
             raise PlanError(f"device: {error}") from None
         plan = plan.model_copy(update={"device": device})
-        return cls(plan.effective_yaml(), plan.nominal.file.name, plan.nominal.file.read_bytes(), software(), stack)
+        try:
+            nominal = plan.nominal.file.read_bytes()
+        except OSError as error:
+            raise PlanError(f"{plan.nominal.file}: cannot be read: {error.strerror or error}") from error
+        return cls(plan.effective_yaml(), plan.nominal.file.name, nominal, software(), stack)
 
 
 @dataclass(frozen=True, slots=True)

@@ -83,11 +83,13 @@ def replay_run(
     profile = recorded_profile(changed, recorded)
     stop = stop or threading.Event()
     decoder = _decoder_of(plan.device, recorded, decoder_of)
-    source = Capture(_arrivals(store, recorded, decoder, stop), decoder, _failure(recorded))
+    reading = _Reading(_arrivals(store, recorded, decoder, stop))
+    source = Capture(reading, decoder, _failure(recorded))
     started = RunStarted.from_header(recorded.header)
     live = inspection_of(changed, profile, scratch_in(store.path.parent))
     doubt = _doubt_of(recorded)
     outcome = run_inspection(source, live, sinks, started, buffer_points=plan.buffer_points, clock=clock, stop=stop, doubt=doubt)
+    reading.raise_failure(recorded.run, outcome)
     replayed = result_json(outcome.result, outcome.counts)
     identical = None
     if recorded.end is not None and recorded.end["result_sha256"]:
@@ -96,6 +98,30 @@ def replay_run(
     differs = _differences(recorded.result, replayed) if not identical else ()
     notes = (*started.notes, *density_notes(density_of(stations_of(outcome.result), profile.length_mm), profile.length_mm))
     return Replay(outcome, profile, replayed, changes, differs, identical, notes)
+
+
+class _Reading:
+    """The arrivals of a record, and what kept them from being read: that is no failure of the recorded scan."""
+
+    def __init__(self, arrivals: Iterator[Arrival]) -> None:
+        self._arrivals = arrivals
+        self._has_begun = False
+        self._failure: StoreError | None = None
+
+    def __iter__(self) -> Iterator[Arrival]:
+        self._has_begun = True
+        try:
+            yield from self._arrivals
+        except StoreError as error:
+            self._failure = error
+            raise
+
+    def raise_failure(self, run: str, outcome: RunOutcome) -> None:
+        """Raise StoreError where not all of the record was read."""
+        if self._failure is not None:
+            raise self._failure
+        if outcome.failure is not None and not self._has_begun:
+            raise StoreError(f"run {run} cannot be evaluated again: {outcome.failure}")
 
 
 def recorded_plan(recorded: RecordedRun) -> Plan:
@@ -131,7 +157,10 @@ def recorded_profile(plan: Plan, recorded: RecordedRun) -> NominalProfile:
     """Discretise the nominal from its recorded file; the one that the plan names may have changed since, or be gone."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / f"nominal-{plain_name(recorded.header['nominal'])}"
-        file.write_bytes(recorded.nominal)
+        try:
+            file.write_bytes(recorded.nominal)
+        except OSError as error:
+            raise StoreError(f"{folder}: the nominal cannot be written there: {error.strerror or error}; free some space") from error
         return profile_of(plan.model_copy(update={"nominal": plan.nominal.model_copy(update={"file": file})}))
 
 

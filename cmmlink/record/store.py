@@ -37,6 +37,7 @@ MIGRATIONS: tuple[str, ...] = (
 )
 """Scripts from one version of the schema to the next. A migration adds tables, columns and indices; it never changes a record."""
 
+_OF_THE_SYSTEM = (sqlite3.SQLITE_IOERR, sqlite3.SQLITE_FULL, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_PERM, sqlite3.SQLITE_BUSY)
 _COLUMNS = "number, run, kind, time_s, count, body, crc32, sha256"
 _PATIENCE_S = 5.0  # for another connection's transaction
 
@@ -149,6 +150,8 @@ class Store:
             if found is None and run is None:
                 found = self._unsound_file(number)
         except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
+            if getattr(error, "sqlite_errorcode", 0) & 0xFF in _OF_THE_SYSTEM:  # says nothing about what is in the file
+                raise StoreError(f"{self.path}: {_reason(error, self.path)}") from error
             return Alteration(0, "", "", f"cannot be read: the file is damaged ({error})"), 0, b""
         return found, stopped - first, last
 
@@ -276,7 +279,7 @@ def has_records(folder: Path) -> bool:
         raise StoreError(f"{folder / FILE_NAME}: cannot be opened: {error}; choose another folder with --records DIR") from None
 
 
-def _reason(error: sqlite3.Error, path: Path) -> str:
+def _reason(error: Exception, path: Path) -> str:
     code = getattr(error, "sqlite_errorcode", 0) & 0xFF
     if code in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR):
         mend = "free some space" if code == sqlite3.SQLITE_FULL else "look whether the disk is sound"

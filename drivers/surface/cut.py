@@ -8,7 +8,7 @@ by a tiny offset, and the slice says so.
 
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import dist
@@ -83,12 +83,21 @@ def _work_ahead(
 ) -> Iterator[SurfaceSection]:
     """Yield the results in order. `workers` threads compute them, as numpy releases the interpreter; at most twice as many wait."""
     with ThreadPoolExecutor(workers, thread_name_prefix="cut") as pool:
-        waiting = deque(pool.submit(work, batch) for batch in batches[: 2 * workers])
+        waiting = deque(_submitted(pool, work, batch) for batch in batches[: 2 * workers])
         for batch in [*batches[2 * workers :], None]:
             for _ in range(1 if batch else len(waiting)):
                 yield from waiting.popleft().result()
             if batch:
-                waiting.append(pool.submit(work, batch))
+                waiting.append(_submitted(pool, work, batch))
+
+
+def _submitted(
+    pool: ThreadPoolExecutor, work: Callable[[tuple[int, int]], list[SurfaceSection]], batch: tuple[int, int]
+) -> Future[list[SurfaceSection]]:
+    try:
+        return pool.submit(work, batch)
+    except RuntimeError as error:
+        raise MeshError(f"the surface cannot be cut: {error}; close other programs") from error
 
 
 class NumpyCutter:

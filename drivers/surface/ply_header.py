@@ -49,8 +49,11 @@ def readable(path: Path, header: bytes) -> Iterator[Path]:
         return
     with TemporaryDirectory(prefix="cmmlink-") as folder:
         copy = Path(folder) / "surface.ply"
-        with path.open("rb") as source, copy.open("wb") as target:
-            source.seek(len(header))
-            target.write(plain)
-            shutil.copyfileobj(source, target)
+        try:
+            with path.open("rb") as source, copy.open("wb") as target:
+                source.seek(len(header))
+                target.write(plain)
+                shutil.copyfileobj(source, target)
+        except OSError as error:
+            raise MeshError(f"{path}: cannot be read, or copied to {folder} ({error.strerror or error})") from error
         yield copy

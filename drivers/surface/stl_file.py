@@ -67,6 +67,13 @@ def read_stl(path: Path, scale: float = 1.0) -> SurfaceMesh:
     Raises `MeshError` for a file that is empty, truncated, no STL, or holds numbers that cannot be a part in mm.
     """
     checked_scale(scale)
+    try:
+        return _read(path, scale)
+    except OSError as error:
+        raise MeshError(_words_of_unreadable(path, error)) from error
+
+
+def _read(path: Path, scale: float) -> SurfaceMesh:
     size, start = _size_and_start(path)
     head = start[:HEADER_BYTES]
     if size == 0:
@@ -114,14 +121,11 @@ def _words_of_unreadable(path: Path, error: OSError) -> str:
 
 
 def _size_and_start(path: Path) -> tuple[int, bytes]:
-    try:
-        refuse_endless(path)
-        with path.open("rb") as file:
-            size = file.seek(0, 2)
-            file.seek(0)
-            return size, file.read(_START_BYTES)
-    except OSError as error:
-        raise MeshError(_words_of_unreadable(path, error)) from error
+    refuse_endless(path)
+    with path.open("rb") as file:
+        size = file.seek(0, 2)
+        file.seek(0)
+        return size, file.read(_START_BYTES)
 
 
 def rounding_note(mesh: SurfaceMesh, scale: float) -> tuple[str, ...]:

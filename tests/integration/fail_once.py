@@ -34,6 +34,7 @@ from tests.integration.counter_parties import CounterParty, LineScanner, PortSca
 from tests.integration.failing_calls import NOT_OURS, Faults, failing, intercepted, take
 
 LONGEST_RUN_S = 300.0
+FALSE = ("the answer could not be written", "is damaged", "altered", "is none of")  # of no call that fails
 FEWEST = 300  # points of a whole scan
 OF_TIDYING = ("unlink", "rmdir", "scandir", "lstat")  # where one of these fails, a temporary file may stay
 
@@ -167,7 +168,7 @@ def attempt(command: Command, faults: Faults, records: Path, *, again: bool = Tr
                 ended = Ended(1, "", traceback.format_exc())
         faulthandler.cancel_dump_traceback_later()
         wrong = [*_said_wrongly(command, ended, faults), *_kept_wrongly(folder / "records", records, faults)]
-        if faults.failed not in OF_TIDYING:
+        if faults.failed not in OF_TIDYING and "shutil.py" not in faults.place:
             wrong += [f"left behind: {path.name}" for path in scratch.iterdir()]
         wrong += [f"thread left: {name}" for name in _others() - threads]
         wrong += [f"left open: {path}" for path in _descriptors() - descriptors]
@@ -234,7 +235,7 @@ def _said_wrongly(command: Command, ended: Ended, faults: Faults) -> Iterator[st
     if ended.code not in (0, 3):
         if not ended.err.startswith("cmmlink: "):
             yield f"no message: {ended.err!r}"
-        if not any(words in ended.err for words in _words_of(faults.error)) or "the answer could not be written" in ended.err:
+        if not any(words in ended.err for words in _words_of(faults.error)) or any(words in ended.err for words in FALSE):
             yield f"a false cause: {ended.err!r}"
     if f"{os.sep}records" in str(getattr(faults.error, "filename", "")) and ended.code not in (0, RECORD):
         yield f"the folder of the records failed, yet it ends with {ended.code}: {ended.err}"

@@ -176,6 +176,12 @@ class FailingRaw(io.FileIO):
         self._was_read = True
         return int(NOW.call("file read", no_answer_of_the_disk, super().readinto, buffer))
 
+    def readall(self) -> bytes:
+        if self._was_read:
+            return super().readall()
+        self._was_read = True
+        return bytes(NOW.call("file read", no_answer_of_the_disk, super().readall))
+
     def close(self) -> None:
         is_first, written = not self.closed, not self.closed and self.writable()
         super().close()

@@ -31,7 +31,7 @@ def test_an_answer_that_cannot_be_written_is_not_taken_for_nonconform_and_loses_
     with open("/dev/full", "w", encoding="utf-8") as full:
         ended = subprocess.run(inspection(nominal, tmp_path / "a"), cwd=ROOT, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     assert ended.returncode == 2
-    assert ended.stderr.splitlines()[-1].startswith("cmmlink: the answer could not be written: ")
+    assert ended.stderr.splitlines()[-1].startswith("cmmlink: the answer or a file could not be written or read: ")
     assert "Traceback" not in ended.stderr
     reading, writing = os.pipe()
     os.close(reading)  # a pipe that nobody reads
