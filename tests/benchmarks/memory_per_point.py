@@ -2,6 +2,7 @@
 file of as many points that is inspected, each in a process of its own.
 
     python -m tests.benchmarks.memory_per_point 1e6 4e6 1.6e7 3.6e7
+    python -m tests.benchmarks.memory_per_point 3.6e7 inspect
 
 A source gives batches of 1,000 points of a profile with form, noise and rows that are rejected, without a wire, as fast as they are
 taken and not faster. Memory is what the process holds for itself (RssAnon of /proc/self/status, sampled every 20 ms, less what it held
@@ -248,14 +249,15 @@ def measure(step: str, points: int, folder: Path) -> list[dict[str, object]]:
     ]
 
 
-def main(numbers: list[str]) -> None:
-    """Print a table with a row for every number of points and every step."""
+def main(words: list[str]) -> None:
+    """Print a table with a row for every number of points and every step, or those steps that the words name."""
+    steps = [word for word in words if word in STEPS] or STEPS
     print(machine("numpy", "numba"))
     print("| points | step | own memory, MB | bytes a point | files mapped, MB | largest resident set, MB | seconds | |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- |")
-    for points in (int(float(number)) for number in numbers):
+    for points in (int(float(word)) for word in words if word not in STEPS):
         with tempfile.TemporaryDirectory() as folder:
-            for step in STEPS:
+            for step in steps:
                 told = subprocess.run(
                     [sys.executable, "-m", __spec__.name, "--step", step, str(points), folder], check=True, capture_output=True, text=True
                 )
