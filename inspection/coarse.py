@@ -94,7 +94,8 @@ def contour_of(points: Cloud, nominal: NominalProfile) -> Contour:
 
     def near() -> Iterator[Array]:
         for block in points.blocks():
-            yield block[np.abs(block - middle).max(axis=1) <= most]
+            off_x, off_y = np.abs(block - middle).T
+            yield block[(off_x <= most) & (off_y <= most)]
 
     if sum(len(block) for block in near()) >= FEWEST_POINTS:
         contour = trace_contour(near, nominal.length_mm / (_SIGNATURE_STEPS * _CELLS_A_STEP))

@@ -14,6 +14,8 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 from scipy.spatial import Delaunay, QhullError
 
+from inspection.cloud import corners_of
+
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
@@ -77,7 +79,7 @@ def _edges(means: Array) -> Rows:
 
 def _cell_means(blocks: Callable[[], Iterable[Array]], step_mm: float) -> Array:
     """The mean of the points in every cell that has any, in the order of the cells."""
-    corners = [(block.min(axis=0), block.max(axis=0)) for block in blocks() if len(block)]
+    corners = [corners_of(block) for block in blocks() if len(block)]
     low = np.min([corner for corner, _ in corners], axis=0)
     across = int(np.floor((np.max([corner for _, corner in corners], axis=0) - low) / step_mm)[1]) + 1
     keys, sums = (
