@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.path import Path
+from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
 from cmmlink.report.heading import draw_heading, fix_labels, heading_of, save_picture
@@ -50,24 +51,46 @@ _LOOKS = (
 )
 
 
+class ProfilePictures:
+    """Draws pictures one after the other on one figure, whose axes with their numbers are made once: they take as long as the rest."""
+
+    def __init__(self) -> None:
+        self._figure = Figure(figsize=(12, 8), dpi=110)
+        self._profile, self._strip = self._figure.subplots(2, 1, gridspec_kw=_PLACES)
+        self._foot = self._figure.text(0.99, 0.01, "", ha="right", va="bottom", fontsize=9, parse_math=False)
+        for axes in (self._profile, self._strip):
+            fix_labels(axes)
+
+    def write(
+        self, result: InspectionResult, nominal: NominalProfile, title: str, path: pathlib.Path, ending: str = "complete", said: str = ""
+    ) -> None:
+        """Draw the profile and the strip of deviations to a PNG file.
+
+        ending : how the run ended
+        said   : what stands small at the foot, like which run it was and when it was measured
+        """
+        telling = _telling(result, nominal)
+        for axes, draw in ((self._profile, _draw_profile), (self._strip, _draw_strip)):
+            _wipe(axes)
+            draw(axes, result, nominal, telling)
+        draw_heading(self._figure, headline_on_picture(result, title, ending))
+        self._foot.set_text(said)
+        save_picture(self._figure, path)
+
+
 def write_picture(
     result: InspectionResult, nominal: NominalProfile, title: str, path: pathlib.Path, ending: str = "complete", said: str = ""
 ) -> None:
-    """Draw the profile and the strip of deviations to a PNG file.
+    """Draw one picture: see `ProfilePictures.write`."""
+    ProfilePictures().write(result, nominal, title, path, ending, said)
 
-    ending : how the run ended
-    said   : what stands small at the foot, like which run it was and when it was measured
-    """
-    figure = Figure(figsize=(12, 8), dpi=110)
-    profile, strip = figure.subplots(2, 1, gridspec_kw=_PLACES)
-    telling = _telling(result, nominal)
-    _draw_profile(profile, result, nominal, telling)
-    _draw_strip(strip, result, nominal, telling)
-    for axes in (profile, strip):
-        fix_labels(axes)
-    draw_heading(figure, headline_on_picture(result, title, ending))
-    figure.text(0.99, 0.01, said, ha="right", va="bottom", fontsize=9, parse_math=False)
-    save_picture(figure, path)
+
+def _wipe(axes: Axes) -> None:
+    """Take everything that was drawn off the axes, and forget how far it reached."""
+    for artist in (*axes.lines, *axes.collections, *axes.patches, *axes.texts):
+        artist.remove()
+    axes.dataLim.set(Bbox.null())
+    axes.ignore_existing_data_limits = True
 
 
 def headline_on_picture(result: InspectionResult, title: str, ending: str) -> str:

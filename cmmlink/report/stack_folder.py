@@ -49,9 +49,10 @@ def write_stack(
     on_section: Callable[[], None] = lambda: None,
 ) -> None:
     """Write result.json, sections.csv, stack.png and for each section its deviations, contours and picture."""
-    from cmmlink.report.picture import write_picture  # noqa: PLC0415 - matplotlib takes half a second that other commands need not pay
+    from cmmlink.report.picture import ProfilePictures  # noqa: PLC0415 - matplotlib takes half a second that other commands need not pay
     from cmmlink.report.stack_picture import write_stack_picture  # noqa: PLC0415
 
+    drawn = ProfilePictures()
     try:
         with new_files(folder, make_room) as files:
             files("result.json").write_text(json.dumps(stack.result_json(), indent=2) + "\n", encoding="utf-8")
@@ -64,7 +65,7 @@ def write_stack(
                     write_deviations(result.blocks(), files(f"{own}/deviations.csv"), section.run.ending)
                     if pictures:
                         heading = f"{title}, height {section.slice.height_mm:g} mm"
-                        write_picture(result, section.profile, heading, files(f"{own}/profile.png"), section.run.ending)
+                        drawn.write(result, section.profile, heading, files(f"{own}/profile.png"), section.run.ending)
                 on_section()
             if pictures:
                 write_stack_picture(stack, zone, title, files("stack.png"))

@@ -8,7 +8,7 @@ import pytest
 from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 
-from cmmlink.report.picture import headline_on_picture, magnification, names_of_limits, side_of_label, write_picture
+from cmmlink.report.picture import ProfilePictures, headline_on_picture, magnification, names_of_limits, side_of_label, write_picture
 from inspection import NominalProfile, ToleranceZone
 from tests.cmmlink.judged_oval import bumped, inspect_oval
 
@@ -70,3 +70,12 @@ def test_the_picture_of_an_aborted_run_says_so(profile: NominalProfile) -> None:
     result = inspect_oval(profile, bumped())
     assert headline_on_picture(result, "oval", "complete").endswith("NOT CONFORM")
     assert headline_on_picture(result, "oval", "aborted") == f"oval    ABORTED AT {math.floor(100 * result.coverage)} %"
+
+
+def test_pictures_on_one_figure_are_those_on_a_new_one_each(profile: NominalProfile, tmp_path: Path) -> None:
+    pictures, results = ProfilePictures(), [inspect_oval(profile, bumped()), inspect_oval(profile, 0.065), inspect_oval(profile, 3 * bumped())]
+    for number, result in enumerate((*results, results[0])):
+        said = f"run {number}" if number % 2 else ""
+        pictures.write(result, profile, f"part {number}", tmp_path / "one.png", "complete", said)
+        write_picture(result, profile, f"part {number}", tmp_path / "new.png", "complete", said)
+        np.testing.assert_array_equal(imread(tmp_path / "one.png"), imread(tmp_path / "new.png"))
