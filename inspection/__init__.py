@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from inspection.curve import NurbsCurve
     from inspection.curve_check import CurveCheck, Hollow, check_curve
     from inspection.errors import InspectionError, NominalError, NotMeasured, RegistrationError
+    from inspection.filters import FilteredProfile, FilterOrder, ProfileFilter, filter_profile
     from inspection.fine import register, register_fine
     from inspection.gaps import Gap, coverage, default_gap_max_mm
     from inspection.judged_rows import JudgedRows
@@ -39,6 +40,7 @@ else:
         "inspection.curve": ("NurbsCurve",),
         "inspection.curve_check": ("CurveCheck", "Hollow", "check_curve"),
         "inspection.errors": ("InspectionError", "NominalError", "NotMeasured", "RegistrationError"),
+        "inspection.filters": ("FilteredProfile", "FilterOrder", "ProfileFilter", "filter_profile"),
         "inspection.fine": ("register", "register_fine"),
         "inspection.gaps": ("Gap", "coverage", "default_gap_max_mm"),
         "inspection.judged_rows": ("JudgedRows",),
@@ -75,6 +77,8 @@ __all__ = [
     "Crossing",
     "CurveCheck",
     "Deviations",
+    "FilterOrder",
+    "FilteredProfile",
     "FitName",
     "Gap",
     "Hollow",
@@ -95,6 +99,7 @@ __all__ = [
     "PlacementSearch",
     "Prefix",
     "PrefixSearch",
+    "ProfileFilter",
     "Reason",
     "Registration",
     "RegistrationError",
@@ -114,6 +119,7 @@ __all__ = [
     "default_gap_max_mm",
     "deviations",
     "discretize",
+    "filter_profile",
     "find_crossings",
     "fit_minimum_zone",
     "profile_error_mm",
