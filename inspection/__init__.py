@@ -14,9 +14,11 @@ if TYPE_CHECKING:
     from inspection.errors import InspectionError, NominalError, NotMeasured, RegistrationError
     from inspection.filters import FilteredProfile, FilterOrder, ProfileFilter, filter_profile
     from inspection.fine import register, register_fine
+    from inspection.freedoms import FreedomName, Freedoms
     from inspection.gaps import Gap, coverage, default_gap_max_mm
     from inspection.judged_rows import JudgedRows
     from inspection.kernels import Room, compiled_code_folder, while_compiling
+    from inspection.limited_fit import LimitedFit, register_within
     from inspection.live import LiveInspection, LiveUpdate, State, rehearse
     from inspection.methods import FitName, Material, Method, RuleName, WeightName
     from inspection.minimum_zone import MinimumZone, fit_minimum_zone
@@ -42,9 +44,11 @@ else:
         "inspection.errors": ("InspectionError", "NominalError", "NotMeasured", "RegistrationError"),
         "inspection.filters": ("FilteredProfile", "FilterOrder", "ProfileFilter", "filter_profile"),
         "inspection.fine": ("register", "register_fine"),
+        "inspection.freedoms": ("FreedomName", "Freedoms"),
         "inspection.gaps": ("Gap", "coverage", "default_gap_max_mm"),
         "inspection.judged_rows": ("JudgedRows",),
         "inspection.kernels": ("Room", "compiled_code_folder", "while_compiling"),
+        "inspection.limited_fit": ("LimitedFit", "register_within"),
         "inspection.live": ("LiveInspection", "LiveUpdate", "State", "rehearse"),
         "inspection.methods": ("FitName", "Material", "Method", "RuleName", "WeightName"),
         "inspection.minimum_zone": ("MinimumZone", "fit_minimum_zone"),
@@ -80,11 +84,14 @@ __all__ = [
     "FilterOrder",
     "FilteredProfile",
     "FitName",
+    "FreedomName",
+    "Freedoms",
     "Gap",
     "Hollow",
     "InspectionError",
     "InspectionResult",
     "JudgedRows",
+    "LimitedFit",
     "LiveInspection",
     "LiveUpdate",
     "Material",
@@ -127,6 +134,7 @@ __all__ = [
     "register",
     "register_coarse",
     "register_fine",
+    "register_within",
     "rehearse",
     "synthetic",
     "telling_rows",

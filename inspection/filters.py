@@ -194,7 +194,7 @@ class _Smoother:
         first = np.floor(at / step).astype(np.int64) - 1
         if not self._stretch.circular:
             first = np.clip(first, 0, count - 3)  # no value is worked out beyond an end
-        grid = self._regress(station, heavy, deviation, np.arange(-1, count + 3) * step)
+        grid = self._regress(station, heavy, deviation, np.arange(-1, count + 3, dtype=np.float64) * step)
         t = at / step - first
         four = [grid[first + 1 + i] for i in range(4)]
         parts = (-(t - 1) * (t - 2) * (t - 3) / 6, t * (t - 2) * (t - 3) / 2, -t * (t - 1) * (t - 3) / 2, t * (t - 1) * (t - 2) / 6)
@@ -255,9 +255,11 @@ def _weighted_median(values: Array, weights: Array) -> float:
 def _put_together(station: Array, heavy: Array, deviation: Array, step: float, count: int) -> tuple[Array, Array, Array]:
     """The points between two nodes of an even grid put together to one: its place and deviation are their weighted means."""
     node = np.minimum((station / step).astype(np.int64), count - 1)
-    total = np.bincount(node, heavy, count)
+    total = np.asarray(np.bincount(node, heavy, count), dtype=np.float64)
     filled = np.flatnonzero(total > 0)
-    means = [np.bincount(node, heavy * values, count)[filled] / total[filled] for values in (station, deviation)]
+    means = [
+        np.asarray(np.bincount(node, heavy * values, count)[filled] / total[filled], dtype=np.float64) for values in (station, deviation)
+    ]
     return means[0], total[filled], means[1]
 
 

@@ -1,60 +1,16 @@
 """Proofs over every placement: reference parts, minimum zones known from elsewhere, parts that can pass, and open profiles."""
 
-from functools import cache
-
 import numpy as np
 import pytest
 
-from inspection import NominalProfile, NurbsCurve, RigidTransform, discretize, fit_minimum_zone
+from inspection import RigidTransform, discretize, fit_minimum_zone
 from inspection.placements import PlacementSearch
 from tests.inspection import profiles
-from tests.inspection.profiles import AIRFOILS, Array
+from tests.inspection.profiles import Array
+from tests.inspection.reference_parts import middles, nominal_of, reference_form, scan, stations
 
 # Half minimum zones of the reference scans, found by independent branch and bound in long double (500 points, form as in `reference_form`).
 HALF_ZONES_MM = {"goe404": 0.036958537, "mh42": 0.037013398, "naca65410": 0.035523921}
-
-
-@cache
-def nominal_of(name: str) -> NominalProfile:
-    points = np.loadtxt(AIRFOILS / f"{name}.dat", skiprows=1) * 100.0
-    return discretize(NurbsCurve.interpolate(points, closed=True) if name == "closed" else airfoil(points), samples=3000)
-
-
-def airfoil(points: Array) -> NurbsCurve:
-    """The profile as the command line reads it: a cubic through the points, joined to itself."""
-    from cmmlink.nominal_files.through_points import through_points
-
-    return through_points(points, np.arange(1, len(points) + 1), True, "uiuc-selig", ()).curve
-
-
-def scan(name: str, count: int, form: Array, turned_deg: float, shift: tuple[float, float]) -> Array:
-    """Points at the middles of `count` equal shares of the length, moved by `form` along the outward normal, then turned and shifted."""
-    nominal = nominal_of(name)
-    curve = nominal.curve
-    u = profiles.even_in_arc_length(curve, 2 * count + 1)[1::2] if not curve.closed else middles(curve, count)
-    normal = nominal.outward * profiles.left_normal(curve, u)
-    return RigidTransform(np.radians(turned_deg), np.array(shift)).apply(curve.point(u) + form[:, None] * normal)
-
-
-def middles(curve: NurbsCurve, count: int) -> Array:
-    """Parameters at the middles of equal shares of the length, by Newton steps on the arc length."""
-    wanted = (np.arange(count) + 0.5) / count * curve.length_mm
-    u = np.linspace(*curve.domain, 20_001)
-    station = curve.station_mm(u)
-    station[-1] = curve.length_mm
-    u = np.interp(wanted, station, u)
-    for _ in range(4):
-        u = u - (curve.station_mm(u) - wanted) / np.hypot(*curve.derivatives(u, 1)[1].T)
-    return np.asarray(u)
-
-
-def stations(name: str, count: int) -> Array:
-    return (np.arange(count) + 0.5) / count * nominal_of(name).curve.length_mm
-
-
-def reference_form(name: str, count: int) -> Array:
-    s = 2 * np.pi * stations(name, count) / nominal_of(name).curve.length_mm
-    return 0.02 * np.sin(2 * s + 0.4) + 0.015 * np.cos(5 * s) + 0.01 * np.sin(13 * s + 1)
 
 
 def dented(name: str) -> Array:
