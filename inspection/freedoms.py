@@ -56,7 +56,7 @@ class Freedoms:
         """
         pivot, bounds = np.array(pivot_mm, dtype=np.float64), dict(limits or {})
         if pivot.shape != (2,) or not np.isfinite(pivot).all():
-            raise ValueError(f"the pivot must be a point (x, y) in mm, not {pivot_mm}")
+            raise ValueError(f"the pivot must be a point (x, y) in mm, not {pivot_mm!r}")
         if not set(free) <= set(ALL) or len(set(free)) < len(free) or not set(bounds) <= set(free):
             raise ValueError(f"freedoms are x, y and rotation, each once, and only free ones have limits; got {free} and {sorted(bounds)}")
         for name, (low, high) in bounds.items():
@@ -65,8 +65,9 @@ class Freedoms:
         names = tuple(name for name in ALL if name in free)
         c, s = np.cos(x_axis_rad), np.sin(x_axis_rad)
         unit = {"x": (c, s, 0.0), "y": (-s, c, 0.0), "rotation": (0.0, 0.0, 1.0)}
-        low, high = (np.array([bounds.get(name, (-np.inf, np.inf))[side] for name in names], dtype=np.float64) for side in (0, 1))
-        return cls(pivot, names, np.array([unit[name] for name in names], dtype=np.float64).reshape(-1, 3), low, high)
+        limited = np.array([bounds.get(name, (-np.inf, np.inf)) for name in names], dtype=np.float64).reshape(-1, 2)
+        directions = np.array([unit[name] for name in names], dtype=np.float64).reshape(-1, 3)
+        return cls(pivot, names, directions, limited[:, 0].copy(), limited[:, 1].copy())
 
     def __len__(self) -> int:
         return len(self.names)

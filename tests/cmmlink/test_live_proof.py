@@ -14,7 +14,8 @@ from cmmlink.pipeline import RunOutcome, run_inspection
 from drivers.source import Arrival, PointBatch, ScanClosed, ScanOpened
 from inspection import LiveInspection, Prefix, PrefixSearch, ToleranceZone, Verdict
 from tests.inspection.live_scans import ZONE, LiveScan, live_scan
-from tests.inspection.test_placements import dented, nominal_of
+from tests.inspection.reference_parts import nominal_of
+from tests.inspection.test_placements import dented
 
 PATIENCE_S = 60.0
 

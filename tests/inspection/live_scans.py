@@ -8,7 +8,7 @@ import numpy as np
 from inspection import InspectionResult, LiveInspection, LiveUpdate, NominalProfile, ToleranceZone
 from inspection.methods import FitName
 from tests.inspection.profiles import Array
-from tests.inspection.test_placements import nominal_of, scan, stations
+from tests.inspection.reference_parts import nominal_of, scan, stations
 
 Kind = Literal["good", "noise only", "dent", "step", "late form", "dense side"]
 KINDS: tuple[Kind, ...] = get_args(Kind)

@@ -1,5 +1,6 @@
 """Fits with locked and limited freedoms: printed values of an independent program, and limits held against locks."""
 
+from functools import cache
 from typing import get_args
 
 import numpy as np
@@ -27,6 +28,7 @@ PRINTED: list[tuple[tuple[FreedomName, ...], float, tuple[float, ...], float, fl
 ]
 
 
+@cache
 def part() -> Array:
     """The reference part of 500 points, a little turned about the pivot and shifted."""
     points = scan("goe404", 500, reference_form("goe404", 500), 0, (0, 0))

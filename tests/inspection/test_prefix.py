@@ -14,7 +14,8 @@ from inspection.telling_points import telling_rows
 from tests.inspection import profiles
 from tests.inspection.live_scans import ZONE, LiveScan, live_scan, proven_at
 from tests.inspection.profiles import Array
-from tests.inspection.test_placements import dented, nominal_of, scan
+from tests.inspection.reference_parts import nominal_of, scan
+from tests.inspection.test_placements import dented
 
 
 @pytest.mark.parametrize("name", ["goe404", "mh42"])
