@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from inspection import synthetic
     from inspection.coarse import register_coarse
     from inspection.conclusion import Missing, Reason, reasons_of_abort
+    from inspection.consumption import ConsumptionFit, fit_least_consumption
     from inspection.curve import NurbsCurve
     from inspection.curve_check import CurveCheck, Hollow, check_curve
     from inspection.errors import InspectionError, NominalError, NotMeasured, RegistrationError
@@ -34,11 +35,13 @@ if TYPE_CHECKING:
     from inspection.telling_points import telling_rows
     from inspection.tolerance import ToleranceZone
     from inspection.verdict import NOT_JUDGED, Rejection, Verdict
+    from inspection.zones import Transition, VaryingZone
 else:
     _PLACES = {
         "inspection.synthetic": ("synthetic",),
         "inspection.coarse": ("register_coarse",),
         "inspection.conclusion": ("Missing", "Reason", "reasons_of_abort"),
+        "inspection.consumption": ("ConsumptionFit", "fit_least_consumption"),
         "inspection.curve": ("NurbsCurve",),
         "inspection.curve_check": ("CurveCheck", "Hollow", "check_curve"),
         "inspection.errors": ("InspectionError", "NominalError", "NotMeasured", "RegistrationError"),
@@ -64,6 +67,7 @@ else:
         "inspection.telling_points": ("telling_rows",),
         "inspection.tolerance": ("ToleranceZone",),
         "inspection.verdict": ("NOT_JUDGED", "Rejection", "Verdict"),
+        "inspection.zones": ("Transition", "VaryingZone"),
     }
 
     def __getattr__(name: str) -> object:
@@ -78,6 +82,7 @@ else:
 
 __all__ = [
     "NOT_JUDGED",
+    "ConsumptionFit",
     "Crossing",
     "CurveCheck",
     "Deviations",
@@ -118,6 +123,8 @@ __all__ = [
     "State",
     "Stretch",
     "ToleranceZone",
+    "Transition",
+    "VaryingZone",
     "Verdict",
     "WeightName",
     "check_curve",
@@ -128,6 +135,7 @@ __all__ = [
     "discretize",
     "filter_profile",
     "find_crossings",
+    "fit_least_consumption",
     "fit_minimum_zone",
     "profile_error_mm",
     "reasons_of_abort",

@@ -72,6 +72,11 @@ class Freedoms:
     def __len__(self) -> int:
         return len(self.names)
 
+    @property
+    def turning(self) -> NDArray[np.bool_]:
+        """Which of the free motions (k,) are rotations."""
+        return np.asarray(self.directions[:, 2] != 0)
+
     def pose(self, start: RigidTransform, amounts: Array) -> RigidTransform:
         """The pose after amounts (k,) of the free motions from the start."""
         x, y, turn = (amounts @ self.directions).tolist()

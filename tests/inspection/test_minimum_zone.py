@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from inspection import MinimumZone, NurbsCurve, RigidTransform, deviations, discretize, fit_minimum_zone, minimum_zone, register
+from inspection import MinimumZone, NurbsCurve, RigidTransform, chebyshev, deviations, discretize, fit_minimum_zone, register
 from tests.inspection import profiles
 from tests.inspection.oracle import closest_point
 from tests.inspection.profiles import Array, curve_of, nominal_of
@@ -164,7 +164,7 @@ def test_points_without_form_error_have_no_zone() -> None:
 def test_few_of_many_points_give_the_zone_of_all(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     points = profiles.rotated(with_form(name, 6000, 4), 30.0, (5.0, -2.0))
     few = fit_minimum_zone(points, nominal_of(name))
-    monkeypatch.setattr(minimum_zone, "MANY", 10_000)
+    monkeypatch.setattr(chebyshev, "MANY", 10_000)
     every = fit_minimum_zone(points, nominal_of(name))
     assert few.converged
     assert few.zone_mm == pytest.approx(every.zone_mm, abs=1e-11)

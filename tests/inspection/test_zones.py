@@ -1,0 +1,62 @@
+"""Zones that vary along the profile: transitions by closed forms, borders, seams, and what contradicts itself."""
+
+import numpy as np
+import pytest
+
+from inspection import Transition, VaryingZone
+
+STATIONS, LOWER, UPPER = np.array([20.0, 60.0]), np.array([-0.02, -0.06]), np.array([0.04, 0.10])
+
+
+def zone(between: Transition = "linear", closed: bool = True, border_mm: float = 0.0) -> VaryingZone:
+    """A profile of 100 mm whose zone is -0.02 .. 0.04 at station 20 and -0.06 .. 0.10 at 60."""
+    return VaryingZone(STATIONS, LOWER, UPPER, 100.0, closed, between, border_mm)
+
+
+def test_limits_run_on_over_the_seam_of_a_closed_profile_and_stay_at_the_ends_of_an_open_one() -> None:
+    at = [20, 30, 60, 90, 0, 100, 10]
+    closed = zone().limits(at)
+    np.testing.assert_allclose(closed.lower_mm, [-0.02, -0.03, -0.06, -0.04, -0.1 / 3, -0.1 / 3, -0.08 / 3], atol=1e-15)
+    np.testing.assert_allclose(closed.upper_mm, [0.04, 0.055, 0.10, 0.07, 0.06, 0.06, 0.05], atol=1e-15)
+    np.testing.assert_allclose(closed.upper_slope[[1, 3, 4]], [0.0015, -0.001, -0.001], atol=1e-15)
+    opened = zone(closed=False).limits(at)
+    np.testing.assert_allclose(opened.lower_mm, [-0.02, -0.03, -0.06, -0.06, -0.02, -0.06, -0.02], atol=1e-15)
+    assert opened.lower_slope[[3, 4, 6]].tolist() == [0, 0, 0]
+
+
+def test_a_smooth_transition_leaves_and_arrives_without_a_slope() -> None:
+    s = np.linspace(20, 60, 4001)
+    limits = zone("smooth").limits(s)
+    np.testing.assert_allclose(limits.upper_mm[[0, 1000, 2000, 4000]], [0.04, 0.04 + 0.06 * 0.15625, 0.07, 0.10], atol=1e-15)
+    np.testing.assert_allclose(np.gradient(limits.lower_mm, s)[1:-1], limits.lower_slope[1:-1], atol=1e-9)
+    assert (limits.upper_slope[0], limits.upper_slope[-1]) == (0.0, 0.0)
+
+
+def test_where_two_zones_meet_the_stricter_limit_holds() -> None:
+    """The lower limit is the stricter before the border, the upper one behind it: both hold on it."""
+    meeting = VaryingZone(np.array([0.0, 40.0, 40.0, 100.0]), np.array([-1, -1, -3, -3]), np.array([5, 5, 2, 2]), 100.0, False)
+    limits = meeting.limits([39.9, 40, 40.1])
+    assert limits.lower_mm.tolist() == [-1, -1, -3]
+    assert limits.upper_mm.tolist() == [5, 2, 2]
+    assert zone("constant").limits([20, 40, 60, 80, 10]).upper_mm.tolist() == [0.04, 0.04, 0.04, 0.10, 0.10]
+    wide = zone("constant", border_mm=0.5).limits([19.4, 19.6, 20.4, 59.4, 60.4, 60.6]).upper_mm
+    assert wide.tolist() == [0.10, 0.04, 0.04, 0.04, 0.04, 0.10]
+    seam = VaryingZone(np.array([0.0, 100.0]), np.array([-1.0, -2.0]), np.array([1.0, 2.0]), 100.0, True)
+    assert seam.limits([0, 100, 50]).upper_mm.tolist() == [1, 1, 1.5]
+
+
+def test_consumption_is_one_at_either_limit_and_zero_in_the_middle() -> None:
+    np.testing.assert_allclose(zone().consumption([0.04, -0.02, 0.01, 0.07, np.nan], [20, 20, 20, 20, 20]), [1, -1, 0, 2, np.nan])
+    assert np.isnan(zone().consumption([0.0], [np.nan])).all()
+    np.testing.assert_allclose(VaryingZone.constant(-0.1, 0.3, 50.0, False).consumption([0.2, 0.3], [0, 50]), [0.5, 1.0], rtol=1e-15)
+
+
+def test_zones_that_contradict_themselves_are_refused() -> None:
+    with pytest.raises(ValueError, match="station 40 mm have no deviation in common"):
+        VaryingZone(np.array([0.0, 40.0, 40.0]), np.array([-1, -1, 2]), np.array([1, 1, 3]), 100.0, False)
+    with pytest.raises(ValueError, match="every lower limit must be below"):
+        VaryingZone(STATIONS, UPPER, LOWER, 100.0, True)
+    with pytest.raises(ValueError, match=r"must rise from 0 to 50 mm at most, got 20 \.\. 60"):
+        VaryingZone(STATIONS, LOWER, UPPER, 50.0, True)
+    with pytest.raises(ValueError, match="one shape"):
+        VaryingZone(STATIONS, LOWER[:1], UPPER, 100.0, True)
