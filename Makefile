@@ -14,10 +14,11 @@ demo: .venv/installed
 install: .venv/all-installed
 
 # A file stays with one process, which so prepares its nominals and its browser once; tests/conftest.py has the order.
-TWO_AT_ONCE := -n 2 --dist loadfile --no-loadscope-reorder
+# Three on two cores: a third of the time a test waits, for a device, a page or a process of its own.
+AT_ONCE := -n 3 --dist loadfile --no-loadscope-reorder
 
 test: checks compiled
-	$(BIN)/pytest $(TWO_AT_ONCE) $(PYTEST_OPTIONS)
+	$(BIN)/pytest $(AT_ONCE) $(PYTEST_OPTIONS)
 	@tests/page/check $(PAGE_OPTIONS)
 
 checks: .venv/test-installed
@@ -36,7 +37,7 @@ LOWEST_PYTHON ?= python3.11
 OF_LIBRARIES := plan nominal_files report record/test_recorder.py commands/test_inspect.py console/test_server.py
 lowest: .venv/lowest/installed
 	.venv/lowest/bin/python -m tests.benchmarks.warm_up
-	.venv/lowest/bin/python -m pytest $(TWO_AT_ONCE) --first-case tests/inspection tests/drivers tests/simulators $(OF_LIBRARIES:%=tests/cmmlink/%) \
+	.venv/lowest/bin/python -m pytest $(AT_ONCE) --first-case tests/inspection tests/drivers tests/simulators $(OF_LIBRARIES:%=tests/cmmlink/%) \
 		--ignore=tests/inspection/kernels/test_compiling.py
 
 # For every system of the README the versions of constraints.txt must exist as wheels.
