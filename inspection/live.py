@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from inspection.cloud import MANY, Cloud
 from inspection.conclusion import Missing
-from inspection.kernels import Room
+from inspection.kernels import Room, compile_projection, fit_compiled_beside
 from inspection.methods import FitName, Method, RuleName, WeightName
 from inspection.nominal import NominalProfile
 from inspection.pose_track import PoseTrack, seek_pose
@@ -266,8 +266,10 @@ def rehearse(nominal: NominalProfile, method: Method = "exact", reject_outliers:
 
     Takes seconds on the first use after an installation, milliseconds from the cache afterwards.
     """
+    with fit_compiled_beside():
+        compile_projection()
     live = LiveInspection(nominal, ToleranceZone(-1.0, 1.0), method=method, reject_outliers=reject_outliers)
-    points = nominal.points_mm[:: max(1, len(nominal) // (4 * BLOCK))]
+    points = nominal.points_mm[:: max(1, len(nominal) // (4 * BLOCK))].copy()  # as a device gives them: of one type to the compiler
     live.add(np.column_stack([points, np.zeros(len(points))]))
     live.add(points)
     live.snapshot()

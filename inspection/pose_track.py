@@ -38,10 +38,10 @@ class PoseTrack:
         self._stations = nominal.station_mm[::_PLACES]
         reach = float(np.hypot(*(self._places - self._centre).T).max())
         self._sums = GrowingSums(self._centre, reach, nominal.length_mm)
-        for block in points.blocks():
+        for block in points.blocks():  # copied, because arrays that cannot be written to are another type to the compiler
             d = deviations(self.pose.apply(block), nominal, tip_radius_mm=terms.tip_radius_mm)
             part = np.where(d.beyond_end, np.int8(NOT_JUDGED), np.int8(0))
-            self._sums.add(d.foot_mm, d.normal, d.deviation_mm - terms.target_mm, d.station_mm, part, follows=True)
+            self._sums.add(d.foot_mm.copy(), d.normal.copy(), d.deviation_mm - terms.target_mm, d.station_mm.copy(), part, follows=True)
         self._ends, self._tangents = _open_ends(nominal)
         self._reserve_mm: float | None = None  # asked for more often than it changes, which is once a block
 

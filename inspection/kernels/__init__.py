@@ -11,7 +11,7 @@ What the rest of the project may call stands here; the files behind it are this 
 TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer to load than all of this
 
 if TYPE_CHECKING:
-    from inspection.kernels.blocks import CurveTables, project
+    from inspection.kernels.blocks import CurveTables, compile_projection, project
     from inspection.kernels.compile_notice import while_compiling
     from inspection.kernels.compiling import compiled_code_folder
     from inspection.kernels.feet import Feet, Marks, Room, turn_outward
@@ -20,10 +20,11 @@ if TYPE_CHECKING:
     from inspection.kernels.on_samples import SampleTables, project_on_samples
     from inspection.kernels.pose import AT_ONCE, NONE_LEFT_OUT, OutlierLimit, PoseEstimate, PoseFit
     from inspection.kernels.rows import JUDGED_AS, TALLY, Columns, Judgement, Places, judge_rows, take_in
+    from inspection.kernels.side_by_side import fit_compiled_beside
     from inspection.kernels.thinning import strides
 else:
     _PLACES = {
-        "inspection.kernels.blocks": ("CurveTables", "project"),
+        "inspection.kernels.blocks": ("CurveTables", "compile_projection", "project"),
         "inspection.kernels.compile_notice": ("while_compiling",),
         "inspection.kernels.compiling": ("compiled_code_folder",),
         "inspection.kernels.feet": ("Feet", "Marks", "Room", "turn_outward"),
@@ -32,6 +33,7 @@ else:
         "inspection.kernels.on_samples": ("SampleTables", "project_on_samples"),
         "inspection.kernels.pose": ("AT_ONCE", "NONE_LEFT_OUT", "OutlierLimit", "PoseEstimate", "PoseFit"),
         "inspection.kernels.rows": ("JUDGED_AS", "TALLY", "Columns", "Judgement", "Places", "judge_rows", "take_in"),
+        "inspection.kernels.side_by_side": ("fit_compiled_beside",),
         "inspection.kernels.thinning": ("strides",),
     }
 
@@ -62,7 +64,9 @@ __all__ = [
     "PoseFit",
     "Room",
     "SampleTables",
+    "compile_projection",
     "compiled_code_folder",
+    "fit_compiled_beside",
     "judge_rows",
     "project",
     "project_on_samples",

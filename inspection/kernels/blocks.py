@@ -132,6 +132,11 @@ def search_code() -> int:
     return code_of(search_curve, *SEARCH)
 
 
+def compile_projection() -> None:
+    """Compile the projection, or load it, without what it calls by its place."""
+    projection_code()
+
+
 @cache
 def projection_code() -> int:
     """Where the code of `project_points` is."""

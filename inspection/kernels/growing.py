@@ -92,7 +92,7 @@ class GrowingSums:
 
     def spread_mm(self, places_mm: Array, normals: Array, scatter: float) -> float:
         """Largest standard deviation of the pose's effect on a deviation at any place, for independent errors of that variance."""
-        return float(_spread(places_mm, normals, scatter, self._frame[0], self._sums))
+        return float(_spread(np.array(places_mm), np.array(normals), scatter, self._frame[0], self._sums))  # copies are of one type
 
 
 @kernel

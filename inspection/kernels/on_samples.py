@@ -93,6 +93,7 @@ _NO_REALS, _NO_INTEGERS = np.empty(0), np.empty(0, dtype=np.int64)
 _NO_REALS.setflags(write=False)
 _NO_INTEGERS.setflags(write=False)
 _NO_TABLES = (_NO_REALS, _NO_INTEGERS, _NO_REALS, _NO_INTEGERS, _NO_REALS, 0)
+NO_PROJECTION = (_NO_TABLES, (0, 0, 0))  # where no point is to be projected
 _SMALL_TURN = 1e-2  # rad; as samples lie densely most turns are smaller, and the next term of the series is below round-off
 
 

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from inspection.kernels.blocks import CurveTables
+from inspection.kernels.blocks import CurveTables, search_code
 from inspection.kernels.compiling import array_at, inlined_kernel, inner_kernel, kernel, stack_reals
 from inspection.kernels.feet import Feet, Marks, Room, empty_feet, flatten
 from inspection.kernels.layout import (
@@ -34,7 +34,7 @@ from inspection.kernels.layout import (
     TANGENTIAL_YY,
 )
 from inspection.kernels.normal_equations import fill_covariance, newton_step
-from inspection.kernels.on_samples import SampleTables, project_by, projection_of
+from inspection.kernels.on_samples import NO_PROJECTION, SampleTables, project_by, projection_of
 
 Array = NDArray[np.float64]
 
@@ -130,6 +130,14 @@ class PoseFit:
         found[:] = False
         _find_outliers(self._problem, self._projection, self._memory, pose, limit, most_steps, found, off)
         return found
+
+
+def compile_fit() -> None:
+    """Compile the search and the fit, or load them, as `PoseFit.settle` takes them. No point is settled, so none is projected."""
+    search_code()
+    none, integers = np.empty(0), np.frombuffer(bytes(4), dtype=np.int32)
+    problem = (none, NONE_LEFT_OUT, none, NO_PROJECTION[0][0], integers, 1.0, 0.0)
+    _settle_pose(problem, NO_PROJECTION, (NONE_LEFT_OUT, NONE_LEFT_OUT, none, empty_feet(1)), np.zeros(6), np.empty((3, 3)), 0)
 
 
 @kernel

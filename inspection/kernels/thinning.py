@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 def strides(points_mm: Array, step_mm: float) -> NDArray[np.int64]:
     """Indices of points (m, 2) at which a walk along them has come at least one step from the point picked before."""
     picked = np.empty(len(points_mm), dtype=np.int64)
-    return picked[: _strides(points_mm, step_mm * step_mm, picked)]
+    return picked[: _strides(np.ascontiguousarray(points_mm), step_mm * step_mm, picked)]
 
 
 @kernel
