@@ -7,6 +7,7 @@ TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer 
 
 if TYPE_CHECKING:
     from inspection import synthetic
+    from inspection.certificate import ZoneCertificate, certify_minimum_zone
     from inspection.coarse import register_coarse
     from inspection.conclusion import Missing, Reason, reasons_of_abort
     from inspection.consumption import ConsumptionFit, fit_least_consumption
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
 else:
     _PLACES = {
         "inspection.synthetic": ("synthetic",),
+        "inspection.certificate": ("ZoneCertificate", "certify_minimum_zone"),
         "inspection.coarse": ("register_coarse",),
         "inspection.conclusion": ("Missing", "Reason", "reasons_of_abort"),
         "inspection.consumption": ("ConsumptionFit", "fit_least_consumption"),
@@ -127,6 +129,8 @@ __all__ = [
     "VaryingZone",
     "Verdict",
     "WeightName",
+    "ZoneCertificate",
+    "certify_minimum_zone",
     "check_curve",
     "compiled_code_folder",
     "coverage",

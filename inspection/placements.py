@@ -43,12 +43,14 @@ class PlacementProof:
     pose      : nominal from section, a placement that passes
     witnesses : points (indices) whose deviations refuted boxes, the most telling first
     boxes     : boxes of motions that were looked at
+    finest_mm : the least by which a refuted box moves the point that refutes it; infinite where none was refuted
     """
 
     outcome: Literal["refuted", "fits", "undecided"]
     pose: RigidTransform | None
     witnesses: tuple[int, ...]
     boxes: int
+    finest_mm: float = np.inf
 
 
 @dataclass(slots=True)
@@ -88,6 +90,7 @@ class PlacementSearch:
         self._ends = np.empty((0, 2)) if nominal.curve.closed else nominal.curve.point(np.array(nominal.curve.domain))
         self._hits: dict[int, int] = {}
         self._passed: RigidTransform | None = None
+        self._finest_mm = np.inf
 
     def look(
         self,
@@ -113,22 +116,51 @@ class PlacementSearch:
             return self._search(points, zone.active.tolist(), most_boxes, is_over)
         return self._search_by_few(points, zone, most_boxes, is_over)
 
+    def look_with(
+        self, points_mm: Array, rows: Rows, most_boxes: int = 400_000, is_over: Callable[[], bool] = lambda: False
+    ) -> tuple[PlacementProof, Rows]:
+        """Search every placement with few of points (m, 2), beginning with `rows` alone, and give the rows (w,) that it needed.
+
+        While a placement suits them, the point that it leaves farthest out joins them. What they refute, any later check can refute
+        with these points and nothing else.
+        """
+        return self._search_with(points_mm, rows, rows, self._worst, most_boxes, is_over)
+
     def _search_by_few(self, points: Array, zone: MinimumZone, most_boxes: int, is_over: Callable[[], bool]) -> PlacementProof:
-        """Search with few points that stand for all: what they refute is refuted, and what fits them is asked of all the others."""
-        rows, pose, boxes = zone.active, zone.nominal_from_section, 0
-        while True:
+        """Search with few points that stand for all."""
+
+        def telling(points: Array, pose: RigidTransform) -> Rows:
             feet = project(pose.apply(points), self._nominal.grid)
             out = self._nominal.outward * feet.distance_mm - self._tip - self._middle
-            worst = int(self._outside(pose.apply(points), np.zeros(len(points))).argmax())
-            rows = np.union1d(rows, np.append(telling_rows(feet.station_mm, out, self._nominal.length_mm), worst))
-            proof = self._search(points[rows], np.flatnonzero(np.isin(rows, zone.active)).tolist(), most_boxes - boxes, is_over)
+            return np.union1d(telling_rows(feet.station_mm, out, self._nominal.length_mm), self._worst(points, pose))
+
+        rows = np.union1d(zone.active, telling(points, zone.nominal_from_section))
+        return self._search_with(points, rows, zone.active, telling, most_boxes, is_over)[0]
+
+    def _search_with(
+        self,
+        points: Array,
+        rows: Rows,
+        active: Rows,
+        joining: Callable[[Array, RigidTransform], Rows],
+        most_boxes: int,
+        is_over: Callable[[], bool],
+    ) -> tuple[PlacementProof, Rows]:
+        """Search with few rows: what they refute is refuted, and what fits them is asked of all the others, some of which join."""
+        boxes = 0
+        while True:
+            proof = self._search(points[rows], np.flatnonzero(np.isin(rows, active)).tolist(), most_boxes - boxes, is_over)
             boxes += proof.boxes
             proof = replace(proof, boxes=boxes, witnesses=tuple(rows[list(proof.witnesses)].tolist()))
             if proof.pose is None or self._excess(points, proof.pose) <= 0:
-                return proof
+                return proof, rows
             if boxes >= most_boxes or is_over():
-                return replace(proof, outcome="undecided", pose=None)
-            pose = proof.pose
+                return replace(proof, outcome="undecided", pose=None), rows
+            rows = np.union1d(rows, joining(points, proof.pose))
+
+    def _worst(self, points: Array, pose: RigidTransform) -> Rows:
+        """The row (1,) of the point that a pose leaves farthest out of the zone."""
+        return np.array([self._outside(pose.apply(points), np.zeros(len(points))).argmax()])
 
     def _search(self, points: Array, active: list[int], most_boxes: int, is_over: Callable[[], bool]) -> PlacementProof:
         """Refute boxes of motions until none is left, best first; `active` are the points that hold the minimum zone nearby."""
@@ -150,7 +182,7 @@ class PlacementSearch:
                     self._passed = _pose(*passing, points[anchor])
                     return PlacementProof("fits", self._passed, self._witnesses(), looked_at)
                 waiting = waiting.joined(_halves(left, float(np.hypot(*arms.T).max())))
-        return PlacementProof("refuted", None, self._witnesses(), looked_at)
+        return PlacementProof("refuted", None, self._witnesses(), looked_at, self._finest_mm)
 
     def _root(self) -> _Boxes:
         """Return the one box that holds every motion which could pass."""
@@ -170,7 +202,10 @@ class PlacementSearch:
             margin, excess = self._margins(boxes, arms[rows])
             wave.excess[alive] = np.maximum(wave.excess[alive], excess.max(axis=1))
             refuted = margin.max(axis=1) > 0
-            for row in rows[margin[refuted].argmax(axis=1)].tolist():
+            by = margin[refuted].argmax(axis=1)
+            moves = excess[refuted, by] - margin[refuted, by]
+            self._finest_mm = min(self._finest_mm, float(moves.min(initial=np.inf)))
+            for row in rows[by].tolist():
                 self._hits[row] += 1
             alive = alive[~refuted]
         return wave.rows(alive)
@@ -186,6 +221,8 @@ class PlacementSearch:
             if excess.max() <= 0:
                 return boxes, (boxes.place[box], float(boxes.angle[box]))
             left[box] = margin.max() <= 0
+            if not left[box]:
+                self._finest_mm = min(self._finest_mm, float((excess - margin)[0, margin.argmax()]))
             self._hits.setdefault(int(excess.argmax()), 1)
             boxes.excess[box] = max(boxes.excess[box], float(excess.max()))
         return boxes.rows(left), None
