@@ -8,6 +8,17 @@ TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer 
 if TYPE_CHECKING:
     from inspection import synthetic
     from inspection.certificate import ZoneCertificate, certify_minimum_zone
+    from inspection.characteristics.actual import ActualSection, draw_actual_section
+    from inspection.characteristics.airfoil import AirfoilValues, ComparedAirfoil, LeftOut, compare_airfoil, evaluate_airfoil
+    from inspection.characteristics.camber import maximum_camber
+    from inspection.characteristics.chord import ChordAngleMethod, ChordMethod, chord, chord_angle
+    from inspection.characteristics.edge_radius import EdgeRadiusMethod, edge_radius
+    from inspection.characteristics.inscribed import CamberLine, InscribedCircles, find_camber_line
+    from inspection.characteristics.outline import AirfoilSection, find_airfoil
+    from inspection.characteristics.placement import displacement, twist_by_chord, twist_by_fit
+    from inspection.characteristics.section_value import ComparedValue, SectionValue, compare_values
+    from inspection.characteristics.stack import StackedSections, StackingAxis, bow, fit_stacking_axis, relative_twist, taper
+    from inspection.characteristics.thickness import ThicknessMethod, edge_thickness, maximum_thickness
     from inspection.coarse import register_coarse
     from inspection.conclusion import Missing, Reason, reasons_of_abort
     from inspection.consumption import ConsumptionFit, fit_least_consumption
@@ -41,6 +52,17 @@ else:
     _PLACES = {
         "inspection.synthetic": ("synthetic",),
         "inspection.certificate": ("ZoneCertificate", "certify_minimum_zone"),
+        "inspection.characteristics.actual": ("ActualSection", "draw_actual_section"),
+        "inspection.characteristics.airfoil": ("AirfoilValues", "ComparedAirfoil", "LeftOut", "compare_airfoil", "evaluate_airfoil"),
+        "inspection.characteristics.camber": ("maximum_camber",),
+        "inspection.characteristics.chord": ("ChordAngleMethod", "ChordMethod", "chord", "chord_angle"),
+        "inspection.characteristics.edge_radius": ("EdgeRadiusMethod", "edge_radius"),
+        "inspection.characteristics.inscribed": ("CamberLine", "InscribedCircles", "find_camber_line"),
+        "inspection.characteristics.outline": ("AirfoilSection", "find_airfoil"),
+        "inspection.characteristics.placement": ("displacement", "twist_by_chord", "twist_by_fit"),
+        "inspection.characteristics.section_value": ("ComparedValue", "SectionValue", "compare_values"),
+        "inspection.characteristics.stack": ("StackedSections", "StackingAxis", "bow", "fit_stacking_axis", "relative_twist", "taper"),
+        "inspection.characteristics.thickness": ("ThicknessMethod", "edge_thickness", "maximum_thickness"),
         "inspection.coarse": ("register_coarse",),
         "inspection.conclusion": ("Missing", "Reason", "reasons_of_abort"),
         "inspection.consumption": ("ConsumptionFit", "fit_least_consumption"),
@@ -84,10 +106,19 @@ else:
 
 __all__ = [
     "NOT_JUDGED",
+    "ActualSection",
+    "AirfoilSection",
+    "AirfoilValues",
+    "CamberLine",
+    "ChordAngleMethod",
+    "ChordMethod",
+    "ComparedAirfoil",
+    "ComparedValue",
     "ConsumptionFit",
     "Crossing",
     "CurveCheck",
     "Deviations",
+    "EdgeRadiusMethod",
     "FilterOrder",
     "FilteredProfile",
     "FitName",
@@ -95,9 +126,11 @@ __all__ = [
     "Freedoms",
     "Gap",
     "Hollow",
+    "InscribedCircles",
     "InspectionError",
     "InspectionResult",
     "JudgedRows",
+    "LeftOut",
     "LimitedFit",
     "LiveInspection",
     "LiveUpdate",
@@ -122,25 +155,44 @@ __all__ = [
     "Room",
     "RuleName",
     "SectionPlane",
+    "SectionValue",
+    "StackedSections",
+    "StackingAxis",
     "State",
     "Stretch",
+    "ThicknessMethod",
     "ToleranceZone",
     "Transition",
     "VaryingZone",
     "Verdict",
     "WeightName",
     "ZoneCertificate",
+    "bow",
     "certify_minimum_zone",
     "check_curve",
+    "chord",
+    "chord_angle",
+    "compare_airfoil",
+    "compare_values",
     "compiled_code_folder",
     "coverage",
     "default_gap_max_mm",
     "deviations",
     "discretize",
+    "displacement",
+    "draw_actual_section",
+    "edge_radius",
+    "edge_thickness",
+    "evaluate_airfoil",
     "filter_profile",
+    "find_airfoil",
+    "find_camber_line",
     "find_crossings",
     "fit_least_consumption",
     "fit_minimum_zone",
+    "fit_stacking_axis",
+    "maximum_camber",
+    "maximum_thickness",
     "profile_error_mm",
     "reasons_of_abort",
     "register",
@@ -148,7 +200,11 @@ __all__ = [
     "register_fine",
     "register_within",
     "rehearse",
+    "relative_twist",
     "synthetic",
+    "taper",
     "telling_rows",
+    "twist_by_chord",
+    "twist_by_fit",
     "while_compiling",
 ]

@@ -1,0 +1,209 @@
+"""The actual section: the nominal outline moved along its normals by measured deviations, as one smooth curve.
+
+Characteristics such as a radius or a camber line need a curve with a curvature, and points with noise have none. The deviations
+are therefore drawn as a cubic spline over the station first, by least squares with arc-length weights (so that dwelling does not pull
+it), with knots at a stated distance. The actual place at station s is foot(s) + D(s) normal(s). What the spline leaves of the
+deviations stands beside it, and so do the stretches without a measured point: no value is given that was found in one.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline, make_interp_spline
+from scipy.sparse import csr_array, diags_array
+from scipy.sparse.linalg import spsolve
+
+from inspection.characteristics.outline import AirfoilSection, find_airfoil, section_on
+from inspection.characteristics.section_value import SectionValue
+from inspection.curve import NurbsCurve
+from inspection.errors import InspectionError
+from inspection.signed_deviations import Deviations
+
+Array = NDArray[np.float64]
+Source = Literal["raw", "filtered"]
+
+_DEGREE = 3
+_KNOTS = 200  # on the outline, unless their distance is given
+_GAP_KNOTS = 2.0  # a stretch without points that is longer than this many knot distances is drawn by no point
+_BRIDGING = 1e-10  # weight of smoothness beside that of the points; it acts where there are none
+_CLOSEST = 0.2  # of the steps beside it: over a step shorter than this, round-off would bend the spline
+_ON_OUTLINE = 1e-4  # of the section's length: a place nearer to the outline than this lies on it
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ActualSection:
+    """A measured airfoil section as a smooth curve, beside the nominal one.
+
+    section   : the actual outline; its parameter is the station on the nominal one
+    nominal   : the nominal outline
+    source    : whether raw or filtered deviations were drawn
+    knots_mm  : distance of the knots of the spline of deviations
+    points    : number of measured points that it was drawn from
+    rms_mm    : root mean square of what the spline leaves of the deviations, weighted by arc length
+    unseen_mm : (k, 2) stretches of stations without a measured point, from and to; a station beyond the nominal's length wraps
+    is_unseen : (n,) which samples of the outline lie in one
+    notes     : all this in words
+    """
+
+    section: AirfoilSection
+    nominal: AirfoilSection
+    source: Source
+    knots_mm: float
+    points: int
+    rms_mm: float
+    unseen_mm: Array
+    is_unseen: NDArray[np.bool_]
+    notes: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        self.unseen_mm.setflags(write=False)
+        self.is_unseen.setflags(write=False)
+
+    def unseen_place(self, value: SectionValue) -> str | None:
+        """The name of a place of a value that lies where nothing was measured; None where there is none."""
+        if not self.is_unseen.any():
+            return None
+        outline = self.section.points_mm
+        for place, name in zip(value.places_mm, value.place_names, strict=True):
+            distance = np.hypot(*(outline - place).T)
+            near = int(np.argmin(distance))
+            if self.is_unseen[near] and distance[near] < max(_ON_OUTLINE * self.section.length_mm, self._spacing(near)):
+                return name
+        return None
+
+    def _spacing(self, sample: int) -> float:
+        """Distance of a sample from its farther neighbour."""
+        points = self.section.points_mm
+        beside = points[[max(sample - 1, 0), min(sample + 1, len(points) - 1)]]
+        return float(np.hypot(*(beside - points[sample]).T).max())
+
+
+def draw_actual_section(
+    nominal: AirfoilSection,
+    deviations: Deviations,
+    filtered_mm: Array | None = None,
+    knots_mm: float | None = None,
+    gap_max_mm: float | None = None,
+) -> ActualSection:
+    """The actual section of m points with their deviations from the nominal's curve.
+
+    deviations  : of the points at the pose of the fit or datum; points beyond an end and those whose foot is a corner are left out
+    filtered_mm : (m,) filtered deviations in place of the raw ones, NaN where the filter gives none
+    knots_mm    : distance of the spline's knots; a two-hundredth of the outline unless given. Finer detail is not drawn
+    gap_max_mm  : a stretch without points longer than this is unseen; two knot distances unless given
+
+    Raises InspectionError where fewer than eight points are left.
+    """
+    values = deviations.deviation_mm if filtered_mm is None else np.asarray(filtered_mm, dtype=np.float64)
+    if values.shape != deviations.deviation_mm.shape:
+        raise ValueError(f"expected {len(deviations)} filtered deviations, got shape {values.shape}")
+    start, end = _station_range(nominal)
+    station = _unwrap(nominal, deviations.station_mm, start)
+    used = ~deviations.beyond_end & ~deviations.at_vertex & np.isfinite(values) & (station <= end)
+    station, values = station[used], values[used]
+    if len(station) < 8:
+        raise InspectionError(f"only {len(station)} points lie on the sides of the section: too few to draw it")
+    order = np.lexsort((values, station))
+    station, values = station[order], values[order]
+    spacing = (end - start) / _KNOTS if knots_mm is None else float(knots_mm)
+    if not 0 < spacing < (end - start) / 4:
+        raise ValueError(f"the distance of knots must be positive and below a quarter of the outline, not {spacing:g} mm")
+    spline, rms = _draw_deviations(nominal, station, values, (start, end), spacing)
+    unseen = _find_unseen(station, (start, end), _GAP_KNOTS * spacing if gap_max_mm is None else gap_max_mm, nominal.trailing == "round")
+    section = _move_outline(nominal, spline, start)
+    at = section.parameter if nominal.trailing != "round" else start + (section.parameter - start) % (end - start)
+    is_unseen = np.any((at[:, None] > unseen[:, 0]) & (at[:, None] < unseen[:, 1]), axis=1)
+    source: Source = "raw" if filtered_mm is None else "filtered"
+    drawn = f"drawn from {len(station)} {source} deviations as a cubic spline with knots every {spacing:.4g} mm"
+    gaps = tuple(f"nothing was measured from station {a:.3f} to {b:.3f} mm" for a, b in unseen)
+    notes = (f"{drawn}, which leaves {rms:.3g} mm rms", *gaps)
+    return ActualSection(section, nominal, source, spacing, len(station), rms, unseen, is_unseen, notes)
+
+
+def _station_range(nominal: AirfoilSection) -> tuple[float, float]:
+    """Stations of both ends of the outline in mm, rising through the seam of a closed curve."""
+    start = float(nominal.curve.station_mm(nominal.first)[0])
+    if nominal.trailing == "round":
+        return start, start + nominal.curve.length_mm
+    end = float(nominal.curve.station_mm(nominal.last)[0])
+    return start, end if end > start else end + nominal.curve.length_mm
+
+
+def _unwrap(nominal: AirfoilSection, station_mm: Array, start: float) -> Array:
+    """Stations (m,) at or above that of the outline's beginning."""
+    return np.where(station_mm < start, station_mm + nominal.curve.length_mm, station_mm) if nominal.curve.closed else station_mm
+
+
+def _stations(nominal: AirfoilSection, u: Array, start: float) -> Array:
+    """Stations (n,) of rising parameters (n,) of the outline, rising through the seam."""
+    found = _unwrap(nominal, nominal.curve.station_mm(u), start)
+    if nominal.curve.closed and found[-1] < found[-2]:  # the end of a full turn has the station of its beginning
+        found[-1] += nominal.curve.length_mm
+    return found
+
+
+def _draw_deviations(
+    nominal: AirfoilSection, station: Array, values: Array, ends: tuple[float, float], spacing: float
+) -> tuple[BSpline, float]:
+    """The spline of least squares over rising stations (m,), and the weighted root mean square of what it leaves."""
+    start, end = ends
+    count = max(4, round((end - start) / spacing))
+    step = (end - start) / count
+    knots = start + step * np.arange(-_DEGREE, count + _DEGREE + 1)
+    basis = csr_array(BSpline.design_matrix(np.clip(station, start, np.nextafter(end, start)), knots, _DEGREE))
+    is_round = nominal.trailing == "round"
+    columns = count if is_round else count + _DEGREE
+    fold = csr_array((np.ones(count + _DEGREE), (np.arange(count + _DEGREE), np.arange(count + _DEGREE) % columns)))
+    basis = csr_array(basis @ fold)
+    weight = _arc_shares(station, ends, is_round)
+    bend = diags_array([1.0, -2.0, 1.0], offsets=[0, 1, 2], shape=(count + _DEGREE - 2, count + _DEGREE)) @ fold
+    normal_matrix = basis.T @ (basis * weight[:, None]) + _BRIDGING * weight.sum() / columns * (bend.T @ bend)
+    coefficients = spsolve(normal_matrix.tocsc(), basis.T @ (weight * values))
+    rest = values - basis @ coefficients
+    rms = float(np.sqrt((weight * rest * rest).sum() / weight.sum()))
+    return BSpline(knots, np.asarray(fold @ coefficients), _DEGREE), rms
+
+
+def _arc_shares(station: Array, ends: tuple[float, float], is_round: bool) -> Array:
+    """The length of outline (m,) that each of rising stations (m,) stands for: half the way to both neighbours."""
+    before, behind = (station[-1] - (ends[1] - ends[0]), station[0] + (ends[1] - ends[0])) if is_round else (station[0], station[-1])
+    steps = np.diff(np.concatenate([[before], station, [behind]]))
+    shares = (steps[:-1] + steps[1:]) / 2
+    return np.asarray(np.maximum(shares, 1e-9 * shares.max()))
+
+
+def _find_unseen(station: Array, ends: tuple[float, float], gap_max_mm: float, is_round: bool) -> Array:
+    """Stretches (k, 2) of stations without a point that are longer than `gap_max_mm`."""
+    borders = np.concatenate([station[-1:] - (ends[1] - ends[0]), station]) if is_round else np.concatenate([ends[:1], station, ends[1:]])
+    wide = np.flatnonzero(np.diff(borders) > gap_max_mm)
+    stretches = np.column_stack([borders[wide], borders[wide + 1]])
+    if is_round and len(stretches) and stretches[0, 0] < ends[0]:  # around the tip: once before its end, and once behind its beginning
+        stretches = np.vstack([stretches, stretches[0] + (ends[1] - ends[0])])
+    return stretches
+
+
+def _move_outline(nominal: AirfoilSection, spline: BSpline, start: float) -> AirfoilSection:
+    """The section whose outline is the nominal one moved along its normals by the spline of deviations over stations."""
+    u = _without_close_pairs(nominal.parameter)
+    u = np.sort(np.concatenate([u, (u[1:] + u[:-1]) / 2]))
+    station = _stations(nominal, u, start)  # a spline over the station does not feel how the nominal is parametrised
+    point, _, _, inward = nominal.frame(u)
+    moved = point + (nominal.outward * nominal.inward * spline(station))[:, None] * inward
+    if nominal.trailing == "round":
+        moved[-1] = moved[0]
+        drawn = make_interp_spline(station, moved, k=_DEGREE, bc_type="periodic")
+        curve = NurbsCurve(_DEGREE, drawn.c, drawn.t, closed=True)
+        return find_airfoil(curve, nominal.points_mm[nominal.nose_sample])
+    drawn = make_interp_spline(station, moved, k=_DEGREE)
+    return section_on(NurbsCurve(_DEGREE, drawn.c, drawn.t), float(station[0]), float(station[-1]), nominal.trailing, nominal.outward)
+
+
+def _without_close_pairs(u: Array) -> Array:
+    """Rising parameters (n,) without those that lie much nearer to the one before than their neighbours do to each other."""
+    step = np.diff(u)
+    beside = np.maximum(np.append(step[1:], 0.0), np.concatenate([[0.0], step[:-1]]))
+    keep = np.concatenate([[True], step >= _CLOSEST * beside])
+    keep[-1] = True
+    return np.asarray(u[keep])

@@ -1,0 +1,221 @@
+"""An airfoil section: its outline from the trailing edge over the leading edge back to the trailing edge, and its two sides.
+
+The leading edge is the place of largest curvature in the front of the section, the trailing edge is where the outline is open,
+has a corner, or ends in a flat between two corners. On an outline that is smooth all around, the two edges are its tips, and the
+leading one is the blunter: the one with the smaller curvature (the convention of PC-DMIS Blade, "Nominal File Keywords").
+"""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from inspection.characteristics.zoom import find_maximum
+from inspection.curve import NurbsCurve
+from inspection.errors import NominalError
+from inspection.nominal import NominalProfile
+
+Array = NDArray[np.float64]
+TrailingEdge = Literal["open", "sharp", "blunt", "round"]
+Edge = Literal["leading", "trailing"]
+Side = Literal["upper", "lower"]
+
+_SAMPLES = 1200
+_FRONT = 0.1  # of the section's length: how far from the foremost place its nose may lie
+_WIDEST_GAP = 0.2  # of the section's length: an outline that is open wider than this has lost a part, and is no section
+_SCOUT = 2000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AirfoilSection:
+    """The outline of an airfoil section, seen as one way from trailing edge to trailing edge.
+
+    curve         : the curve that it lies on
+    first, last   : parameters of its two ends at the trailing edge; `last` may lie beyond the domain of a closed curve, which wraps
+    nose          : parameter of the largest curvature in the front: the leading edge, between the two sides
+    trailing      : "open" where the curve has two ends, "sharp" at a corner, "blunt" at a flat between two corners, "round" on a
+                    smooth outline, whose tip is then at `first` and at `last`
+    upper_first   : the side from `first` to `nose` is the upper one. The upper side is on the left of who looks from the leading
+                    to the trailing edge: it lies above in the usual drawing, with the leading edge on the left
+    inward        : 1 where the inside lies on the left of the curve, else -1
+    outward       : 1 where out of material is on the left of the curve, else -1; the material of a bare curve lies inside
+    parameter     : (n,) rising from first to last, dense where the outline turns
+    points_mm     : (n, 2)
+    normal        : (n, 2) unit vectors into the section
+    nose_sample   : the number of the sample at the nose
+    length_mm     : largest distance of two samples, the size of the section
+    """
+
+    curve: NurbsCurve
+    first: float
+    last: float
+    nose: float
+    trailing: TrailingEdge
+    upper_first: bool
+    inward: float
+    outward: float
+    parameter: Array = field(repr=False)
+    points_mm: Array = field(repr=False)
+    normal: Array = field(repr=False)
+    nose_sample: int
+    length_mm: float
+
+    def __post_init__(self) -> None:
+        for array in (self.parameter, self.points_mm, self.normal):
+            array.setflags(write=False)
+
+    def point(self, u: ArrayLike) -> Array:
+        """Points (m, 2) at the parameters u (m,)."""
+        return self.curve.point(np.clip(u, self.first, self.last))
+
+    def frame(self, u: Array) -> tuple[Array, Array, Array, Array]:
+        """Point (m, 2), derivative by u (m, 2), second derivative (m, 2) and unit normal into the section (m, 2)."""
+        point, first, second = self.curve.derivatives(np.clip(u, self.first, self.last), 2)
+        unit = first / np.hypot(first[:, 0], first[:, 1])[:, None]
+        return point, first, second, self.inward * np.column_stack([-unit[:, 1], unit[:, 0]])
+
+    def neighbourhood(self, sample: int) -> tuple[float, float]:
+        """The parameters of the samples before and after one of them, so far as there are any."""
+        return float(self.parameter[max(sample - 1, 0)]), float(self.parameter[min(sample + 1, len(self.parameter) - 1)])
+
+    def side_of(self, u: float) -> Side:
+        """The side that a parameter lies on."""
+        return "upper" if (u < self.nose) == self.upper_first else "lower"
+
+    def sides(self) -> dict[Side, tuple[float, float]]:
+        """First and last parameter of each side; one ends at the nose, and the other begins there."""
+        one, other = (self.first, self.nose), (self.nose, self.last)
+        return {"upper": one, "lower": other} if self.upper_first else {"upper": other, "lower": one}
+
+    def ends_mm(self) -> Array:
+        """The two ends (2, 2) of the outline at the trailing edge; they are one place where it is sharp or round."""
+        return self.curve.point(np.array([self.first, self.last]))
+
+    def support(self, direction: Array) -> float:
+        """The parameter at which the outline reaches farthest in a direction (2,)."""
+        best = int(np.argmax(self.points_mm @ direction))
+        return find_maximum(lambda u: self.point(u) @ direction, *self.neighbourhood(best))
+
+
+def find_airfoil(nominal: NurbsCurve | NominalProfile, leading_near_mm: ArrayLike | None = None) -> AirfoilSection:
+    """The edges and sides of the airfoil section that a curve or nominal profile draws.
+
+    leading_near_mm : (2,) a place nearer to the leading edge than to the trailing one, for a smooth outline whose blunter tip is
+                      not the leading one. Elsewhere the trailing edge is where the outline is open or has its corners.
+
+    Raises NominalError where the outline is no airfoil section: open wider than a fifth of its length, or with corners that are
+    not those of a trailing edge.
+    """
+    curve = nominal.curve if isinstance(nominal, NominalProfile) else nominal
+    first, last, trailing = _outline_range(curve, None if leading_near_mm is None else np.asarray(leading_near_mm, dtype=np.float64))
+    return section_on(curve, first, last, trailing, nominal.outward if isinstance(nominal, NominalProfile) else None)
+
+
+def section_on(curve: NurbsCurve, first: float, last: float, trailing: TrailingEdge, outward: float | None = None) -> AirfoilSection:
+    """The section whose outline runs from parameter `first` to `last` of a curve; `outward` None: the material lies inside."""
+    u = dense_parameters(curve, first, last)
+    points = curve.point(u)
+    ends = points[[0, -1]]
+    tail = ends.mean(axis=0)
+    tip = points[int(np.argmax(np.hypot(*(points - tail).T)))]
+    length = float(np.hypot(*(tip - tail)))
+    gap = float(np.hypot(*(ends[1] - ends[0])))
+    if gap > _WIDEST_GAP * length:
+        what = f"its two corners lie {gap:.4g} mm apart" if curve.closed else f"it is open {gap:.4g} mm wide"
+        raise NominalError(
+            f"this outline is no airfoil section: {what}, and it is {length:.4g} mm long; "
+            f"corners and openings are taken at a trailing edge only, up to {_WIDEST_GAP:.0%} of the length"
+        )
+    nose = _largest_curvature(curve, u, np.hypot(*(points - tip).T) < _FRONT * length)
+    u = np.unique(np.concatenate([u, [nose]]))
+    points, tangent = curve.derivatives(u, 1)
+    tangent = tangent / np.hypot(*tangent.T)[:, None]
+    inward = 1.0 if _area(points) > 0 else -1.0
+    return AirfoilSection(
+        curve=curve,
+        first=first,
+        last=last,
+        nose=nose,
+        trailing=trailing,
+        upper_first=inward > 0,  # anticlockwise from the trailing edge: the first side lies on the left of who looks at the trailing edge
+        inward=inward,
+        outward=-inward if outward is None else float(outward),
+        parameter=u,
+        points_mm=points,
+        normal=inward * np.column_stack([-tangent[:, 1], tangent[:, 0]]),
+        nose_sample=int(np.searchsorted(u, nose)),
+        length_mm=length,
+    )
+
+
+def _outline_range(curve: NurbsCurve, leading_near: Array | None) -> tuple[float, float, TrailingEdge]:
+    """First and last parameter of the outline, and what its trailing edge is."""
+    start, end = curve.domain
+    if not curve.closed:
+        return start, end, "open"
+    period = end - start
+    corners = curve.corners
+    if not corners.size:
+        return *_round_range(curve, leading_near), "round"
+    if len(corners) == 1:
+        return float(corners[0]), float(_just_before(corners[0] + period)), "sharp"
+    if len(corners) == 2:
+        lengths = np.diff(curve.station_mm(corners))[0]
+        flat_first = lengths <= curve.length_mm / 2  # the flat is the short way from corner to corner
+        first, last = (corners[1], corners[0] + period) if flat_first else (corners[0], corners[1])
+        return float(first), float(_just_before(last)), "blunt"
+    raise NominalError(f"the outline has {len(corners)} corners: an airfoil section has at most two, at its trailing edge")
+
+
+def _just_before(u: float) -> float:
+    """The parameter before a corner at which the curve still has the tangent from before it."""
+    return float(np.nextafter(u, -np.inf))
+
+
+def _round_range(curve: NurbsCurve, leading_near: Array | None) -> tuple[float, float]:
+    """The range of a smooth closed outline from its trailing tip once around: the tips are the curvature maxima at its far ends."""
+    start, end = curve.domain
+    u = dense_parameters(curve, start, end)[:-1]
+    points = curve.point(u)
+    one = int(np.argmax(np.hypot(*(points - points[0]).T)))
+    for _ in range(3):  # the farthest of the farthest settles at once on the two ends of the section
+        other = one
+        one = int(np.argmax(np.hypot(*(points - points[other]).T)))
+    length = float(np.hypot(*(points[one] - points[other])))
+    tips = [_largest_curvature(curve, u, np.hypot(*(points - points[k]).T) < _FRONT * length) for k in (one, other)]
+    place, curvature = curve.point(tips), np.abs(curve.curvature(np.array(tips)))
+    if leading_near is not None:
+        trailing = int(np.argmax(np.hypot(*(place - leading_near).T)))
+    elif abs(curvature[0] - curvature[1]) > 1e-6 * curvature.max():
+        trailing = int(np.argmax(curvature))
+    else:  # two equal tips, as of an ellipse: the trailing one has the larger x, or above it the larger y
+        trailing = int(np.argmax(place[:, 0] if abs(np.ptp(place[:, 0])) > 1e-6 * length else place[:, 1]))
+    return tips[trailing], tips[trailing] + end - start
+
+
+def dense_parameters(curve: NurbsCurve, first: float, last: float) -> Array:
+    """Parameters (n,) from first to last, spread evenly over the arc length and the turning of the tangent, half each."""
+    u = np.linspace(first, last, _SCOUT)
+    tangent = curve.derivatives(u, 1)[1]
+    heading = np.unwrap(np.arctan2(tangent[:, 1], tangent[:, 0]))
+    travelled = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(curve.point(u), axis=0).T))])
+    turned = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(heading)))])
+    measure = travelled / travelled[-1] + (turned / turned[-1] if turned[-1] > 0 else 0.0)
+    dense = np.interp(np.linspace(0.0, measure[-1], _SAMPLES), measure, u)
+    dense[[0, -1]] = first, last
+    return np.asarray(dense)
+
+
+def _largest_curvature(curve: NurbsCurve, u: Array, allowed: NDArray[np.bool_]) -> float:
+    """The parameter of the largest curvature, in either sense, among the samples u (n,) that are allowed."""
+    size = np.where(allowed, np.abs(curve.curvature(u)), -1.0)
+    best = int(np.argmax(size))
+    low, high = u[max(best - 1, 0)], u[min(best + 1, len(u) - 1)]
+    return find_maximum(lambda at: np.abs(curve.curvature(at)), float(low), float(high))
+
+
+def _area(points: Array) -> float:
+    """Signed area of the polygon of points (n, 2), positive when they run anticlockwise."""
+    x, y = points[:, 0] - points[0, 0], points[:, 1] - points[0, 1]
+    return float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2)
