@@ -127,13 +127,25 @@ def _poles(
 
 
 def _farthest_per_site(site: NDArray[np.int64], radius: Array, chosen: NDArray[np.bool_], n: int) -> NDArray[np.int64]:
-    """Row of the largest radius among the chosen rows of each site (n,); -1 where a site has none."""
+    """Row of the largest radius among the chosen rows of each site (n,), the first of equal ones; -1 where a site has none.
+
+    site : rises from row to row
+    """
     rows = np.flatnonzero(chosen)
-    rows = rows[np.lexsort((-radius[rows], site[rows]))]
-    sites, first = np.unique(site[rows], return_index=True)
+    largest = np.full(n, -1.0)
+    starts = _first_rows(site[rows])
+    if len(starts):
+        largest[site[rows[starts]]] = np.maximum.reduceat(radius[rows], starts)
+    rows = rows[radius[rows] == largest[site[rows]]]
+    rows = rows[_first_rows(site[rows])]
     result = np.full(n, -1)
-    result[sites] = rows[first]
+    result[site[rows]] = rows
     return result
+
+
+def _first_rows(site: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The first row of each site among rows (k,) in which it rises."""
+    return np.flatnonzero(np.diff(site, prepend=-1))
 
 
 def _angle_deg(a: Array, b: Array) -> Array:
