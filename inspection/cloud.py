@@ -61,6 +61,11 @@ class Cloud:
             return np.concatenate([np.empty((0, 2)), *self.blocks()]) if len(self.left_out) else self.points_mm
         return few_of(self.blocks(), self.count, most)
 
+    def about(self, most: int) -> Array:
+        """At most so many of the points (k, 2), in their order, from all stretches of the rows; no more rows are looked at."""
+        rows = even_choice(len(self.points_mm), most)
+        return self.points_mm[rows[self.left_out[rows] == 0] if len(self.left_out) else rows]
+
     def corners(self) -> Array:
         """The lowest and the highest x and y (2, 2)."""
         low, high = np.full(2, np.inf), np.full(2, -np.inf)

@@ -34,6 +34,11 @@ _ICP_TOLERANCE = 1e-6  # relative change of the mean square; the paper states no
 _OUTLIER_MADS = 6.0  # median absolute deviations beyond which Tukey's weight is zero and a point an outlier
 _ROBUST_STEPS = 40
 _SETTLED_WEIGHTS_MM = 1e-6
+_FEWEST, _THINNED = 400, 25  # a pose is settled first on so many points, or on one in so many
+_WORTH_THINNING = 20  # where there are so many times as many
+_HELD = 1 << 20  # points for whose deviations there is memory
+_STEPS_OF_FEW = 6  # they settle quadratically, or not where all points would
+_DETERMINED = 0.25  # variance of where the few put any point, as a share of that of their deviations
 _WEIGHINGS = 2  # the weights follow from the pose, and the pose from them: after the second time they stay within rounding
 _SCOUTS = 400  # points of the walk along the contour that rank coarse poses
 _CLOSE_RMS = 3.0  # poses within this factor of the best rms are compared on all points: the trimmed score of 400 points can miss an edge
@@ -140,17 +145,52 @@ def register_fine(
         raise ValueError(f"scheme must be gauss-newton or icp, not {scheme!r}")
     aimed_mm, outliers = tip_radius_mm + target_mm, no_outliers(len(points))
     if robust:
-        limit = OutlierLimit(_OUTLIER_MADS, float(gross_mm), _SETTLED_WEIGHTS_MM)
-        outliers = _pose_fit(points, nominal, method, aimed_mm, MANY).find_outliers(_pose_numbers(pose), limit, _ROBUST_STEPS)
+        outliers = _find_outliers(points, nominal, method, aimed_mm, _pose_numbers(pose), gross_mm)
         points = points.without(outliers)
     fit = _pose_fit(points, nominal, method, aimed_mm)
-    found = fit.settle(_pose_numbers(pose), _MOST_STEPS)
+    found = _settle(points, fit, _fit_to_few(points, nominal, method, aimed_mm), _pose_numbers(pose))
     if weights == "arc-length":
         for _ in range(_WEIGHINGS):
             _weigh_by_arc_length(fit, points, found, nominal)
-            again = fit.settle(found.pose, _MOST_STEPS)
+            again = fit.settle_nearby(found.pose) or fit.settle(found.pose, _MOST_STEPS)
             found = again._replace(steps=found.steps + again.steps)
     return _registration(found, found.steps, found.settled, outliers)
+
+
+def _settle(points: Cloud, fit: PoseFit, few: PoseFit | None, pose: tuple[float, float, float]) -> PoseEstimate:
+    """The least mean square of all points: first of a few, then by passes over all from there.
+
+    Where the few do not settle at once, or do not say where they belong, every step is made over all points from the start.
+    """
+    near = few.settle(pose, _STEPS_OF_FEW) if few else None
+    if near and near.settled and _is_determined(near, fit):
+        found = fit.settle_nearby(near.pose)
+        if found:
+            return found._replace(steps=near.steps + found.steps)
+    return fit.settle(pose, _MOST_STEPS)
+
+
+def _is_determined(near: PoseEstimate, fit: PoseFit) -> bool:
+    """Whether the pose that points were fitted to is known better than each of their deviations: that of a circle is not."""
+    x, y, turn = np.diag(near.covariance).tolist()
+    return bool(x + y + turn * fit.reach_mm**2 <= _DETERMINED * near.mean_square)
+
+
+def _find_outliers(
+    points: Cloud, nominal: NominalProfile, method: Method, aimed_mm: float, pose: tuple[float, float, float], gross_mm: float
+) -> NDArray[np.bool_]:
+    """Which of the points (m,) are gross outliers."""
+    limit = OutlierLimit(_OUTLIER_MADS, float(gross_mm), _SETTLED_WEIGHTS_MM)
+    few, fit = _fit_to_few(points, nominal, method, aimed_mm), _pose_fit(points, nominal, method, aimed_mm, MANY)
+    near = few.find_outliers(pose, limit, _ROBUST_STEPS) if few and len(points) <= _HELD else None
+    found = fit.find_outliers_nearby(near, limit) if near and near.settled else None
+    return (found or fit.find_outliers(pose, limit, _ROBUST_STEPS)).found
+
+
+def _fit_to_few(points: Cloud, nominal: NominalProfile, method: Method, aimed_mm: float) -> PoseFit | None:
+    """A fit to one point of every stretch of a scan, None where there are too few points for that to be quicker."""
+    few = max(_FEWEST, len(points) // _THINNED)
+    return _pose_fit(Cloud(points.about(few)), nominal, method, aimed_mm) if len(points) >= _WORTH_THINNING * few else None
 
 
 def _weigh_by_arc_length(fit: PoseFit, points: Cloud, found: PoseEstimate, nominal: NominalProfile) -> None:

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from inspection.kernels.growing import GrowingSums
     from inspection.kernels.layout import SAMPLE_METHODS
     from inspection.kernels.on_samples import SampleTables, project_on_samples
-    from inspection.kernels.pose import AT_ONCE, NONE_LEFT_OUT, OutlierLimit, PoseEstimate, PoseFit
+    from inspection.kernels.pose import NONE_LEFT_OUT, OutlierLimit, PoseEstimate, PoseFit
+    from inspection.kernels.pose_sums import AT_ONCE
     from inspection.kernels.rows import JUDGED_AS, TALLY, Columns, Judgement, Places, judge_rows, take_in
     from inspection.kernels.side_by_side import fit_compiled_beside
     from inspection.kernels.thinning import strides
@@ -31,7 +32,8 @@ else:
         "inspection.kernels.growing": ("GrowingSums",),
         "inspection.kernels.layout": ("SAMPLE_METHODS",),
         "inspection.kernels.on_samples": ("SampleTables", "project_on_samples"),
-        "inspection.kernels.pose": ("AT_ONCE", "NONE_LEFT_OUT", "OutlierLimit", "PoseEstimate", "PoseFit"),
+        "inspection.kernels.pose": ("NONE_LEFT_OUT", "OutlierLimit", "PoseEstimate", "PoseFit"),
+        "inspection.kernels.pose_sums": ("AT_ONCE",),
         "inspection.kernels.rows": ("JUDGED_AS", "TALLY", "Columns", "Judgement", "Places", "judge_rows", "take_in"),
         "inspection.kernels.side_by_side": ("fit_compiled_beside",),
         "inspection.kernels.thinning": ("strides",),

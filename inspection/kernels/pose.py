@@ -1,51 +1,36 @@
 """The fine registration: Gauss-Newton on the pose of points, and their outliers by Tukey's weights."""
 
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inspection.kernels.blocks import CurveTables, search_code
-from inspection.kernels.compiling import array_at, inlined_kernel, inner_kernel, kernel, stack_reals
-from inspection.kernels.feet import Feet, Marks, Room, empty_feet, flatten
-from inspection.kernels.layout import (
-    BENDING_TT,
-    BENDING_XT,
-    BENDING_XX,
-    BENDING_XY,
-    BENDING_YT,
-    BENDING_YY,
-    BLOCK,
-    CORNER,
-    COUNT,
-    OPEN_END,
-    REALS,
-    SLOPE_TURN,
-    SLOPE_X,
-    SLOPE_Y,
-    SQUARE,
-    SQUARE_BEFORE,
-    SUMS,
-    TANGENTIAL_TT,
-    TANGENTIAL_XT,
-    TANGENTIAL_XX,
-    TANGENTIAL_XY,
-    TANGENTIAL_YT,
-    TANGENTIAL_YY,
-)
+from inspection.kernels.compiling import inner_kernel, kernel
+from inspection.kernels.feet import Marks, Room, empty_feet, flatten, share_out
+from inspection.kernels.layout import COUNT, OPEN_END, SLOPE_TURN, SLOPE_X, SLOPE_Y, SQUARE, SQUARE_BEFORE, SUMS
 from inspection.kernels.normal_equations import fill_covariance, newton_step
 from inspection.kernels.on_samples import NO_PROJECTION, SampleTables, project_by, projection_of
+from inspection.kernels.pose_sums import AT_ONCE, add_up, centre_of, evaluate, first_feet, move_pose, place_points, span_of
 
 Array = NDArray[np.float64]
+Pose = tuple[float, float, float]  # rotation about the origin in rad, then shift in mm (x, y)
 
 NONE_LEFT_OUT: Marks = np.empty(0, dtype=np.uint8)
-AT_ONCE = 32 * BLOCK  # points projected together: their feet stay in the cache
+_NO_WEIGHING: Array = np.empty(0)
 MANY = 1 << 20  # points from which on a median is taken of a choice of them
 _STANDSTILL_MM = 1e-9  # Gauss-Newton ends when no point moves further
 _HALVINGS = 12
 _HOVERING_STEPS = 3  # after them points that come and go at an open end in small steps are left out: no pose suits both
 _HOVERING_MM = 0.01
-_LEAST_REACH_MM = 1e-9
+_STANDSTILL_TO_COME_MM = 1e-12  # it ends as well when the step after this one moves none further, however slowly steps fall
+_PASSES = 4  # near the least mean square two are enough
+_WEIGHED_PASSES = 12
+_TO_COME = 2.0  # all steps from here on together, as a multiple of one that is at most half as long as the one before
+_AROUND_MEDIAN = 0.05  # share of a median within which the next one is expected
+
+
 # Not literals: to the compiler each of those has a type of its own, and what it is given to is compiled once more.
 _KNOWN: Any = np.bool_(True)
 _NOT_KNOWN: Any = np.bool_(False)
@@ -63,7 +48,7 @@ class PoseEstimate(NamedTuple):
     covariance  : (3, 3) of shift in mm and rotation in rad about the centre, for deviations that are independent
     """
 
-    pose: tuple[float, float, float]
+    pose: Pose
     steps: int
     settled: bool
     mean_square: float
@@ -82,6 +67,21 @@ class OutlierLimit(NamedTuple):
     mads: float
     least_mm: float
     settled_mm: float
+
+
+class OutlierFit(NamedTuple):
+    """A fit by Tukey's weights.
+
+    found    : (m,) which points are outliers
+    pose     : rotation about the origin in rad, then shift in mm (x, y)
+    limit_mm : a point as far off is an outlier
+    settled  : the last step moved no point further than the limit of the fit says
+    """
+
+    found: NDArray[np.bool_]
+    pose: Pose
+    limit_mm: float
+    settled: bool
 
 
 class PoseFit:
@@ -116,20 +116,116 @@ class PoseFit:
         before[:] = 1
         self._room, self._memory = room, (before, after, np.empty(2 * chunk), empty_feet(chunk))
 
-    def settle(self, pose: tuple[float, float, float], most_steps: int) -> PoseEstimate:
+    @property
+    def reach_mm(self) -> float:
+        """How far the farthest point is from the mean of all."""
+        return float(self._span[2])
+
+    @cached_property
+    def _span(self) -> tuple[float, float, float]:
+        """The mean of the points, and the reach."""
+        return span_of(self._problem[0], self._problem[1], len(self.weights))
+
+    @cached_property
+    def _first_rows(self) -> NDArray[np.int64]:
+        """The row of the first point of every chunk that a thread takes."""
+        return _first_rows(self._problem[1], len(self.weights))
+
+    def settle(self, pose: Pose, most_steps: int) -> PoseEstimate:
         """Go from a pose to the least mean square of the deviations, by at most so many steps."""
         state, covariance = np.array([*pose, 0.0, 0.0, 0.0]), np.empty((3, 3))
         steps, settled = _settle_pose(self._problem, self._projection, self._memory, state, covariance, most_steps)
-        angle, x, y, mean_square, _, _ = state.tolist()
-        return PoseEstimate((angle, x, y), steps, settled, mean_square, state[4:], covariance)
+        return _estimate(state, covariance, steps, settled)
 
-    def find_outliers(self, pose: tuple[float, float, float], limit: OutlierLimit, most_steps: int) -> NDArray[np.bool_]:
+    def settle_nearby(self, pose: Pose) -> PoseEstimate | None:
+        """Go from a pose close to the least mean square there, on all threads; None where that takes more than a few whole steps.
+
+        None as well where points with a weight take no part: `settle` knows what to do with those that hover at an end.
+        """
+        before, here = self._memory[:2]
+        sums, last_mm, count = self._pass(pose, before, here), 0.0, np.count_nonzero(self.weights)
+        for steps in range(1, _PASSES + 1):
+            next_pose, moved_mm, fall = _next_pose(pose, self._span, sums, 1.0)
+            if sums[COUNT] != count or not np.isfinite(moved_mm):
+                return None
+            if moved_mm <= _STANDSTILL_MM or moved_mm * moved_mm <= _STANDSTILL_TO_COME_MM * last_mm:
+                sums[SQUARE] = max(sums[SQUARE] - fall, 0.0)
+                state, covariance = np.empty(6), np.empty((3, 3))
+                _report(sums, next_pose, self._span, state, covariance)
+                return _estimate(state, covariance, steps, True)
+            before, here = here, before
+            there = self._pass(next_pose, before, here)
+            if there[SQUARE_BEFORE] > sums[SQUARE] * (1.0 + 1e-12):
+                return None
+            pose, sums, last_mm = next_pose, there, moved_mm
+        return None
+
+    def find_outliers(self, pose: Pose, limit: OutlierLimit, most_steps: int) -> OutlierFit:
         """Mark the points (m,) that are beyond the limit once the fit by Tukey's weights has settled."""
         m = len(self.weights)
-        found, off = self._room((m,), np.bool_), self._room((m,), np.float64)
+        found, off, state = self._room((m,), np.bool_), self._room((m,), np.float64), np.array([*pose, np.inf])
         found[:] = False
-        _find_outliers(self._problem, self._projection, self._memory, pose, limit, most_steps, found, off)
-        return found
+        settled = _find_outliers(self._problem, self._projection, self._memory, state, limit, most_steps, found, off)
+        return OutlierFit(found, tuple(state[:3].tolist()), float(state[3]), settled)
+
+    def find_outliers_nearby(self, near: OutlierFit, limit: OutlierLimit) -> OutlierFit | None:
+        """The same, on all threads, from a fit to some of the points; None where that takes more than a few steps."""
+        off, takes_part = np.empty(len(self.weights)), self._memory[0]
+        pose, limit_mm, last_mm = near.pose, near.limit_mm, np.inf
+        for _ in range(_WEIGHED_PASSES):
+            sums = self._pass(pose, takes_part, takes_part, limit_mm, off)
+            share = _share_of_tukey(float(self.weights.sum()), float(np.sqrt(self.weights).sum()))
+            next_pose, moved_mm, _ = _next_pose(pose, self._span, sums, share)
+            if not sums[COUNT] > 0.0 or not np.isfinite(moved_mm):
+                return None
+            next_mm = _limit_mm(limit, _median_near(off, limit_mm / limit.mads))
+            to_come = _TO_COME * (moved_mm + abs(next_mm - limit_mm)) if moved_mm <= last_mm / 2 else np.inf
+            if moved_mm <= limit.settled_mm or not np.any(np.abs(off - next_mm) <= to_come):
+                return OutlierFit(off >= next_mm, pose, next_mm, True)
+            pose, limit_mm, last_mm = next_pose, next_mm, moved_mm
+        return None
+
+    def _pass(self, pose: Pose, before: Marks, here: Marks, limit_mm: float = 0.0, off: Array = _NO_WEIGHING) -> Array:
+        """The sums over the points at a pose, chunk by chunk; `before` and `here` say who took part there and at the pose before."""
+        sums = np.empty((len(self._first_rows), SUMS))
+        asked = (self._problem, self._projection, pose, self._span, (before, here), self._first_rows, (limit_mm, off))
+        share_out(lambda claimed: add_up(*asked, claimed, sums), len(self.weights), None)
+        return np.asarray(np.add.reduce(sums, axis=0))
+
+
+def _estimate(state: Array, covariance: Array, steps: int, settled: bool) -> PoseEstimate:
+    angle, x, y, mean_square, _, _ = state.tolist()
+    return PoseEstimate((angle, x, y), steps, settled, mean_square, state[4:], covariance)
+
+
+def _first_rows(left_out: Marks, m: int) -> NDArray[np.int64]:
+    """The row of the first of every AT_ONCE points that are not left out, of m."""
+    if not len(left_out):
+        return np.arange(0, m, AT_ONCE)
+    chosen, count = [], 0
+    for first in range(0, len(left_out), MANY):
+        inside = np.flatnonzero(left_out[first : first + MANY] == 0)
+        chosen.append(first + inside[-count % AT_ONCE :: AT_ONCE])
+        count += len(inside)
+    return np.concatenate(chosen)
+
+
+def _limit_mm(limit: OutlierLimit, median_mm: float) -> float:
+    return max(limit.mads * median_mm, limit.least_mm, _STANDSTILL_MM)
+
+
+def _median_near(values: Array, guess: float) -> float:
+    """The median of the values that are numbers, of which only those around a guess are ordered where the guess is a good one."""
+    low, high = guess * (1.0 - _AROUND_MEDIAN), guess * (1.0 + _AROUND_MEDIAN)
+    inside = values[(values >= low) & (values <= high)]
+    below, above = np.count_nonzero(values < low), np.count_nonzero(values > high)
+    count = below + len(inside) + above
+    if not count:
+        return np.inf
+    ranks = np.array([(count - 1) // 2, count // 2]) - below
+    if ranks[0] < 0 or ranks[1] >= len(inside):
+        return float(np.nanmedian(values))
+    return float(np.partition(inside, ranks)[ranks].mean())
 
 
 def compile_fit() -> None:
@@ -141,30 +237,38 @@ def compile_fit() -> None:
 
 
 @kernel
+def _next_pose(pose: Any, span: Any, sums: Any, share: float) -> tuple[Pose, float, float]:
+    """The pose after a share of a Newton step, how far that moves the farthest point, and by how much the sum of squares is to fall."""
+    step = newton_step(sums, span[2])
+    fall = -(sums[SLOPE_X] * step[0] + sums[SLOPE_Y] * step[1] + sums[SLOPE_TURN] * step[2])
+    return move_pose(pose, span, step, share), share * step[3], fall
+
+
+@kernel
 def _settle_pose(problem: Any, projection: Any, memory: Any, state: Any, covariance: Any, most_steps: int) -> tuple[int, bool]:
     """Make Newton steps, each halved until the mean square falls. Returns their number and whether the pose has settled."""
     weights = problem[2]
     takes_part, new_part, moved, feet = memory
-    span, pose, here, trial = _span(problem[0], problem[1], len(weights)), (state[0], state[1], state[2]), np.empty(SUMS), np.empty(SUMS)
-    _evaluate(problem, projection, pose, span, moved, takes_part, takes_part, feet, _NOT_KNOWN, here)
+    span, pose, here, trial = span_of(problem[0], problem[1], len(weights)), (state[0], state[1], state[2]), np.empty(SUMS), np.empty(SUMS)
+    evaluate(problem, projection, pose, span, moved, takes_part, takes_part, feet, _NOT_KNOWN, here)
     steps, settled, lower = 0, False, True
     while lower and not settled and steps < most_steps:
         steps += 1
         step, next_pose, share, lower = newton_step(here, span[2]), pose, 1.0, False
         for _ in range(_HALVINGS):
-            next_pose = _move_pose(pose, span, step, share)
+            next_pose = move_pose(pose, span, step, share)
             # It changes no deviation by more, so there is nothing to project again; without any point nothing was fitted.
             settled = share * step[3] <= _STANDSTILL_MM and here[COUNT] > 0.0
             if settled:
                 break
-            _evaluate(problem, projection, next_pose, span, moved, takes_part, new_part, feet, _NOT_KNOWN, trial)
+            evaluate(problem, projection, next_pose, span, moved, takes_part, new_part, feet, _NOT_KNOWN, trial)
             lower = trial[SQUARE_BEFORE] <= here[SQUARE] * (1.0 + 1e-12)
             if lower:
                 break
             share *= 0.5
         if lower and steps >= _HOVERING_STEPS and share * step[3] < _HOVERING_MM and trial[COUNT] != here[COUNT]:
             _leave_out_hovering(weights, takes_part, new_part)
-            _evaluate(problem, projection, next_pose, span, moved, takes_part, new_part, feet, _KNOWN, trial)
+            evaluate(problem, projection, next_pose, span, moved, takes_part, new_part, feet, _KNOWN, trial)
         if lower:
             here, trial = trial, here
             takes_part, new_part = new_part, takes_part
@@ -181,35 +285,69 @@ def _leave_out_hovering(weights: Any, before: Any, after: Any) -> None:
         weights[i] *= before[i] * after[i]
 
 
-@inner_kernel
+@kernel
 def _report(sums: Any, pose: Any, span: Any, state: Any, covariance: Any) -> None:
     """Fill in the state (6,): the pose, the mean square of the deviations, the centre of the points; and the covariance."""
     state[0], state[1], state[2] = pose
     state[3] = sums[SQUARE] / sums[COUNT] if sums[COUNT] > 0.0 else np.inf
-    state[4], state[5] = _centre(pose, span)
+    state[4], state[5] = centre_of(pose, span)
     fill_covariance(sums, span[2], sums[SQUARE] / max(sums[COUNT] - 3.0, 1.0), covariance)
 
 
 @kernel
-def _find_outliers(problem: Any, projection: Any, memory: Any, pose: Any, wanted: Any, most_steps: int, found: Any, off: Any) -> None:
-    """Make weighted steps, the weights following from the deviations at every pose, and mark the points beyond the limit."""
+def _find_outliers(problem: Any, projection: Any, memory: Any, state: Any, wanted: Any, most_steps: int, found: Any, off: Any) -> bool:
+    """Make weighted steps, the weights following from the deviations at every pose, and mark the points beyond the limit.
+
+    It ends where no step to come can change which points these are. Moves the state (4,), a pose and the limit, and returns whether it
+    ended before the steps did.
+    """
     weights = problem[2]
     takes_part, _, moved, feet = memory
-    span, sums, m = _span(problem[0], problem[1], len(weights)), np.empty(SUMS), len(weights)
+    m, sums, last = len(weights), np.empty(SUMS), np.inf
+    span, pose, before = span_of(problem[0], problem[1], m), (state[0], state[1], state[2]), state[3]
     for _ in range(most_steps):
         count = _look_at_distances(problem, projection, pose, moved, takes_part, feet, off)
         limit = np.inf
         if count > 0:
             limit = max(wanted.mads * _median(off, takes_part), wanted.least_mm, _STANDSTILL_MM)
+        weight = root = 0.0
         for i in range(m):
             share = off[i] / limit
-            weights[i] = (1.0 - share * share) ** 2 if off[i] < limit else 0.0
+            near = 1.0 - share * share if off[i] < limit else 0.0
+            weights[i] = near * near
             found[i] = off[i] >= limit and takes_part[i] > 0
-        _evaluate(problem, projection, pose, span, moved, takes_part, takes_part, feet, _KNOWN, sums)
-        step = newton_step(sums, span[2])
-        pose = _move_pose(pose, span, step, 1.0)
-        if step[3] <= wanted.settled_mm:
-            break
+            weight += weights[i]
+            root += near
+        evaluate(problem, projection, pose, span, moved, takes_part, takes_part, feet, _KNOWN, sums)
+        step, share = newton_step(sums, span[2]), _share_of_tukey(weight, root)
+        pose = move_pose(pose, span, step, share)
+        state[0], state[1], state[2] = pose
+        state[3] = limit
+        to_come = _TO_COME * (share * step[3] + abs(limit - before)) if share * step[3] <= last / 2.0 else np.inf
+        if share * step[3] <= wanted.settled_mm or not _is_any_within(off, takes_part, limit, to_come):
+            return count > 0
+        before, last = limit, share * step[3]
+    return False
+
+
+@kernel
+def _share_of_tukey(weight: float, root: float) -> float:
+    """By how much a step with Tukey's weights falls short, from the sums of the weights and of their roots.
+
+    The derivative of w(e) e is less than w(e). The ratio of their sums, which is that of the step to Newton's where the
+    deviations have nothing to do with place, makes half the steps.
+    """
+    slope = 5.0 * weight - 4.0 * root
+    return weight / slope if slope > 0.5 * weight else 1.0
+
+
+@inner_kernel
+def _is_any_within(off: Any, takes_part: Any, limit: float, reach: float) -> bool:
+    """Whether a point that takes part is as close to the limit."""
+    found = False
+    for i in range(len(off)):
+        found |= takes_part[i] > 0 and abs(off[i] - limit) <= reach
+    return found
 
 
 @inner_kernel
@@ -219,8 +357,8 @@ def _look_at_distances(problem: Any, projection: Any, pose: Any, moved: Any, tak
     m, row, count = len(weights), _FIRST_ROW, 0
     for begin in range(0, m, len(feet.vertex)):
         stop = min(begin + len(feet.vertex), m)
-        row = _place(points, left_out, row, stop - begin, pose, moved)
-        project_by(projection, moved[: 2 * (stop - begin)], reals, integers, _first_feet(feet, stop - begin))
+        row = place_points(points, left_out, row, stop - begin, pose, moved)
+        project_by(projection, moved[: 2 * (stop - begin)], reals, integers, first_feet(feet, stop - begin))
         for j in range(stop - begin):
             off[begin + j] = abs(outward * feet.distance_mm[j] - tip)
             takes_part[begin + j] = feet.vertex[j] != OPEN_END
@@ -241,160 +379,3 @@ def _median(off: Any, takes_part: Any) -> float:
             count += 1
         at += step
     return float(np.median(chosen[:count])) if count > 0 else np.inf
-
-
-@inner_kernel
-def _span(points: Any, left_out: Any, m: int) -> tuple[float, float, float]:
-    """Mean of the flat points (x, y), and the distance of the farthest from it: a motion does not change it."""
-    x = y = square = 0.0
-    for row in range(len(points) // 2):
-        if len(left_out) == 0 or left_out[row] == 0:
-            x += points[2 * row]
-            y += points[2 * row + 1]
-    x, y = x / m, y / m
-    for row in range(len(points) // 2):
-        if len(left_out) == 0 or left_out[row] == 0:
-            dx, dy = points[2 * row] - x, points[2 * row + 1] - y
-            square = max(square, dx * dx + dy * dy)
-    return x, y, max(np.sqrt(square), _LEAST_REACH_MM)
-
-
-@inner_kernel
-def _centre(pose: Any, span: Any) -> tuple[float, float]:
-    """Where the pose puts the mean of the points."""
-    c, s = np.cos(pose[0]), np.sin(pose[0])
-    return c * span[0] - s * span[1] + pose[1], s * span[0] + c * span[1] + pose[2]
-
-
-@inner_kernel
-def _move_pose(pose: Any, span: Any, step: Any, share: float) -> tuple[float, float, float]:
-    """The pose after a share of a step: its rotation about the centre, which moves by its shift alone."""
-    x, y = _centre(pose, span)
-    angle = pose[0] + share * step[2]
-    angle = np.arctan2(np.sin(angle), np.cos(angle))
-    c, s = np.cos(angle), np.sin(angle)
-    return angle, x + share * step[0] - (c * span[0] - s * span[1]), y + share * step[1] - (s * span[0] + c * span[1])
-
-
-@inner_kernel
-def _place(points: Any, left_out: Any, row: int, count: int, pose: Any, moved: Any) -> int:
-    """Move the next points that are not left out, from a row on, to a pose. Returns the row after the last."""
-    c, s = np.cos(pose[0]), np.sin(pose[0])
-    for i in range(count):
-        if len(left_out) > 0:
-            while left_out[row] != 0:
-                row += 1
-        x, y = points[2 * row], points[2 * row + 1]
-        moved[2 * i] = c * x - s * y + pose[1]
-        moved[2 * i + 1] = s * x + c * y + pose[2]
-        row += 1
-    return row
-
-
-@inner_kernel
-def _first_feet(feet: Any, count: int) -> Any:
-    """The memory for the first feet of a chunk."""
-    return Feet(
-        feet.parameter[:count],
-        feet.foot_mm[:count],
-        feet.distance_mm[:count],
-        feet.gradient[:count],
-        feet.curvature[:count],
-        feet.station_mm[:count],
-        feet.vertex[:count],
-    )
-
-
-@inner_kernel
-def _evaluate(
-    problem: Any, projection: Any, pose: Any, span: Any, moved: Any, before: Any, takes_part: Any, feet: Any, known: bool, sums: Any
-) -> None:
-    """Add up the sums over the points at a pose, chunk by chunk and always in the same order.
-
-    They are added first for each place in a block, so that the loop vectorises, then in halves.
-
-    known : the points were looked at there before, so that their feet are still known where one chunk holds them all
-    """
-    points, left_out, weights, reals, integers, outward, tip = problem
-    m, row = len(weights), _FIRST_ROW
-    lanes = array_at(stack_reals(), REALS)
-    for i in range(SUMS * BLOCK):
-        lanes[i] = 0.0
-    x0, y0 = _centre(pose, span)
-    for begin in range(0, m, len(feet.vertex)):
-        stop = min(begin + len(feet.vertex), m)
-        if not known or m > len(feet.vertex):
-            row = _place(points, left_out, row, stop - begin, pose, moved)
-            project_by(projection, moved[: 2 * (stop - begin)], reals, integers, _first_feet(feet, stop - begin))
-        for block in range(begin, stop, BLOCK):
-            end = min(block + BLOCK, stop)
-            near, far = block - begin, end - begin
-            xy, gradient = moved[2 * near : 2 * far], feet.gradient.reshape(-1)[2 * near : 2 * far]
-            distance, curvature, vertex = feet.distance_mm[near:far], feet.curvature[near:far], feet.vertex[near:far]
-            weight, part_before, part = weights[block:end], before[block:end], takes_part[block:end]
-            for j in range(end - block):
-                _add_point(lanes, xy, gradient, distance, curvature, vertex, weight, part_before, part, outward, tip, x0, y0, j)
-    half = BLOCK // 2
-    while half > 0:
-        for column in range(0, SUMS * BLOCK, BLOCK):
-            for j in range(half):
-                lanes[column + j] += lanes[column + half + j]
-        half //= 2
-    for quantity in range(SUMS):
-        sums[quantity] = lanes[quantity * BLOCK]
-
-
-@inlined_kernel
-def _add_point(
-    lanes: Any,
-    points: Any,
-    gradient: Any,
-    distance: Any,
-    curvature: Any,
-    vertex: Any,
-    weight: Any,
-    before: Any,
-    part: Any,
-    outward: float,
-    tip: float,
-    x0: float,
-    y0: float,
-    j: int,
-) -> None:
-    """Add a point to the sums: tangent distance plus curvature, e(p) = e + J p + p' H p / 2.
-
-    H is the curvature of the distance field across its gradient.
-    """
-    field = outward * distance[j]
-    e = field - tip
-    gx, gy = outward * gradient[2 * j], outward * gradient[2 * j + 1]
-    ax, ay = points[2 * j] - x0, points[2 * j + 1] - y0
-    turn, radial = ax * gy - ay * gx, ax * gx + ay * gy
-    at_corner = vertex[j] == CORNER
-    numerator = 1.0 if at_corner else -outward * curvature[j]
-    denominator = field if at_corner else max(1.0 - curvature[j] * distance[j], 1e-3)
-    bend = numerator / denominator if abs(denominator) > 1e-9 else 0.0
-    was_part = before[j]
-    u = 0.0 if vertex[j] == OPEN_END else weight[j]
-    takes_part = 1.0 if u > 0.0 else 0.0
-    part[j] = takes_part
-    we = u * e
-    across = we * bend
-    lanes[BLOCK * SLOPE_X + j] += we * gx
-    lanes[BLOCK * SLOPE_Y + j] += we * gy
-    lanes[BLOCK * SLOPE_TURN + j] += we * turn
-    lanes[BLOCK * TANGENTIAL_XX + j] += u * gx * gx
-    lanes[BLOCK * TANGENTIAL_XY + j] += u * gx * gy
-    lanes[BLOCK * TANGENTIAL_XT + j] += u * gx * turn
-    lanes[BLOCK * TANGENTIAL_YY + j] += u * gy * gy
-    lanes[BLOCK * TANGENTIAL_YT + j] += u * gy * turn
-    lanes[BLOCK * TANGENTIAL_TT + j] += u * turn * turn
-    lanes[BLOCK * BENDING_XX + j] += across * gy * gy
-    lanes[BLOCK * BENDING_XY + j] -= across * gx * gy
-    lanes[BLOCK * BENDING_XT + j] -= across * gy * radial
-    lanes[BLOCK * BENDING_YY + j] += across * gx * gx
-    lanes[BLOCK * BENDING_YT + j] += across * gx * radial
-    lanes[BLOCK * BENDING_TT + j] += across * radial * radial - we * radial
-    lanes[BLOCK * SQUARE + j] += we * e
-    lanes[BLOCK * COUNT + j] += takes_part
-    lanes[BLOCK * SQUARE_BEFORE + j] += was_part * weight[j] * e * e
