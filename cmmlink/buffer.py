@@ -42,13 +42,17 @@ class Buffer(Generic[Item]):
             self._changed.notify_all()
             return True
 
-    def take(self, timeout_s: float) -> list[Item]:
-        """Take everything that waits, in order. The list is empty when nothing came in time."""
+    def take(self, timeout_s: float, most: int | None = None) -> list[Item]:
+        """Take what waits, in order: everything, or items until they have the size `most` together. Nothing came in time: an empty list."""
         with self._changed:
             self._changed.wait_for(lambda: bool(self._items), timeout_s)
-            taken = [item for _, item in self._items]
-            self._items.clear()
-            self.waiting = 0
+            taken: list[Item] = []
+            size = 0
+            while self._items and (most is None or size < most):
+                each, item = self._items.popleft()
+                taken.append(item)
+                size += each
+            self.waiting -= size
             self._changed.notify_all()
             return taken
 

@@ -35,6 +35,7 @@ COMMIT_S = 0.1
 CHUNK_POINTS = 1000
 _JUDGED_BODIES = 8  # of judged rows that are committed together: eight megabytes
 QUEUE_BYTES = 64 << 20
+COMMIT_BYTES = 4 << 20  # of what waits in the queue that are packed and committed together
 _SMALL_BYTES = 128  # size in the queue of an event without bytes or points
 _POSE_S = 0.1  # the shortest time between two notes of a pose that still moves
 
@@ -284,12 +285,17 @@ class Recorder:
                 if self._closing.is_set():
                     return
             while not self._closing.wait(self._commit_s):
-                self._commit(self._queue.take(0.0))
-            self._commit(self._queue.take(0.0))
+                self._commit_all()
+            self._commit_all()
         except Exception as error:  # whatever it is, the run must hear of it
             self._failure = error
         finally:
             self._queue.close()
+
+    def _commit_all(self) -> None:
+        """Commit what waits, some megabytes at a time: of these the packed bodies are held as well."""
+        while items := self._queue.take(0.0, COMMIT_BYTES):
+            self._commit(items)
 
     def _commit(self, items: "Sequence[Arrived | _Pose]") -> None:
         drafts = [self._draft(kind, body, count) for kind, body, count in self._pack.bodies(items)]
@@ -362,4 +368,6 @@ def _size(event: Arrived) -> int:
     arrival = event.arrival
     if isinstance(arrival, WireBytes):
         return len(arrival.data) + _SMALL_BYTES
-    return arrival.points_mm.nbytes + _SMALL_BYTES if isinstance(arrival, PointBatch) else _SMALL_BYTES
+    if isinstance(arrival, PointBatch):
+        return arrival.sequence.nbytes + arrival.time_s.nbytes + arrival.points_mm.nbytes + _SMALL_BYTES
+    return _SMALL_BYTES

@@ -45,6 +45,16 @@ def test_waiting_and_peak_count_points_and_not_items() -> None:
     assert (buffer.waiting, buffer.peak, buffer.stalls) == (20, 70, 0)
 
 
+def test_a_part_can_be_taken_and_the_rest_waits() -> None:
+    buffer: Buffer[int] = Buffer(100)
+    for item, size in enumerate((30, 40, 0, 20)):
+        buffer.give(item, size)
+    assert buffer.take(0.0, 31) == [0, 1]
+    assert (buffer.waiting, buffer.peak) == (20, 90)
+    assert buffer.take(0.0, 1000) == [2, 3]
+    assert (buffer.waiting, buffer.take(0.0, 5)) == (0, [])
+
+
 def test_exactly_full_is_not_a_stall() -> None:
     buffer: Buffer[int] = Buffer(100)
     buffer.give(0, 60)

@@ -105,6 +105,26 @@ def test_a_slow_disk_makes_the_run_wait_and_nothing_is_dropped(tmp_path: Path) -
         assert [read.time_s for read in reads_of(store, recorder.run)] == list(range(200))
 
 
+def test_what_piled_up_is_committed_some_megabytes_at_a_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Packed together it would be held two times more."""
+    monkeypatch.setattr("cmmlink.record.recorder.COMMIT_BYTES", 10_000)
+    acknowledged: list[int] = []
+    basis = RunInputs("plan", "nominal", b"", {})
+    with (
+        Store(tmp_path, writing=True, epoch_s=lambda: 0.0) as store,
+        Recorder(
+            store, basis, clock=lambda: 0.0, now=today, commit_s=60.0, acknowledge=lambda told: acknowledged.append(told.wire_bytes)
+        ) as recorder,
+    ):
+        recorder(_started())
+        for index in range(200):
+            recorder(Arrived(0.0, WireBytes(float(index), bytes(500))))
+    assert acknowledged[-1] == 100_000
+    assert max(np.diff([0, *acknowledged])) <= 10_000
+    with open_to_read(tmp_path, today) as again:
+        assert [read.time_s for read in reads_of(again, recorder.run)] == list(range(200))
+
+
 def _started() -> RunStarted:
     return RunStarted("part", "1", "operator", "device", True)
 
