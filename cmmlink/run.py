@@ -18,7 +18,7 @@ from cmmlink.events import RunStarted, Sink
 from cmmlink.from_plan import inspection_of, notes_on_nominal, run_started
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan import FileDevice, Plan
-from cmmlink.record import PATIENCE_S, Recorder, RecordReference, RunInputs, open_to_record
+from cmmlink.record import PATIENCE_S, QUEUE_BYTES, Recorder, RecordReference, RunInputs, open_to_record
 from cmmlink.result_folder import folder_of
 from cmmlink.result_json import density_notes, density_of, identity_json, result_json, stations_of
 from cmmlink.run_log import log_event
@@ -26,6 +26,7 @@ from cmmlink.scratch import scratch_in, words_of_room
 from cmmlink.words import utc_words
 from inspection import NominalProfile, rehearse
 
+_FILE_POINTS, _FILE_BYTES = 1 << 15, 4 << 20  # a file can wait: no more of it is held than keeps judging and recording busy
 _log = logging.getLogger(__name__)
 
 
@@ -104,7 +105,8 @@ def carry_out(
         recorder: Recorder | None = None
         if records is not None:
             store = stack.enter_context(open_to_record(records, now, patience_s))
-            recorder = stack.enter_context(Recorder(store, RunInputs.of(plan), clock=clock, now=now))
+            queue_bytes = QUEUE_BYTES if followed else _FILE_BYTES
+            recorder = stack.enter_context(Recorder(store, RunInputs.of(plan), clock=clock, now=now, queue_bytes=queue_bytes))
         began = recorder.began if recorder else now()
         listeners: list[Sink] = [*([recorder] if recorder else []), *sinks, log_event]
         outcome = run_inspection(
@@ -112,7 +114,7 @@ def carry_out(
             live,
             listeners,
             started,
-            buffer_points=plan.buffer_points,
+            buffer_points=plan.buffer_points if followed else min(plan.buffer_points, _FILE_POINTS),
             clock=clock,
             stop=stop,
             watch=recorder.check if recorder else lambda: None,

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
         recorded_result,
         recorded_run,
     )
-    from cmmlink.record.recorder import Recorder, RecordReference, RunInputs
+    from cmmlink.record.recorder import QUEUE_BYTES, Recorder, RecordReference, RunInputs
     from cmmlink.record.replay import Change, Replay, recorded_plan, recorded_profile, replay_run
     from cmmlink.record.station_lock import PATIENCE_S
     from cmmlink.record.store import FILE_NAME, Store
@@ -49,7 +49,7 @@ else:
             "recorded_result",
             "recorded_run",
         ),
-        "cmmlink.record.recorder": ("Recorder", "RecordReference", "RunInputs"),
+        "cmmlink.record.recorder": ("QUEUE_BYTES", "Recorder", "RecordReference", "RunInputs"),
         "cmmlink.record.replay": ("Change", "Replay", "recorded_plan", "recorded_profile", "replay_run"),
         "cmmlink.record.station_lock": ("PATIENCE_S",),
         "cmmlink.record.store": ("FILE_NAME", "Store"),
@@ -67,6 +67,7 @@ else:
 __all__ = [
     "FILE_NAME",
     "PATIENCE_S",
+    "QUEUE_BYTES",
     "Change",
     "Draft",
     "Record",

@@ -144,6 +144,17 @@ def test_a_run_ends_with_a_result_when_the_disk_has_no_room_for_more(tmp_path: P
     assert (entry["state"], entry["received"]) == ("interrupted", document["received"])
 
 
+def test_no_more_of_a_file_waits_than_keeps_a_run_busy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cmmlink.run._FILE_POINTS", 100)
+    monkeypatch.setattr("cmmlink.run._FILE_BYTES", 3000)
+    plan = small_plan().model_copy(update={"device": FileDevice(type="file", file=tmp_path / "points.csv")})
+    alone, followed = run(Script(*scan_arrivals()), tmp_path, plan=plan), run(Script(*scan_arrivals()), tmp_path, lambda _: None, plan=plan)
+    assert alone.outcome.counts.buffer_peak <= 100
+    assert alone.outcome.counts.received == followed.outcome.counts.received == 612
+    with open_to_read(tmp_path, today) as store:
+        assert [store.totals(str(begin.run))["points"][1] for begin, _ in store.begins_and_ends()] == [600, 600]
+
+
 def test_a_file_that_nobody_follows_is_judged_at_its_end_alone_and_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     lives: list[LiveInspection] = []
 
