@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from inspection.signed_deviations import Deviations, deviations, profile_error_mm
     from inspection.telling_points import telling_rows
     from inspection.tolerance import ToleranceZone
+    from inspection.uncertainty import DeviationUncertainty, UncertaintyBudget, deviation_uncertainty, largest_by_noise_mm
     from inspection.verdict import NOT_JUDGED, Rejection, Verdict
     from inspection.zones import Transition, VaryingZone
 else:
@@ -90,6 +91,7 @@ else:
         "inspection.signed_deviations": ("Deviations", "deviations", "profile_error_mm"),
         "inspection.telling_points": ("telling_rows",),
         "inspection.tolerance": ("ToleranceZone",),
+        "inspection.uncertainty": ("DeviationUncertainty", "UncertaintyBudget", "deviation_uncertainty", "largest_by_noise_mm"),
         "inspection.verdict": ("NOT_JUDGED", "Rejection", "Verdict"),
         "inspection.zones": ("Transition", "VaryingZone"),
     }
@@ -117,6 +119,7 @@ __all__ = [
     "ConsumptionFit",
     "Crossing",
     "CurveCheck",
+    "DeviationUncertainty",
     "Deviations",
     "EdgeRadiusMethod",
     "FilterOrder",
@@ -163,6 +166,7 @@ __all__ = [
     "ThicknessMethod",
     "ToleranceZone",
     "Transition",
+    "UncertaintyBudget",
     "VaryingZone",
     "Verdict",
     "WeightName",
@@ -177,6 +181,7 @@ __all__ = [
     "compiled_code_folder",
     "coverage",
     "default_gap_max_mm",
+    "deviation_uncertainty",
     "deviations",
     "discretize",
     "displacement",
@@ -191,6 +196,7 @@ __all__ = [
     "fit_least_consumption",
     "fit_minimum_zone",
     "fit_stacking_axis",
+    "largest_by_noise_mm",
     "maximum_camber",
     "maximum_thickness",
     "profile_error_mm",

@@ -1,0 +1,251 @@
+"""Uncertainty of each deviation after a fit, from a budget by the GUM: u^2(e) is the diagonal of (I - H) V (I - H)'.
+
+V holds what every measured point is uncertain by and how that goes together between points; H = J Z (Z'J'WJZ)^-1 Z'J'W is what the
+fit takes away. An error that all points share in the way of a free motion is fitted away; one that they do not share leaves the pose
+uncertain by its mean. See Forbes, Appl. Sci. 2022, 12(6), 2808. The propagation is linear, and that of least squares; a minimum zone
+hangs on few points, so that its pose is less certain than this.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import ndtr
+
+from inspection.freedoms import Freedoms, gradients
+from inspection.gaps import weigh_by_station
+from inspection.methods import WeightName
+from inspection.nominal import NominalProfile
+from inspection.signed_deviations import Deviations, check_points, deviations
+
+Array = NDArray[np.float64]
+PartName = Literal["repeatability", "device", "tip radius", "temperature"]
+
+_FREE = 1e-9  # a motion whose eigenvalue is below this share of the largest changes no deviation, and is not fitted
+_MOST_GROUPS = 2048  # of neighbouring points that stand together where the device's error is summed up: it changes slowly
+_AT_ONCE = 512  # places whose errors are compared with those of all points together
+_FAR = 8.0  # standard deviations: farther below the largest, a point has no share in what noise adds to it
+_NODES = 2001
+
+
+@dataclass(frozen=True, slots=True)
+class UncertaintyBudget:
+    """What a measured point is uncertain by. All are standard uncertainties but the device's, which is its maximum permissible error.
+
+    repeatability_mm  : of one point along the normal, independent from point to point; scanning noise belongs here
+    mpe_mm, mpe_share : the device measures a length L to within mpe_mm + mpe_share * L (A + L/K of ISO 10360-2, mpe_share = 1/K in mm a
+                        mm), taken as rectangular: the errors of two places differ by (A + L/K) / sqrt(3), along any direction
+    tip_radius_mm     : of the calibrated tip: the same for every point, so that it does not average
+    temperature_k     : of the part's temperature
+    expansion_per_k   : the part's coefficient of thermal expansion
+    off_reference_k   : how far from the reference temperature the part was measured and compensated for
+    u_expansion_per_k : of the coefficient, which counts by that distance
+    """
+
+    repeatability_mm: float = 0.0
+    mpe_mm: float = 0.0
+    mpe_share: float = 0.0
+    tip_radius_mm: float = 0.0
+    temperature_k: float = 0.0
+    expansion_per_k: float = 0.0
+    off_reference_k: float = 0.0
+    u_expansion_per_k: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in self.__slots__:
+            value = getattr(self, name)
+            if not np.isfinite(value) or (value < 0 and name != "off_reference_k"):
+                raise ValueError(f"{name} of an uncertainty budget must be a finite number, zero or more; got {value:g}")
+
+    @property
+    def growth(self) -> float:
+        """Standard uncertainty of the part's size by temperature, mm a mm."""
+        return float(np.hypot(self.expansion_per_k * self.temperature_k, self.u_expansion_per_k * self.off_reference_k))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DeviationUncertainty:
+    """Standard uncertainties of n deviations.
+
+    standard_mm : (n,) all parts together
+    pose_mm     : (n,) what of it the pose brings in, sqrt(j P j'); not a part beside the others, which hold it already
+    parts_mm    : (n,) each, by name; their squares add up to that of `standard_mm`
+    covariance  : (3, 3) P of the pose: shift in mm and rotation in rad about `pivot_mm`; zero in motions that are locked
+    pivot_mm    : (2,)
+    """
+
+    standard_mm: Array
+    pose_mm: Array
+    parts_mm: dict[PartName, Array]
+    covariance: Array
+    pivot_mm: Array
+
+    def expanded_mm(self, coverage_factor: float = 2.0) -> Array:
+        """Expanded uncertainty U (n,); a factor of 2 covers about 95 %."""
+        return coverage_factor * self.standard_mm
+
+
+class _Places(NamedTuple):
+    """Places where deviations are uncertain: where (n, 2), outward normals (n, 2), rates by the free motions (n, k)."""
+
+    at: Array
+    normal: Array
+    rates: Array
+
+
+def deviation_uncertainty(
+    points_mm: ArrayLike,
+    nominal: NominalProfile,
+    budget: UncertaintyBudget,
+    freedoms: Freedoms | None = None,
+    elsewhere_mm: ArrayLike | None = None,
+    fixed_mm: ArrayLike | None = None,
+    tip_radius_mm: float = 0.0,
+    weights: WeightName = "points",
+) -> DeviationUncertainty:
+    """Uncertainty of the deviation of fitted points (m, 2), which are given at their pose, in nominal coordinates.
+
+    freedoms     : the motions that were fitted; None for all, none of them for a datum
+    elsewhere_mm : (n, 2) places that took no part in the fit; the uncertainties are then theirs
+    fixed_mm     : (2,) the point that stays where it is when the part grows with temperature; None takes the middle of the points. After
+                   a free fit it does not matter
+    weights      : of the fit
+
+    NaN for points beyond open ends.
+    """
+    points = check_points(points_mm)
+    d = deviations(points, nominal, tip_radius_mm=tip_radius_mm)
+    used = np.flatnonzero(~d.beyond_end)
+    free = Freedoms.about(points[used].mean(axis=0)) if freedoms is None else freedoms
+    shares = np.ones(len(points))
+    if weights == "arc-length":
+        weigh_by_station(np.where(d.beyond_end, np.nan, d.station_mm), shares, nominal)
+    fit = _places(points, d, free, used)
+    gain = _gain(fit.rates, shares[used])  # (k, m) amounts of the motions by deviations
+    there, known = fit, used
+    if elsewhere_mm is not None:
+        others = check_points(elsewhere_mm)
+        beyond = deviations(others, nominal, tip_radius_mm=tip_radius_mm)
+        known = np.flatnonzero(~beyond.beyond_end)
+        there = _places(others, beyond, free, known)
+    fixed = points[used].mean(axis=0) if fixed_mm is None else np.asarray(fixed_mm, dtype=np.float64)
+    variances, poses = {}, np.zeros((len(free), len(free)))
+    for name, variance, pose in _parts(fit, there, gain, budget, d.station_mm[used], fixed):
+        variances[name], poses = variance, poses + pose
+    count = len(points) if elsewhere_mm is None else len(others)
+    parts = {name: _spread(np.sqrt(np.maximum(variance, 0.0)), known, count) for name, variance in variances.items()}
+    pose_mm = np.sqrt(np.maximum(((there.rates @ poses) * there.rates).sum(axis=1), 0.0))
+    standard = np.sqrt(sum((np.square(part) for part in parts.values()), np.zeros(count)))
+    return DeviationUncertainty(standard, _spread(pose_mm, known, count), parts, free.directions.T @ poses @ free.directions, free.pivot_mm)
+
+
+def _spread(values: Array, rows: NDArray[np.int64], count: int) -> Array:
+    """Values (k,) at their rows among so many, NaN at the others."""
+    every = np.full(count, np.nan)
+    every[rows] = values
+    return every
+
+
+def _places(points: Array, d: Deviations, free: Freedoms, rows: NDArray[np.int64]) -> _Places:
+    rates = gradients(d.normal, points - free.pivot_mm) @ free.directions.T
+    return _Places(points[rows], d.normal[rows], rates[rows])
+
+
+def _gain(rates: Array, weights: Array) -> Array:
+    """Amounts (k, m) by which a unit of each deviation moves the free motions."""
+    scale = np.maximum(np.abs(rates).max(axis=0, initial=0.0), 1e-300)
+    scaled = rates / scale
+    values, vectors = np.linalg.eigh((scaled.T * weights) @ scaled) if len(scale) else (np.empty(0), np.empty((0, 0)))
+    kept = values > _FREE * values.max(initial=0.0)
+    inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T
+    return np.asarray(-(inverse @ (scaled.T * weights)) / scale[:, None])
+
+
+def _parts(
+    fit: _Places, there: _Places, gain: Array, budget: UncertaintyBudget, station_mm: Array, fixed_mm: Array
+) -> Iterator[tuple[PartName, Array, Array]]:
+    """Variance (n,) of the deviations and of the amounts (k, k) by each part of the budget.
+
+    A deviation after the fit is e = z + j gain z: what is added to the others by the motion that the fit makes of them.
+    """
+    same = there is fit
+    yield "repeatability", *_independent(there, gain, budget.repeatability_mm**2, same)
+    yield "device", *_of_device(fit, there, gain, budget, station_mm)
+    common = ((there.normal * (there.at - fixed_mm)).sum(axis=1), (fit.normal * (fit.at - fixed_mm)).sum(axis=1))
+    ones = (np.ones(len(there.at)), np.ones(len(fit.at)))
+    yield "tip radius", *_common(there, gain, ones, budget.tip_radius_mm)
+    yield "temperature", *_common(there, gain, common, budget.growth)
+
+
+def _common(there: _Places, gain: Array, shape: tuple[Array, Array], standard: float) -> tuple[Array, Array]:
+    """An error that all points share, of shapes (n,) at the places and (m,) at the fitted points."""
+    amounts = gain @ shape[1]
+    return standard**2 * np.square(shape[0] + there.rates @ amounts), standard**2 * np.outer(amounts, amounts)
+
+
+def _independent(there: _Places, gain: Array, variance: float, same: bool) -> tuple[Array, Array]:
+    """An error that no two points share. At a fitted point the pose has followed it a little."""
+    pose = variance * gain @ gain.T
+    own = 2 * variance * (there.rates * gain.T).sum(axis=1) if same else 0.0
+    return variance + own + ((there.rates @ pose) * there.rates).sum(axis=1), pose
+
+
+def _of_device(fit: _Places, there: _Places, gain: Array, budget: UncertaintyBudget, station_mm: Array) -> tuple[Array, Array]:
+    """The device's error, a field over the plane of which only differences over a length are known: u^2 = (A + L/K)^2 / 3.
+
+    With C0 = (A + D/K)^2 / 3 for the part's size D its covariance over a length L is C0 - (A + L/K)^2 / 6: of this A^2 / 6 is
+    independent from place to place, and the rest changes slowly. A free fit takes C0 away, so that its choice matters to datums only.
+    """
+    A, share = budget.mpe_mm, budget.mpe_share
+    size = float(np.hypot(*np.ptp(fit.at, axis=0)))
+    near = (A + share * size) ** 2 / 3 - A * A / 6
+    order = np.argsort(station_mm, kind="stable")
+    starts = np.unique(np.linspace(0, len(order), min(len(order), _MOST_GROUPS), endpoint=False).astype(np.int64))
+    middles = order[(starts + np.append(starts[1:], len(order)) - 1) // 2]
+    at = fit.at[middles]
+    pulls = [np.add.reduceat((gain * fit.normal[:, axis])[:, order], starts, axis=1) for axis in (0, 1)]  # (k, groups) by x and by y
+
+    def moved(places: Array) -> tuple[Array, Array]:
+        """Covariance (n, k) of the errors in x, and in y, at places (n, 2) with the amounts of the motions."""
+        rows = [slice(i, i + _AT_ONCE) for i in range(0, len(places), _AT_ONCE)]
+        found = [[_covariance(places[part], at, near, A, share) @ pull.T for part in rows] for pull in pulls]
+        x, y = (np.concatenate(each) if each else np.empty((0, len(gain))) for each in found)
+        return x, y
+
+    x, y = moved(at)
+    pose = pulls[0] @ x + pulls[1] @ y
+    x, y = moved(there.at)
+    with_pose = there.normal[:, :1] * x + there.normal[:, 1:] * y
+    smooth = near + 2 * (there.rates * with_pose).sum(axis=1) + ((there.rates @ pose) * there.rates).sum(axis=1)
+    apart, of_apart = _independent(there, gain, A * A / 6, there is fit)
+    return smooth + apart, pose + of_apart
+
+
+def _covariance(places: Array, others: Array, near: float, A: float, share: float) -> Array:
+    """Covariance (n, g) of the part of the device's error that changes slowly."""
+    length = np.hypot(places[:, None, 0] - others[:, 0], places[:, None, 1] - others[:, 1])
+    return np.asarray(near - share * length * (2 * A + share * length) / 6)
+
+
+def largest_by_noise_mm(deviation_mm: ArrayLike, standard_mm: ArrayLike) -> float:
+    """How much independent noise raises the largest |deviation| on average: the largest of many values is biased upward.
+
+    deviation_mm : (m,) as measured or true; NaN counts for nothing
+    standard_mm  : (m,) or one number: standard deviation of the noise of each
+    """
+    e = np.abs(np.asarray(deviation_mm, dtype=np.float64))
+    u = np.broadcast_to(np.asarray(standard_mm, dtype=np.float64), e.shape)
+    counted = np.isfinite(e) & np.isfinite(u)
+    e, u = e[counted], u[counted]
+    if not len(e) or not u.max() > 0:
+        return 0.0
+    largest, widest = float(e.max()), float(u.max())
+    near = (e > largest - _FAR * widest) & (u > 0)
+    low, high = float(max(e[u <= 0].max(initial=0.0), largest - _FAR * widest, 0.0)), largest + _FAR * widest
+    t = np.linspace(low, high, _NODES)
+    below = np.ones(_NODES)
+    for value, spread in zip(e[near].tolist(), u[near].tolist(), strict=True):
+        below *= ndtr((t - value) / spread) - ndtr((-t - value) / spread)
+    return float(high - np.trapezoid(below, t) - largest)
