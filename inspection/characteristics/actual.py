@@ -7,7 +7,6 @@ deviations stands beside it, and so do the stretches without a measured point: n
 """
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,14 +14,14 @@ from scipy.interpolate import BSpline, make_interp_spline
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import spsolve
 
-from inspection.characteristics.outline import AirfoilSection, find_airfoil, section_on
+from inspection.characteristics.outline import AirfoilSection, section_on
 from inspection.characteristics.section_value import SectionValue
 from inspection.curve import NurbsCurve
 from inspection.errors import InspectionError
+from inspection.filters import ProfileFilter
 from inspection.signed_deviations import Deviations
 
 Array = NDArray[np.float64]
-Source = Literal["raw", "filtered"]
 
 _DEGREE = 3
 _KNOTS = 200  # on the outline, unless their distance is given
@@ -36,9 +35,9 @@ _ON_OUTLINE = 1e-4  # of the section's length: a place nearer to the outline tha
 class ActualSection:
     """A measured airfoil section as a smooth curve, beside the nominal one.
 
-    section   : the actual outline; its parameter is the station on the nominal one
+    section   : the actual outline; its parameter is the station on the nominal one, and so its edges are where those of the nominal are
     nominal   : the nominal outline
-    source    : whether raw or filtered deviations were drawn
+    source    : "raw", or the filter that the deviations went through
     knots_mm  : distance of the knots of the spline of deviations
     points    : number of measured points that it was drawn from
     rms_mm    : root mean square of what the spline leaves of the deviations, weighted by arc length
@@ -49,7 +48,7 @@ class ActualSection:
 
     section: AirfoilSection
     nominal: AirfoilSection
-    source: Source
+    source: str
     knots_mm: float
     points: int
     rms_mm: float
@@ -71,6 +70,10 @@ class ActualSection:
             near = int(np.argmin(distance))
             if self.is_unseen[near] and distance[near] < max(_ON_OUTLINE * self.section.length_mm, self._spacing(near)):
                 return name
+        if "end of the window" in value.place_names:
+            tip, ends = value.places_mm[0], value.places_mm[2:]
+            inside = np.hypot(*(outline - tip).T) < np.hypot(*(ends - tip).T).max()
+            return "inside the window" if (self.is_unseen & inside).any() else None
         return None
 
     def _spacing(self, sample: int) -> float:
@@ -84,18 +87,22 @@ def draw_actual_section(
     nominal: AirfoilSection,
     deviations: Deviations,
     filtered_mm: Array | None = None,
+    filtered_by: ProfileFilter | None = None,
     knots_mm: float | None = None,
     gap_max_mm: float | None = None,
 ) -> ActualSection:
     """The actual section of m points with their deviations from the nominal's curve.
 
     deviations  : of the points at the pose of the fit or datum; points beyond an end and those whose foot is a corner are left out
-    filtered_mm : (m,) filtered deviations in place of the raw ones, NaN where the filter gives none
+    filtered_mm : (m,) filtered deviations in place of the raw ones, NaN where the filter gives none (`filter_profile`)
+    filtered_by : the filter that gave them; no value may hide that it is of filtered points
     knots_mm    : distance of the spline's knots; a two-hundredth of the outline unless given. Finer detail is not drawn
     gap_max_mm  : a stretch without points longer than this is unseen; two knot distances unless given
 
     Raises InspectionError where fewer than eight points are left.
     """
+    if (filtered_mm is None) != (filtered_by is None):
+        raise ValueError("filtered deviations and the filter that gave them belong together: give both, or none")
     values = deviations.deviation_mm if filtered_mm is None else np.asarray(filtered_mm, dtype=np.float64)
     if values.shape != deviations.deviation_mm.shape:
         raise ValueError(f"expected {len(deviations)} filtered deviations, got shape {values.shape}")
@@ -113,12 +120,14 @@ def draw_actual_section(
     spline, rms = _draw_deviations(nominal, station, values, (start, end), spacing)
     unseen = _find_unseen(station, (start, end), _GAP_KNOTS * spacing if gap_max_mm is None else gap_max_mm, nominal.trailing == "round")
     section = _move_outline(nominal, spline, start)
-    at = section.parameter if nominal.trailing != "round" else start + (section.parameter - start) % (end - start)
+    at = section.parameter
     is_unseen = np.any((at[:, None] > unseen[:, 0]) & (at[:, None] < unseen[:, 1]), axis=1)
-    source: Source = "raw" if filtered_mm is None else "filtered"
+    source = "raw" if filtered_by is None else f"filtered ({filtered_by.words})"
     drawn = f"drawn from {len(station)} {source} deviations as a cubic spline with knots every {spacing:.4g} mm"
+    left = len(deviations) - len(station)
     gaps = tuple(f"nothing was measured from station {a:.3f} to {b:.3f} mm" for a, b in unseen)
-    notes = (f"{drawn}, which leaves {rms:.3g} mm rms", *gaps)
+    idle = (f"{left} points took no part: beyond an end, at a corner or on the flat of the trailing edge, or without a filtered value",)
+    notes = (f"{drawn}, which leaves {rms:.3g} mm rms", *(idle if left else ()), *gaps)
     return ActualSection(section, nominal, source, spacing, len(station), rms, unseen, is_unseen, notes)
 
 
@@ -191,13 +200,15 @@ def _move_outline(nominal: AirfoilSection, spline: BSpline, start: float) -> Air
     station = _stations(nominal, u, start)  # a spline over the station does not feel how the nominal is parametrised
     point, _, _, inward = nominal.frame(u)
     moved = point + (nominal.outward * nominal.inward * spline(station))[:, None] * inward
+    nose = float(_stations(nominal, nominal.parameter, start)[nominal.nose_sample])
     if nominal.trailing == "round":
         moved[-1] = moved[0]
         drawn = make_interp_spline(station, moved, k=_DEGREE, bc_type="periodic")
         curve = NurbsCurve(_DEGREE, drawn.c, drawn.t, closed=True)
-        return find_airfoil(curve, nominal.points_mm[nominal.nose_sample])
+        return section_on(curve, float(station[0]), float(station[-1]), "round", nominal.outward, nose)
     drawn = make_interp_spline(station, moved, k=_DEGREE)
-    return section_on(NurbsCurve(_DEGREE, drawn.c, drawn.t), float(station[0]), float(station[-1]), nominal.trailing, nominal.outward)
+    curve = NurbsCurve(_DEGREE, drawn.c, drawn.t)
+    return section_on(curve, float(station[0]), float(station[-1]), nominal.trailing, nominal.outward, nose)
 
 
 def _without_close_pairs(u: Array) -> Array:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from inspection.characteristics.outline import AirfoilSection, Edge, dense_parameters
+from inspection.characteristics.outline import FRONT, AirfoilSection, Edge, dense_parameters, largest_curvature
 from inspection.characteristics.section_value import SectionValue
 from inspection.curve import NurbsCurve
 from inspection.errors import InspectionError
@@ -38,7 +38,9 @@ def edge_radius(
     """
     tip, low, high = _edge_range(section, edge)
     if method == "curvature":
-        return _by_curvature(section, edge, tip)
+        near = section.point(np.array([tip]))[0]
+        u = dense_parameters(section.curve, low, high)
+        return _by_curvature(section, edge, largest_curvature(section.curve, u, near, FRONT * section.length_mm))
     if method != "circle":
         raise ValueError(f"the method must be curvature or circle, not {method!r}")
     if not 0 < window_deg <= 180:
@@ -57,10 +59,10 @@ def _edge_range(section: AirfoilSection, edge: Edge) -> tuple[float, float, floa
 
 def _by_curvature(section: AirfoilSection, edge: Edge, tip: float) -> SectionValue:
     """The radius of curvature at the tip."""
-    point, first, second, inward = section.frame(np.array([tip]))
-    curvature = abs(first[0, 0] * second[0, 1] - first[0, 1] * second[0, 0]) / np.hypot(*first[0]) ** 3
-    centre = point[0] + inward[0] / curvature
-    return SectionValue(f"{edge} edge radius", "curvature", float(1 / curvature), "mm", np.vstack([point[0], centre]), ("tip", "centre"))
+    point, first = section.curve.derivatives(np.array([tip]), 1)[:, 0]
+    radius = 1 / abs(float(section.curve.curvature(np.array([tip]))[0]))
+    inward = section.inward * np.array([-first[1], first[0]]) / np.hypot(*first)
+    return SectionValue(f"{edge} edge radius", "curvature", radius, "mm", np.vstack([point, point + radius * inward]), ("tip", "centre"))
 
 
 def _by_circle(curve: NurbsCurve, edge: Edge, window_deg: float, around: tuple[float, float, float]) -> SectionValue:

@@ -21,8 +21,9 @@ _NEWTON_STEPS = 12
 _SETTLED = 1e-14  # of the range of the parameter
 _NARROWEST_DEG = 30.0  # contacts that a centre sees closer together than this tell too little of where the circle is
 _END_ROUNDS = 8  # narrowing of the place at which the camber line can be followed no farther, 16-fold each
-_SHORTEST = 1e-3  # of the section's length: a shorter camber line is that of a round part
 _TANGENT = 1e-6  # cosine between the radius to a contact and the outline there: more is a search that did not settle
+_AS_LARGE = 1e-9  # of a radius: circles that differ by less are equal
+_OSCULATING = 1e-6  # radius times curvature of the outline, short of one: along an arc all circles are one, and touch it anywhere
 _INSIDE = 1e-7  # of the section's length: a place that lies this deep in a circle is taken as in it
 
 
@@ -97,7 +98,7 @@ def inscribe_circles(section: AirfoilSection, u: Array) -> InscribedCircles:
         is_whole &= radius > _INSIDE * section.length_mm
         for a, b in ((first, second), (v_first, v_second)):
             curvature = section.inward * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / np.hypot(*a.T) ** 3
-            is_whole &= radius * curvature <= 1 + 1e-9
+            is_whole &= radius * curvature <= 1 - _OSCULATING
         slip = np.abs(((centre - contact) * v_first).sum(axis=1)) / np.hypot(*v_first.T)
         is_whole &= slip <= _TANGENT * radius
         nearest = _nearest(centre, section.points_mm)
@@ -150,34 +151,38 @@ def find_camber_line(section: AirfoilSection) -> CamberLine:
     circles = inscribe_circles(section, u)
     if not circles.is_whole.any():
         raise InspectionError("no circle inside the outline touches both of its sides: it is no airfoil section")
-    best = int(np.nanargmax(np.where(circles.is_whole, circles.radius_mm, -1.0)))
-    low = _run_end(circles, best, -1)
-    high = _run_end(circles, best, 1)
+    size = np.where(circles.is_whole, circles.radius_mm, -1.0)
+    largest = np.flatnonzero(size >= (1 - _AS_LARGE) * size.max())  # many, where both sides are parallel
+    best = int(largest[len(largest) // 2])
+    low, high = _run_around(_goes_on(circles), best)
     towards_tail = _last_whole(section, u[low], u[low - 1] if low else section.first)
     towards_nose = _last_whole(section, u[high], u[high + 1] if high + 1 < len(u) else section.nose)
     found = inscribe_circles(section, np.concatenate([[towards_nose], u[low : high + 1][::-1], [towards_tail]]))
-    if np.hypot(*np.ptp(found.centre_mm, axis=0)) < _SHORTEST * section.length_mm:
-        raise InspectionError("all circles inside the outline have one centre: it is round, and no airfoil section")
     return _continue_to_edges(section, found)
 
 
-def _run_end(circles: InscribedCircles, start: int, step: int) -> int:
-    """The last circle, going by `step` from `start`, up to which all are whole and the contacts move on along both sides."""
-    at = start
-    while 0 <= at + step < len(circles.u) and circles.is_whole[at + step] and step * (circles.v[at + step] - circles.v[at]) <= 0:
-        at += step
-    return at
+def _goes_on(circles: InscribedCircles) -> NDArray[np.bool_]:
+    """Whether each circle (k - 1,) is whole and followed by a whole one with both contacts farther along their sides."""
+    farther = np.diff(circles.v) * np.diff(circles.u) <= 0
+    return np.asarray(circles.is_whole[:-1] & circles.is_whole[1:] & farther)
+
+
+def _run_around(goes_on: NDArray[np.bool_], at: int) -> tuple[int, int]:
+    """First and last circle of the run through circle `at` in which every one goes on to the next."""
+    stops = np.flatnonzero(~goes_on)
+    before, behind = stops[stops < at], stops[stops >= at]
+    return (int(before[-1]) + 1 if before.size else 0), (int(behind[0]) if behind.size else len(goes_on))
 
 
 def _last_whole(section: AirfoilSection, whole: float, beyond: float) -> float:
     """The parameter between one with a whole circle and one without, up to which circles are whole."""
     for _ in range(_END_ROUNDS):
         looked = np.linspace(whole, beyond, 17)
-        good = inscribe_circles(section, looked).is_whole
-        first_bad = int(np.argmin(good)) if not good.all() else len(looked)
-        if first_bad in (0, len(looked)):
-            break
-        whole, beyond = looked[first_bad - 1], looked[first_bad]
+        goes_on = _goes_on(inscribe_circles(section, looked))
+        if goes_on.all():
+            return float(beyond)
+        stop = int(np.argmin(goes_on))
+        whole, beyond = looked[stop], looked[stop + 1]
     return float(whole)
 
 

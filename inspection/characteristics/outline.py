@@ -22,9 +22,10 @@ Edge = Literal["leading", "trailing"]
 Side = Literal["upper", "lower"]
 
 _SAMPLES = 1200
-_FRONT = 0.1  # of the section's length: how far from the foremost place its nose may lie
+FRONT = 0.1  # of the section's length: how far from the foremost place its nose may lie
 _WIDEST_GAP = 0.2  # of the section's length: an outline that is open wider than this has lost a part, and is no section
 _SCOUT = 2000
+_AS_LARGE = 1e-6  # of a curvature: samples that differ by less lie on one arc
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,17 +68,27 @@ class AirfoilSection:
 
     def point(self, u: ArrayLike) -> Array:
         """Points (m, 2) at the parameters u (m,)."""
-        return self.curve.point(np.clip(u, self.first, self.last))
+        return self.curve.point(self._on_outline(u))
 
     def frame(self, u: Array) -> tuple[Array, Array, Array, Array]:
         """Point (m, 2), derivative by u (m, 2), second derivative (m, 2) and unit normal into the section (m, 2)."""
-        point, first, second = self.curve.derivatives(np.clip(u, self.first, self.last), 2)
+        point, first, second = self.curve.derivatives(self._on_outline(u), 2)
         unit = first / np.hypot(first[:, 0], first[:, 1])[:, None]
         return point, first, second, self.inward * np.column_stack([-unit[:, 1], unit[:, 0]])
 
     def neighbourhood(self, sample: int) -> tuple[float, float]:
-        """The parameters of the samples before and after one of them, so far as there are any."""
-        return float(self.parameter[max(sample - 1, 0)]), float(self.parameter[min(sample + 1, len(self.parameter) - 1)])
+        """The parameters of the samples before and after one of them, so far as there are any; around a round edge there always are."""
+        u, last = self.parameter, len(self.parameter) - 1
+        low, high = float(u[max(sample - 1, 0)]), float(u[min(sample + 1, last)])
+        if self.trailing == "round" and sample == 0:
+            low = float(u[-2]) - (self.last - self.first)
+        if self.trailing == "round" and sample == last:
+            high = float(u[1]) + (self.last - self.first)
+        return low, high
+
+    def _on_outline(self, u: ArrayLike) -> Array:
+        """Parameters (m,) within the outline: those beyond an end become that end, and a round outline has none."""
+        return np.asarray(u if self.trailing == "round" else np.clip(u, self.first, self.last), dtype=np.float64)
 
     def side_of(self, u: float) -> Side:
         """The side that a parameter lies on."""
@@ -112,8 +123,14 @@ def find_airfoil(nominal: NurbsCurve | NominalProfile, leading_near_mm: ArrayLik
     return section_on(curve, first, last, trailing, nominal.outward if isinstance(nominal, NominalProfile) else None)
 
 
-def section_on(curve: NurbsCurve, first: float, last: float, trailing: TrailingEdge, outward: float | None = None) -> AirfoilSection:
-    """The section whose outline runs from parameter `first` to `last` of a curve; `outward` None: the material lies inside."""
+def section_on(
+    curve: NurbsCurve, first: float, last: float, trailing: TrailingEdge, outward: float | None = None, nose: float | None = None
+) -> AirfoilSection:
+    """The section whose outline runs from parameter `first` to `last` of a curve.
+
+    outward : None where the material lies inside
+    nose    : where it is known, as on an actual section, whose largest curvature wanders with noise
+    """
     u = dense_parameters(curve, first, last)
     points = curve.point(u)
     ends = points[[0, -1]]
@@ -127,7 +144,8 @@ def section_on(curve: NurbsCurve, first: float, last: float, trailing: TrailingE
             f"this outline is no airfoil section: {what}, and it is {length:.4g} mm long; "
             f"corners and openings are taken at a trailing edge only, up to {_WIDEST_GAP:.0%} of the length"
         )
-    nose = _largest_curvature(curve, u, np.hypot(*(points - tip).T) < _FRONT * length)
+    if nose is None:
+        nose = largest_curvature(curve, u, tip, FRONT * length)
     u = np.unique(np.concatenate([u, [nose]]))
     points, tangent = curve.derivatives(u, 1)
     tangent = tangent / np.hypot(*tangent.T)[:, None]
@@ -183,7 +201,7 @@ def _round_range(curve: NurbsCurve, leading_near: Array | None) -> tuple[float, 
         other = one
         one = int(np.argmax(np.hypot(*(points - points[other]).T)))
     length = float(np.hypot(*(points[one] - points[other])))
-    tips = [_largest_curvature(curve, u, np.hypot(*(points - points[k]).T) < _FRONT * length) for k in (one, other)]
+    tips = [largest_curvature(curve, u, points[k], FRONT * length) for k in (one, other)]
     place, curvature = curve.point(tips), np.abs(curve.curvature(np.array(tips)))
     if leading_near is not None:
         trailing = int(np.argmax(np.hypot(*(place - leading_near).T)))
@@ -207,12 +225,25 @@ def dense_parameters(curve: NurbsCurve, first: float, last: float) -> Array:
     return np.asarray(dense)
 
 
-def _largest_curvature(curve: NurbsCurve, u: Array, allowed: NDArray[np.bool_]) -> float:
-    """The parameter of the largest curvature, in either sense, among the samples u (n,) that are allowed."""
-    size = np.where(allowed, np.abs(curve.curvature(u)), -1.0)
+def largest_curvature(curve: NurbsCurve, u: Array, near_mm: Array, within_mm: float) -> float:
+    """The parameter of the largest curvature, in either sense, among samples u (n,) that lie near a place (2,).
+
+    Where an edge is an arc, the curvature is as large all along it: then it is the middle of the arc.
+    """
+    size = np.where(np.hypot(*(curve.point(u) - near_mm).T) < within_mm, np.abs(curve.curvature(u)), -1.0)
     best = int(np.argmax(size))
-    low, high = u[max(best - 1, 0)], u[min(best + 1, len(u) - 1)]
-    return find_maximum(lambda at: np.abs(curve.curvature(at)), float(low), float(high))
+    low, high = _run_around(size >= (1 - _AS_LARGE) * size[best], best)
+    if high - low > 2:
+        return float(u[low] + u[high]) / 2
+    beside = u[max(best - 1, 0)], u[min(best + 1, len(u) - 1)]
+    return find_maximum(lambda at: np.abs(curve.curvature(at)), float(beside[0]), float(beside[1]))
+
+
+def _run_around(chosen: NDArray[np.bool_], at: int) -> tuple[int, int]:
+    """First and last of the samples in a row that are chosen, around one of them."""
+    others = np.flatnonzero(~chosen)
+    before, behind = others[others < at], others[others > at]
+    return (int(before[-1]) + 1 if before.size else 0), (int(behind[0]) - 1 if behind.size else len(chosen) - 1)
 
 
 def _area(points: Array) -> float:

@@ -9,6 +9,7 @@ from inspection import (
     InspectionError,
     NominalProfile,
     NurbsCurve,
+    ProfileFilter,
     compare_airfoil,
     compare_values,
     deviations,
@@ -145,16 +146,29 @@ def test_a_gap_around_the_tip_of_a_closed_section_is_seen_from_both_ends() -> No
     assert not actual.is_unseen[actual.section.nose_sample]
 
 
+def test_a_gap_inside_the_window_of_an_edge_leaves_its_circle_out() -> None:
+    points = on_ellipse(6000, 50.0, 6.04)
+    beside_the_tip = (points[:, 0] < -49.5) & (np.abs(points[:, 1] - 0.2) < 0.1)
+    result = compare_airfoil(drawn(points[~beside_the_tip], gap_max_mm=0.15))
+    (left,) = (one for one in result.left_out if one.name == "leading edge radius (circle)")
+    assert "inside the window" in left.reason
+
+
 def test_filtered_deviations_take_the_place_of_raw_ones_and_none_is_left_out() -> None:
     profile = nominal_ellipse()
     found = deviations(on_ellipse(2000, 50.0, 6.04), profile)
     half = np.where(np.arange(2000) % 7 == 0, np.nan, found.deviation_mm / 2)
-    actual = draw_actual_section(find_airfoil(profile), found, half)
-    assert actual.source == "filtered"
+    wanted = ProfileFilter(cutoff_mm=0.8)
+    actual = draw_actual_section(find_airfoil(profile), found, half, wanted)
+    assert actual.source == f"filtered ({wanted.words})"
+    assert "cutoff 0.8 mm" in actual.notes[0]
+    assert actual.notes[1].startswith("286 points took no part")
     assert actual.points == 2000 - 286
     assert thickening(actual) == pytest.approx(0.04, abs=1e-4)
     with pytest.raises(ValueError, match="expected 2000 filtered deviations"):
-        draw_actual_section(find_airfoil(profile), found, half[:-1])
+        draw_actual_section(find_airfoil(profile), found, half[:-1], wanted)
+    with pytest.raises(ValueError, match="give both, or none"):
+        draw_actual_section(find_airfoil(profile), found, half)
 
 
 def test_points_beyond_an_end_and_at_a_corner_draw_nothing() -> None:

@@ -3,7 +3,7 @@ import pytest
 
 from inspection import InspectionError, chord, chord_angle, evaluate_airfoil, find_airfoil, find_camber_line
 from tests.inspection.characteristics.airfoils import ellipse_section, file_section, file_values, value_of
-from tests.inspection.profiles import moved_curve, rotated
+from tests.inspection.profiles import moved_curve, rotated, stadium
 
 METHODS = ("nose-tail", "tangent", "x-extent", "minimum-circle", "maximum-distance")
 
@@ -70,3 +70,10 @@ def test_every_value_moves_with_the_section() -> None:
         other = by_key[value.key]
         assert other.value == pytest.approx(value.value + (70.0 if value.unit == "deg" else 0.0), abs=1e-7), value.key
         assert other.places_mm == pytest.approx(rotated(value.places_mm, 70.0, (3.0, -8.0)), abs=1e-4), value.key
+
+
+def test_the_extremes_of_a_round_section_may_lie_on_either_side_of_its_first_place() -> None:
+    section = find_airfoil(stadium(30.0, 4.0))
+    camber = find_camber_line(section)
+    for method in METHODS:
+        assert chord(section, camber, method).value == pytest.approx(68.0, abs=1e-9)  # type: ignore[arg-type]

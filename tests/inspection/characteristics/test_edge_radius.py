@@ -70,8 +70,11 @@ def test_the_circle_of_an_airfoil_does_not_depend_on_a_number_of_points(name: st
 
 
 def test_the_end_of_a_stadium_has_the_radius_of_its_arc_for_every_window() -> None:
-    section = find_airfoil(stadium(30.0, 4.0), leading_near_mm=(-30.0, 0.0))
-    assert edge_radius(section, "leading", "curvature").value == pytest.approx(4.0, abs=1e-9)
+    section = find_airfoil(stadium(30.0, 4.0))
+    for edge, sign in (("leading", -1), ("trailing", 1)):
+        for found in (edge_radius(section, edge, "curvature"), *(edge_radius(section, edge, "circle", window) for window in (20.0, 80.0))):  # type: ignore[arg-type]
+            assert found.value == pytest.approx(4.0, abs=1e-9)
+            assert found.places_mm[:2] == pytest.approx(np.array([[sign * 34.0, 0.0], [sign * 30.0, 0.0]]), abs=1e-2)
 
 
 def test_a_window_that_the_outline_does_not_fill_says_so() -> None:

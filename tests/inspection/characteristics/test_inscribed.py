@@ -6,7 +6,7 @@ import pytest
 from inspection import InspectionError, NurbsCurve, edge_thickness, find_airfoil, find_camber_line, maximum_camber, maximum_thickness
 from inspection.characteristics.inscribed import inscribe_circles
 from tests.inspection.characteristics.airfoils import bent_ellipse, ellipse_circles, ellipse_section, file_section, invert, invert_circles
-from tests.inspection.profiles import circle, moved_curve, naca
+from tests.inspection.profiles import circle, moved_curve, naca, stadium
 
 
 def test_the_circles_of_an_ellipse_are_those_of_the_closed_form() -> None:
@@ -106,7 +106,7 @@ def test_camber_and_thickness_do_not_change_when_the_section_is_turned_and_moved
 
 
 def test_an_outline_without_two_sides_has_no_camber_line() -> None:
-    with pytest.raises(InspectionError, match="it is round"):
+    with pytest.raises(InspectionError, match="no airfoil section"):
         find_camber_line(find_airfoil(circle(10.0)))
 
 
@@ -118,3 +118,11 @@ def test_camber_is_positive_towards_the_upper_side() -> None:
     mirrored = NurbsCurve(3, curve.control_points_mm * (1, -1), curve.knots, closed=True)
     upright, hanging = (maximum_camber(one, find_camber_line(one)).value for one in map(find_airfoil, (curve, mirrored)))
     assert hanging == pytest.approx(-upright)
+
+
+def test_parallel_sides_with_round_ends_have_a_straight_camber_line() -> None:
+    section = find_airfoil(stadium(30.0, 4.0))
+    camber = find_camber_line(section)
+    assert maximum_thickness(section, camber).value == pytest.approx(8.0, abs=1e-9)
+    assert maximum_camber(section, camber).value == pytest.approx(0.0, abs=1e-6)
+    assert np.vstack([camber.nose_mm, camber.tail_mm]) == pytest.approx(np.array([[-34.0, 0.0], [34.0, 0.0]]), abs=1e-3)
