@@ -34,8 +34,8 @@ class PoseTrack:
         self.registration = registration
         self._terms, self._start, self._centre = terms, self.pose, registration.centre_mm
         self._expected_form_mm = _PRIOR_SHARE * (terms.zone.upper_mm - terms.zone.lower_mm)
-        self._places, self._normals = nominal.points_mm[::_PLACES], nominal.outward * nominal.normal[::_PLACES]
-        self._stations = nominal.station_mm[::_PLACES]
+        self._places, self._normals = nominal.points_mm[::_PLACES].copy(), nominal.outward * nominal.normal[::_PLACES]
+        self._stations = nominal.station_mm[::_PLACES].copy()
         reach = float(np.hypot(*(self._places - self._centre).T).max())
         self._sums = GrowingSums(self._centre, reach, nominal.length_mm)
         for block in points.blocks():  # copied, because arrays that cannot be written to are another type to the compiler
@@ -79,8 +79,7 @@ class PoseTrack:
         if self._terms.fit == "minimum-zone":
             return math.inf
         if self._reserve_mm is None:
-            held = self._sums.holds_points(self._stations)
-            self._reserve_mm = self._sums.spread_mm(self._places[held], self._normals[held], self._scatter())
+            self._reserve_mm = self._sums.spread_mm(self._places, self._normals, self._scatter(), self._stations)
         return self._reserve_mm
 
     def is_clear(self, largest_mm: float) -> bool:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from inspection.cloud import Cloud, row_blocks
 from inspection.judged_rows import JudgedRows
-from inspection.kernels import JUDGED_AS, TALLY, Places, Room, judge_rows, take_in
+from inspection.kernels import JUDGED_AS, TALLY, Places, Room, judge_few_rows, judge_rows, take_in
 from inspection.rigid import RigidTransform
 from inspection.section import XY_PLANE, SectionPlane
 from inspection.signed_deviations import feet_on
@@ -75,7 +75,7 @@ class ScanRows:
         self.plane = plane
         self._keep_places(first - first % BLOCK, first)
         take_in(points_mm, plane.packed, off_section_max_mm, self.points, self._columns, self._places, self.base, first)
-        self.height[first : self._end] = plane.heights(points_mm)
+        self.height[first : self._end] = plane.heights(points_mm) if points_mm.shape[1] == 3 else 0.0
 
     def judge(self, first: int, stop: int, pose: RigidTransform, terms: Terms, reserve_mm: float = 0.0) -> None:
         """Fill in rows first .. stop - 1 as they are with the points at this pose, and keep their places.
@@ -184,8 +184,12 @@ class ScanRows:
         place = (math.cos(pose.rotation_rad), math.sin(pose.rotation_rad), *pose.translation_mm.tolist())
         outward, tip_mm, lower_mm, upper_mm, uncertainty_mm = terms.judgement
         judgement = (outward, tip_mm, lower_mm, upper_mm, uncertainty_mm + reserve_mm)
-        project = partial(feet_on, nominal=terms.nominal, method=terms.method)
-        judge_rows(self.points, self._columns, places, base, first, stop, place, project, judgement)
+        rows = (self.points, self._columns, places, base, first, stop, place)
+        nominal, method = terms.nominal, terms.method
+        if stop - first <= BLOCK and method != "inversion":
+            judge_few_rows(*rows, nominal.grid, nominal.table_for(method), method, judgement)
+        else:
+            judge_rows(*rows, partial(feet_on, nominal=nominal, method=method), judgement)
 
     def _keep_places(self, base: int, held: int) -> None:
         """Hold the places of the rows from `base` on: of those up to `held` as they are known, of the others as not judged yet."""
@@ -224,4 +228,5 @@ class ScanRows:
 
 def _places(count: int) -> tuple[Array, Array, Array]:
     """Room for the places of so many rows that are not judged yet."""
-    return np.full((count, 2), np.nan), np.full((count, 2), np.nan), np.full((count, 2), np.nan)
+    actual, foot, normal = np.full((3, count, 2), np.nan)
+    return actual, foot, normal

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from inspection.kernels.on_samples import SampleTables, project_on_samples
     from inspection.kernels.pose import NONE_LEFT_OUT, OutlierLimit, PoseEstimate, PoseFit
     from inspection.kernels.pose_sums import AT_ONCE
-    from inspection.kernels.rows import JUDGED_AS, TALLY, Columns, Judgement, Places, judge_rows, take_in
+    from inspection.kernels.rows import JUDGED_AS, TALLY, Columns, Judgement, Places, judge_few_rows, judge_rows, take_in
     from inspection.kernels.side_by_side import fit_compiled_beside
     from inspection.kernels.thinning import strides
 else:
@@ -34,7 +34,7 @@ else:
         "inspection.kernels.on_samples": ("SampleTables", "project_on_samples"),
         "inspection.kernels.pose": ("NONE_LEFT_OUT", "OutlierLimit", "PoseEstimate", "PoseFit"),
         "inspection.kernels.pose_sums": ("AT_ONCE",),
-        "inspection.kernels.rows": ("JUDGED_AS", "TALLY", "Columns", "Judgement", "Places", "judge_rows", "take_in"),
+        "inspection.kernels.rows": ("JUDGED_AS", "TALLY", "Columns", "Judgement", "Places", "judge_few_rows", "judge_rows", "take_in"),
         "inspection.kernels.side_by_side": ("fit_compiled_beside",),
         "inspection.kernels.thinning": ("strides",),
     }
@@ -69,6 +69,7 @@ __all__ = [
     "compile_projection",
     "compiled_code_folder",
     "fit_compiled_beside",
+    "judge_few_rows",
     "judge_rows",
     "project",
     "project_on_samples",

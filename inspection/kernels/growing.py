@@ -24,6 +24,8 @@ from inspection.kernels.normal_equations import fill_covariance, newton_step
 
 Array = NDArray[np.float64]
 
+_ANYWHERE: Array = np.empty(0)
+
 
 class GrowingSums:
     """Normal equations of a pose that grow point by point, about a pose fitted before.
@@ -80,19 +82,18 @@ class GrowingSums:
         """Half the mean squared change of the deviation from point to point, mm^2."""
         return float(self._change[0] / max(self.count, 1.0) / 2.0)
 
-    def holds_points(self, station_mm: Array) -> NDArray[np.bool_]:
-        """Whether the 64th of the length at stations (k,) holds a point."""
-        bins = (station_mm / self._frame[0][3] * len(self._marks)).astype(np.int64)
-        return np.asarray(self._marks[np.clip(bins, 0, len(self._marks) - 1)] > 0)
-
     @property
     def covered(self) -> float:
         """Share of the length that holds points."""
         return float(self._marks.mean())
 
-    def spread_mm(self, places_mm: Array, normals: Array, scatter: float) -> float:
-        """Largest standard deviation of the pose's effect on a deviation at any place, for independent errors of that variance."""
-        return float(_spread(np.array(places_mm), np.array(normals), scatter, self._frame[0], self._sums))  # copies are of one type
+    def spread_mm(self, places_mm: Array, normals: Array, scatter: float, station_mm: Array = _ANYWHERE) -> float:
+        """Largest standard deviation of the pose's effect on a deviation at any place, for independent errors of that variance.
+
+        station_mm : of the places; only those count whose 64th of the length holds points. (0,) for all
+        """
+        given = np.array(places_mm), np.array(normals), np.array(station_mm)  # copies are of one type
+        return float(_spread(*given, scatter, self._frame[0], self._sums, self._marks))
 
 
 @kernel
@@ -139,11 +140,13 @@ def _move(sums: Any, frame: Any, motion: Any) -> None:
 
 
 @kernel
-def _spread(places: Any, normals: Any, scatter: float, frame: Any, sums: Any) -> float:
+def _spread(places: Any, normals: Any, station: Any, scatter: float, frame: Any, sums: Any, marks: Any) -> float:
     covariance = np.empty((3, 3))
     fill_covariance(sums, frame[2], scatter, covariance)
     most = 0.0
     for i in range(len(places)):
+        if len(station) > 0 and marks[min(max(int(station[i] / frame[3] * len(marks)), 0), len(marks) - 1)] == 0.0:
+            continue
         gx, gy = normals[i, 0], normals[i, 1]
         turn = (places[i, 0] - frame[0]) * gy - (places[i, 1] - frame[1]) * gx
         x = covariance[0, 0] * gx + covariance[0, 1] * gy + covariance[0, 2] * turn

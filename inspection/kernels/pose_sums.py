@@ -142,7 +142,7 @@ def add_up(problem: Any, projection: Any, pose: Any, span: Any, marks: Any, firs
     before, takes_part = marks
     limit, off = tukey
     m = len(weights)
-    moved, feet = np.empty(2 * AT_ONCE), _new_feet(min(AT_ONCE, m))
+    moved, feet = np.empty(2 * AT_ONCE), new_feet(min(AT_ONCE, m))
     lanes = array_at(stack_reals(), REALS)
     x0, y0 = centre_of(pose, span)
     chunk = claim_chunk(claimed) // CHUNK
@@ -171,8 +171,8 @@ def _weigh(feet: Any, outward: float, tip: float, limit: float, off: Any, weight
 
 
 @inner_kernel
-def _new_feet(count: int) -> Any:
-    """Memory for the feet of a chunk."""
+def new_feet(count: int) -> Any:
+    """Memory for so many feet, within a kernel."""
     return Feet(
         np.empty(count),
         np.empty((count, 2)),

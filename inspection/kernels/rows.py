@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from inspection.kernels.blocks import CurveTables
 from inspection.kernels.compiling import kernel
 from inspection.kernels.feet import Feet
 from inspection.kernels.layout import (
@@ -24,6 +25,8 @@ from inspection.kernels.layout import (
     PLANE_Y_AXIS,
     UNCERTAIN,
 )
+from inspection.kernels.on_samples import SampleTables, project_by, projection_of
+from inspection.kernels.pose_sums import new_feet
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int8]
@@ -56,6 +59,38 @@ def judge_rows(
     judgement : 1.0 where left of the curve is out of material, else -1.0; tip radius, lower and upper limit, uncertainty in mm
     """
     feet = project(place_rows(section_mm, columns[3], first, stop, pose))
+    _judge(
+        feet.foot_mm, feet.distance_mm, feet.gradient, feet.curvature, feet.station_mm, feet.vertex, judgement, first, base, columns, places
+    )
+
+
+def judge_few_rows(
+    section_mm: Array,
+    columns: Columns,
+    places: Places,
+    base: int,
+    first: int,
+    stop: int,
+    pose: tuple[float, float, float, float],
+    grid: CurveTables,
+    table: SampleTables | None,
+    method: str,
+    judgement: Judgement,
+) -> None:
+    """The same as `judge_rows`, by one compiled call in this thread: for a batch of a live scan three calls take longer than its points.
+
+    grid, table, method : the curve, and the samples where the method looks at those only
+    """
+    curve = (projection_of(table, method), grid.reals, grid.integers)
+    _judge_few(section_mm, columns, places, base, first, stop, pose, curve, judgement)
+
+
+@kernel
+def _judge_few(section: Any, columns: Any, places: Any, base: int, first: int, stop: int, pose: Any, curve: Any, judgement: Any) -> None:
+    projection, reals, integers = curve
+    moved, feet = np.empty((stop - first, 2)), new_feet(stop - first)
+    _place(section, columns[3], first, pose, moved)
+    project_by(projection, moved.reshape(-1), reals, integers, feet)
     _judge(
         feet.foot_mm, feet.distance_mm, feet.gradient, feet.curvature, feet.station_mm, feet.vertex, judgement, first, base, columns, places
     )

@@ -1,13 +1,16 @@
 """Rows of a scan: which points are rejected and why, and that the compiled verdict is the rule of the tolerance zone."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
 
-from inspection import Rejection, SectionPlane, ToleranceZone
-from inspection.kernels import JUDGED_AS, TALLY, Columns, Feet, Judgement, judge_rows, take_in
+from inspection import Method, Rejection, SectionPlane, ToleranceZone
+from inspection.kernels import JUDGED_AS, TALLY, Columns, Feet, Judgement, judge_few_rows, judge_rows, take_in
+from inspection.signed_deviations import feet_on
 from inspection.verdict import NOT_JUDGED
-from tests.inspection.profiles import Array
+from tests.inspection.profiles import Array, nominal_of
 
 Codes = NDArray[np.int8]
 PLANE = SectionPlane(np.array([10.0, -4.0, 7.0]), np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0]))  # y is the machine's z
@@ -93,3 +96,23 @@ def test_rows_are_placed_by_the_pose_and_those_that_cannot_be_used_come_as_nan()
     judge_rows(section, columns, places, 1, 1, 5, turned, project, (1.0, 0.0, -1.0, 1.0, 0.0))
     assert np.array_equal(seen[0], [(9.0, 22.0), (np.nan, np.nan), (np.nan, np.nan), (10.0, 25.0)], equal_nan=True)
     assert columns[2].tolist() == [NOT_JUDGED, 0, NOT_JUDGED, NOT_JUDGED, 0]
+
+
+@pytest.mark.parametrize("method", ["exact", "pcp"])
+def test_few_rows_are_judged_as_many_are(method: Method) -> None:
+    nominal, rng = nominal_of("NACA 2412 sharp"), np.random.default_rng(6)
+    section = nominal.curve.point(rng.uniform(0, 1, 64)) + rng.normal(0, 0.4, (64, 2))
+    section[5] = np.nan
+    rejection = np.zeros(64, dtype=np.int8)
+    rejection[5], rejection[6] = Rejection.NOT_FINITE, Rejection.OUTLIER
+    pose, limits = (np.cos(0.01), np.sin(0.01), 0.1, -0.2), (nominal.outward, 0.25, -0.5, 0.4, 0.01)
+    together, in_threes = ((columns_of(rejection.copy()), (np.zeros((64, 2)), np.zeros((64, 2)), np.zeros((64, 2)))) for _ in range(2))
+    judge_rows(section, *together, 0, 0, 64, pose, lambda moved: feet_on(moved, nominal, method), limits)
+    for first in range(0, 64, 3):
+        stop = min(first + 3, 64)
+        judge_few_rows(section, *in_threes, 0, first, stop, pose, nominal.grid, nominal.table_for(method), method, limits)
+    wanted: list[NDArray[Any]] = [*together[0], *together[1]]
+    found: list[NDArray[Any]] = [*in_threes[0], *in_threes[1]]
+    for one, other in zip(wanted, found, strict=True):
+        assert np.array_equal(one, other, equal_nan=True)
+    assert (together[0][2] >= 0).sum() > 50
