@@ -90,8 +90,7 @@ def descend(
     unit_mm : what a value of 1 is in mm: the first trust region is the largest value
     """
     if freedoms is None:
-        moved = start.apply(points)
-        freedoms = Freedoms.about(moved[look(moved).takes_part].mean(axis=0) if len(points) else np.zeros(2))
+        freedoms = Freedoms.about(start.apply(points).mean(axis=0))
     problem = _Problem(look, start, freedoms, unit_mm, is_over)
     if len(points) <= MANY:
         return problem.descend(points, np.zeros(len(freedoms)))
@@ -146,8 +145,8 @@ class _Problem(NamedTuple):
         here = self.values(points, amounts)
         trust = here.largest * self.unit_mm
         active, multipliers = np.empty(0, dtype=np.int64), np.empty(0)
-        programs, converged = 0, False
-        while programs < _MOST_PROGRAMS and not converged and not self.is_over():
+        programs, converged, can_go = 0, False, bool(here.takes_part.any())
+        while can_go and programs < _MOST_PROGRAMS and not converged and not self.is_over():
             step = self._step(points, here, amounts, trust)
             programs += 1
             active, multipliers, moves, gain = step.active, step.multipliers, step.moves_mm, here.largest - step.promised

@@ -21,7 +21,8 @@ _GAMMA = {0: math.sqrt(math.log(2) / math.pi), 2: 0.7309134280564225}  # the sec
 _WINDOW = {0: 1.0, 2: 1.5}  # of the cutoff, to either side: beyond it the kernel is below 2e-6
 _GAP = 0.5  # of the cutoff: farther from every point there is no value
 _TUKEY = 4.4478  # times the median of |residual|: beyond it a point counts for nothing (ISO 16610-31)
-_MOST_ROUNDS = 100
+_MOST_ROUNDS = 50
+_NO_SPIKE_MM = 1e-6  # a residual below a nanometre is none, however smooth the profile is
 _SETTLED = 1e-6  # relative change of Tukey's limit
 _DETERMINED = 1e-10  # determinant of the moments, in units of the cutoff, below which the points determine no parabola
 _PAIRS_AT_ONCE = 1 << 15  # their values stay in the cache
@@ -67,12 +68,15 @@ class FilteredProfile:
                   not determine the polynomial
     weight      : (m,) of each point by the robust filter, 0 for a spike; 1 without it, 0 for points that took no part
     rounds      : of the robust filter; 1 without it
+    settled     : the robust filter's limit changed by less than a millionth in its last round; True without it. Where it did not, the
+                  limit goes to and fro between residuals of neighbouring size
     pairs       : kernel values that were worked out, all rounds together
     """
 
     waviness_mm: Array
     weight: Array
     rounds: int
+    settled: bool
     pairs: int
 
     def __post_init__(self) -> None:
@@ -124,7 +128,7 @@ def filter_profile(
     if not wanted.cutoff_mm <= length_mm:
         raise ValueError(f"a cutoff of {wanted.cutoff_mm:g} mm is longer than the profile ({length_mm:g} mm)")
     asked = station if at_mm is None else np.asarray(at_mm, dtype=np.float64)
-    waviness, weight, rounds, pairs = np.full(len(asked), np.nan), np.zeros(len(station)), 1, 0
+    waviness, weight, rounds, settled, pairs = np.full(len(asked), np.nan), np.zeros(len(station)), 1, True, 0
     for stretch in _stretches(length_mm, closed, np.unique(np.asarray(corners_mm, dtype=np.float64))):
         along = stretch.along(station)
         rows = np.flatnonzero(np.isfinite(along) & np.isfinite(deviation))
@@ -132,12 +136,12 @@ def filter_profile(
             continue
         rows = rows[np.argsort(along[rows], kind="stable")]
         smoother = _Smoother(stretch, along[rows], deviation[rows], wanted)
-        weight[rows], taken = smoother.weigh()
+        weight[rows], taken, stands = smoother.weigh()
         where = stretch.along(asked)
         here = np.flatnonzero(np.isfinite(where))
         waviness[here] = smoother.values(weight[rows], where[here])
-        rounds, pairs = max(rounds, taken), pairs + smoother.pairs
-    return FilteredProfile(waviness, weight, rounds, pairs)
+        rounds, settled, pairs = max(rounds, taken), settled and stands, pairs + smoother.pairs
+    return FilteredProfile(waviness, weight, rounds, settled, pairs)
 
 
 def _stretches(length_mm: float, closed: bool, corners_mm: Array) -> list[_Stretch]:
@@ -161,20 +165,20 @@ class _Smoother:
         self._share = _shares(station, stretch, wanted.cutoff_mm)
         self.pairs = 0
 
-    def weigh(self) -> tuple[Array, int]:
-        """Weight (k,) of each point by the robust filter, 1 without it, and the rounds until they stood."""
+    def weigh(self) -> tuple[Array, int, bool]:
+        """Weight (k,) of each point by the robust filter, 1 without it; the rounds, and whether the weights stand."""
         weight = np.ones(len(self._station))
         if not self._filter.robust:
-            return weight, 1
+            return weight, 1, True
         limit = np.inf
-        for taken in range(1, _MOST_ROUNDS + 1):  # noqa: B007 - the count is part of the result
+        for taken in range(1, _MOST_ROUNDS + 1):
             residual = np.abs(self._deviation - self.values(weight, self._station))
             residual = np.where(np.isnan(residual), 0.0, residual)
-            before, limit = limit, _TUKEY * _weighted_median(residual, self._share)
-            if abs(limit - before) <= _SETTLED * limit or limit == 0:
-                break
+            before, limit = limit, max(_TUKEY * _weighted_median(residual, self._share), _NO_SPIKE_MM)
+            if abs(limit - before) <= _SETTLED * limit:
+                return weight, taken, True
             weight = np.where(residual < limit, np.square(1.0 - np.square(residual / limit)), 0.0)
-        return weight, taken
+        return weight, _MOST_ROUNDS, False
 
     def values(self, weight: Array, at: Array) -> Array:
         """The waviness at places (n,) of the stretch, with weights (k,) beside the shares."""

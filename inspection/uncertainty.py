@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 PartName = Literal["repeatability", "device", "tip radius", "temperature"]
 
 _FREE = 1e-9  # a motion whose eigenvalue is below this share of the largest changes no deviation, and is not fitted
-_MOST_GROUPS = 2048  # of neighbouring points that stand together where the device's error is summed up: it changes slowly
+_MOST_GROUPS = 512  # of neighbouring points that stand together where the device's error is summed up: it changes slowly
 _AT_ONCE = 512  # places whose errors are compared with those of all points together
 _FAR = 8.0  # standard deviations: farther below the largest, a point has no share in what noise adds to it
 _NODES = 2001
@@ -209,10 +209,10 @@ def _of_device(fit: _Places, there: _Places, gain: Array, budget: UncertaintyBud
 
     def moved(places: Array) -> tuple[Array, Array]:
         """Covariance (n, k) of the errors in x, and in y, at places (n, 2) with the amounts of the motions."""
-        rows = [slice(i, i + _AT_ONCE) for i in range(0, len(places), _AT_ONCE)]
-        found = [[_covariance(places[part], at, near, A, share) @ pull.T for part in rows] for pull in pulls]
-        x, y = (np.concatenate(each) if each else np.empty((0, len(gain))) for each in found)
-        return x, y
+        both = np.concatenate(pulls).T  # (groups, 2 k)
+        blocks = [_covariance(places[i : i + _AT_ONCE], at, near, A, share) @ both for i in range(0, len(places), _AT_ONCE)]
+        found = np.concatenate(blocks)
+        return found[:, : len(gain)], found[:, len(gain) :]
 
     x, y = moved(at)
     pose = pulls[0] @ x + pulls[1] @ y
@@ -225,8 +225,8 @@ def _of_device(fit: _Places, there: _Places, gain: Array, budget: UncertaintyBud
 
 def _covariance(places: Array, others: Array, near: float, A: float, share: float) -> Array:
     """Covariance (n, g) of the part of the device's error that changes slowly."""
-    length = np.hypot(places[:, None, 0] - others[:, 0], places[:, None, 1] - others[:, 1])
-    return np.asarray(near - share * length * (2 * A + share * length) / 6)
+    square = np.square(places[:, None, 0] - others[:, 0]) + np.square(places[:, None, 1] - others[:, 1])
+    return np.asarray(near - share / 6 * (2 * A * np.sqrt(square) + share * square))
 
 
 def largest_by_noise_mm(deviation_mm: ArrayLike, standard_mm: ArrayLike) -> float:

@@ -43,7 +43,7 @@ def test_reference_values_of_the_robust_filter() -> None:
     found = filter_profile(*reference(), LENGTH, True, ProfileFilter(CUTOFF, 2, robust=True))
     printed = [0.009584966, 0.014463928, 0.014882235, 0.015252561, -0.009584967]
     np.testing.assert_allclose(found.waviness_mm[[0, 122, 123, 124, 200]], printed, rtol=0, atol=6e-10)
-    assert (found.weight[123], found.rounds) == (0.0, 6)
+    assert (found.weight[123], found.rounds, found.settled) == (0.0, 6, True)
 
 
 @pytest.mark.parametrize(
@@ -120,6 +120,13 @@ def test_spikes_do_not_draw_the_robust_waviness() -> None:
     assert rms[1] < 0.8
     assert (robust.weight[spikes] == 0).all()
     assert (np.delete(robust.weight, spikes) == 0).mean() < 0.01
+
+
+def test_a_profile_smoother_than_a_nanometre_has_no_spikes() -> None:
+    s = np.arange(1000) / 5
+    found = filter_profile(s, 0.02 * np.sin(2 * np.pi * s / 50), LENGTH, True, ProfileFilter(1.6, 2, robust=True))
+    assert (found.settled, found.rounds) == (True, 2)
+    assert found.weight.min() > 0.5
 
 
 @pytest.mark.parametrize("robust", [False, True])
