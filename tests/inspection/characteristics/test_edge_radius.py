@@ -39,7 +39,7 @@ def test_the_radius_of_curvature_of_an_ellipse_is_that_of_the_closed_form() -> N
         assert np.abs(found.places_mm[1]) == pytest.approx([50 - 0.72, 0], abs=1e-5)
 
 
-@pytest.mark.parametrize("window_deg", [20.0, 30.0, 60.0])
+@pytest.mark.parametrize("window_deg", [20.0, 60.0])
 def test_the_circle_of_a_window_is_that_of_an_independent_fit(window_deg: float) -> None:
     arc = ellipse_arc(window_deg, 20_000)
     x, y, radius = circle_through(arc)
@@ -50,11 +50,11 @@ def test_the_circle_of_a_window_is_that_of_an_independent_fit(window_deg: float)
     assert np.abs(found.places_mm[2:, 1]) == pytest.approx(np.abs(arc[[0, -1], 1]), rel=1e-3)
 
 
-@pytest.mark.parametrize(("name", "window_deg"), [("goe404", 30.0), ("e387", 60.0), ("s1223", 60.0)])
+@pytest.mark.parametrize(("name", "window_deg"), [("goe404", 30.0), ("e387", 60.0)])
 def test_the_circle_of_an_airfoil_does_not_depend_on_a_number_of_points(name: str, window_deg: float) -> None:
     section = file_section(name)
     found = edge_radius(section, "leading", "circle", window_deg)
-    u = np.linspace(section.first, section.last, 400_001)
+    u = np.linspace(section.first, section.last, 200_001)
     points, first = section.curve.derivatives(u, 1)
     heading = np.unwrap(np.arctan2(first[:, 1], first[:, 0]))
     tip = int(np.searchsorted(u, section.nose))
