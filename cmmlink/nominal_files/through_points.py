@@ -22,6 +22,9 @@ _ABOVE_NEIGHBOURS = 3.0
 _BLUNT_EDGE = 0.02  # of the size: a gap up to this, with its ends side by side, is the edge of a closed profile
 _FACING_DEG = 90.0  # both turns together: the sides run towards the edge within 90 deg of one direction
 _OPEN = 0.25  # of the size: a profile with a larger gap is open
+_STEPS_ALONG_LINES = (0, 1, 2, 4, 8)  # tried in turn: so many steps before an edge are laid along the lines between their points
+_INTO_THE_EDGE = "runs into the edge along the lines from the neighbouring points"
+_PARTS = 4  # of each of those steps
 _LIKE_A_STEP = 1.5  # a gap no larger than the steps beside it may be a step itself: a loop that does not repeat its first point
 
 
@@ -86,21 +89,34 @@ def _without_crossing(points: Array, corner_at_seam: bool) -> tuple[NurbsCurve, 
     """Interpolate points between two ends, or from corner to corner, so that the curve does not cross itself; and what was mended.
 
     A smooth curve can turn itself inside out in the last micrometres before a sharp edge, where nothing but its own smoothness
-    holds its tangents. Laid along the lines to the neighbouring points they meet at the angle that the points show.
+    holds its tangents. Laid along the lines to the neighbouring points they meet at the angle that the points show. Where the sides
+    run so close together that its bends between the points still cross, the curve keeps to the lines between the points there.
     """
     smoothest = NurbsCurve.interpolate(points, _DEGREE, closed=corner_at_seam, corner_at_seam=corner_at_seam)
     crossings = find_crossings(smoothest)
-    mended = smoothest
-    if crossings:
-        mended = NurbsCurve.interpolate(points, _DEGREE, closed=corner_at_seam, corner_at_seam=corner_at_seam, ends_along_chords=True)
-    if not crossings or find_crossings(mended):
+    if not crossings:
+        return smoothest, []
+    for steps in _STEPS_ALONG_LINES:
+        through = _divide_steps(points, steps, corner_at_seam)
+        mended = NurbsCurve.interpolate(through, _DEGREE, closed=corner_at_seam, corner_at_seam=corner_at_seam, ends_along_chords=True)
+        if not find_crossings(mended):
+            break
+    else:
         return smoothest, []
     before = [min(crossing.first_mm, smoothest.length_mm - crossing.second_mm) for crossing in crossings]
     place = f"{max(before):.3g} mm before the edge, at ({crossings[-1].x_mm:.6g}, {crossings[-1].y_mm:.6g})"
-    return mended, [
-        f"mended: the smoothest curve through the points would cross itself {place}; it runs into the edge along the lines from the "
-        "neighbouring points instead, through every point"
-    ]
+    way = f"keeps to the lines between the last {steps + 1} points of both sides" if steps else _INTO_THE_EDGE
+    return mended, [f"mended: the smoothest curve through the points would cross itself {place}; it {way} instead, through every point"]
+
+
+def _divide_steps(points: Array, steps: int, closed: bool) -> Array:
+    """The points with so many steps at either end divided evenly, by points on the lines between them; closed steps back to the first."""
+    ring = np.vstack([points, points[:1]]) if closed else points
+    count = len(ring) - 1
+    divided = np.minimum(np.arange(count), np.arange(count)[::-1]) < steps
+    share = np.arange(_PARTS) / _PARTS
+    rows = [ring[i] + np.outer(share if divided[i] else share[:1], ring[i + 1] - ring[i]) for i in range(count)]
+    return np.vstack(rows if closed else [*rows, ring[-1:]])
 
 
 def _with_straight_join(points: Array, body: NurbsCurve) -> NurbsCurve:

@@ -99,6 +99,18 @@ def test_points_outside_a_sharp_tip_have_positive_deviations(tmp_path: Path, poi
 NEARLY_CUSPED = edge(np.radians(6), np.radians(7), np.linspace(0, 1, 61), 0.8, 1.0, 5)
 
 
+def test_an_edge_whose_sides_nearly_touch_keeps_to_the_lines_between_its_points(tmp_path: Path) -> None:
+    """Laid along the last lines alone the curve still crosses itself in its bends between the points behind them."""
+    points = edge(np.radians(3.5), np.radians(6), np.linspace(0, 1, 70), 0.8, 0.5, 4)
+    assert find_crossings(NurbsCurve.interpolate(points[:-1], 3, closed=True, corner_at_seam=True, ends_along_chords=True))
+    nominal = loaded(tmp_path, points)
+    assert not find_crossings(nominal.curve)
+    check_signs(nominal.curve, points)
+    assert "it keeps to the lines between the last 2 points of both sides instead, through every point" in nominal.notes[1]
+    chord = (points[1] + points[0]) / 2
+    assert abs(deviations(chord[None], discretize(nominal.curve, samples=200, step_min=0.9)).deviation_mm[0]) < 1e-3
+
+
 def test_an_edge_that_the_smoothest_curve_turns_inside_out_is_mended(tmp_path: Path) -> None:
     inside_out = NurbsCurve.interpolate(NEARLY_CUSPED, closed=True, corner_at_seam=True)
     (crossing,) = find_crossings(inside_out)
