@@ -13,10 +13,10 @@ from inspection.errors import NotMeasured
 from inspection.nominal import NominalProfile
 from inspection.registration import no_outliers
 from inspection.scan_rows import ScanRows
+from inspection.signed_deviations import KILOMETRE_MM
 
 Array = NDArray[np.float64]
 
-_KILOMETRE_MM = 1e6  # as for what devices and files give
 _FAR_SIZES = 2.0  # of the nominal's size from the middle of the points: no point of the part lies there
 _FAR_SPREADS = 4.0  # and so many times the distance within which nine of ten points lie
 _FEW = 0.1  # of the points: more than these are not a few
@@ -39,11 +39,11 @@ def space_of(rows: ScanRows, points: Cloud, far: NDArray[np.bool_] | None = None
 
 def refuse_beyond_a_kilometre(space_mm: Array, count: int) -> None:
     """Raise NotMeasured where more than a few of the points, of which (m, 3) stand for all `count`, lie where no part can be."""
-    beyond = int(np.count_nonzero((np.abs(space_mm) > _KILOMETRE_MM).any(axis=1)))
+    beyond = int(np.count_nonzero((np.abs(space_mm) > KILOMETRE_MM).any(axis=1)))
     if beyond > _FEW * len(space_mm):
         told = f"{beyond} of {count} points" if count == len(space_mm) else f"{beyond / len(space_mm):.0%} of {count} points"
         raise NotMeasured(
-            f"{told} have coordinates that no part can have, beyond {_KILOMETRE_MM:g} mm: are the unit and the columns right, or the order "
+            f"{told} have coordinates that no part can have, beyond {KILOMETRE_MM:g} mm: are the unit and the columns right, or the order "
             "of the words in a register map (word_order)?"
         )
 

@@ -6,6 +6,7 @@ from typing import get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inspection.curve import NurbsCurve
 from inspection.inversion import invert_points
 from inspection.kernels import Feet, project, project_on_samples, turn_outward
 from inspection.methods import Method
@@ -13,6 +14,7 @@ from inspection.nominal import NominalProfile
 
 Array = NDArray[np.float64]
 
+KILOMETRE_MM = 1e6  # as for what devices and files give: no part is so far from zero
 _METHODS = get_args(Method)
 
 
@@ -71,14 +73,30 @@ def deviations(points_mm: ArrayLike, nominal: NominalProfile, method: Method = "
                     on the bottom: that stretch stays unmeasured. Raises ValueError for a radius that no ball has,
                     and for a ball that fits nowhere.
     """
-    points = _pairs(points_mm)
+    points = check_points(points_mm)
     check_tip_radius(tip_radius_mm, nominal)
     check_method(method)
     feet = feet_on(points, nominal, method)
-    beyond_end, at_vertex, are_numbers = turn_outward(feet, nominal.outward, tip_radius_mm)
-    if not are_numbers:  # as for a point that is not finite: the points are gone through only then
-        check_points(points)
+    if method == "exact" and nominal.curve.closed:
+        _set_seam(feet, nominal.curve)
+    beyond_end, at_vertex, _ = turn_outward(feet, nominal.outward, tip_radius_mm)
     return Deviations(feet.distance_mm, feet.foot_mm, feet.parameter, feet.station_mm, feet.gradient, feet.curvature, beyond_end, at_vertex)
+
+
+def _set_seam(feet: Feet, curve: NurbsCurve) -> None:
+    """Tell parameter and arc length of feet at the seam by where they lie; the projection holds both in the curve's range."""
+    start, end = curve.domain
+    rows = np.flatnonzero((feet.parameter == start) | (feet.parameter == end))
+    if not len(rows):
+        return
+    (place, after), (_, before) = (curve.derivatives(at, 1)[:, 0] for at in (start, end))
+    for row in rows:
+        off = feet.foot_mm[row] - place
+        ahead = off @ after > 0
+        step = float(off @ after / (after @ after)) if ahead else float(off @ before / (before @ before))
+        feet.parameter[row] = min(max((start if ahead else end) + step, start), end)
+        travel = step * float(np.linalg.norm(after if ahead else before))
+        feet.station_mm[row] = min(max(travel if ahead else curve.length_mm + travel, 0.0), curve.length_mm)
 
 
 def feet_on(points_mm: Array, nominal: NominalProfile, method: Method) -> Feet:
@@ -97,11 +115,12 @@ def check_method(method: str) -> None:
 
 
 def check_points(points_mm: ArrayLike) -> Array:
-    """Points as a finite float array (m, 2). Raises ValueError naming the first bad row."""
+    """Points as a float array (m, 2) of places that a part can have. Raises ValueError naming the first bad row."""
     points = _pairs(points_mm)
-    if not np.isfinite(points).all():
-        bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
-        raise ValueError(f"point {bad[0] + 1} is not finite: {points[bad[0]]}")
+    if not (points.min(initial=0.0) >= -KILOMETRE_MM and points.max(initial=0.0) <= KILOMETRE_MM):  # or one is no number
+        row = int(np.argmin((np.abs(points) <= KILOMETRE_MM).all(axis=1)))
+        what = f"lies beyond {KILOMETRE_MM:g} mm, where no part is" if np.isfinite(points[row]).all() else "is not finite"
+        raise ValueError(f"point {row + 1} {what}: {points[row]}")
     return points
 
 

@@ -40,6 +40,8 @@ OPENING, POINT, HEARTBEAT, CLOSING = range(4)
 INVALID = 1
 UNITS_PER_MM = 1e5
 RUN = 256  # frames looked at together at most
+PACE_POINTS = 256  # of which the pace of a device is learned
+PAUSE = 4.0  # times the usual time from point to point, and the device has paused
 SHORTEST_RUN = 4  # and where runs keep breaking off, so that a frame costs a few checksums, whatever stands behind it
 
 
@@ -84,9 +86,7 @@ class BinaryDecoder:
         self._counter = SequenceCounter(1 << 16)
         self._clock = WrappingClock(1 << 32, 1e6)
         self._in_blocks = self._said_again = False
-        self._last_us: int | None = None
-        self._last_sequence = -1
-        self._us_per_point = 0.0
+        self._newest = np.empty((0, 2), dtype=np.int64)  # number and time of the newest points, at most PACE_POINTS
 
     def _take_run(self, data: bytes, start: int) -> int:
         """Take good points in sequence, many at once; return the number of bytes used."""
@@ -229,23 +229,25 @@ class BinaryDecoder:
         return counter if anew else sequence
 
     def _append_batch(self, sequence: NDArray[np.int64], t_us: NDArray[np.int64], xyz: NDArray[np.int32]) -> None:
-        self._learn_pace(int(sequence[-1]), int(t_us[-1]))
+        newest = np.column_stack([sequence[-PACE_POINTS:], t_us[-PACE_POINTS:]])
+        self._newest = np.concatenate([self._newest[len(newest) - PACE_POINTS :], newest]) if len(newest) < PACE_POINTS else newest
         time_s = t_us / 1e6 if self._in_blocks else self._clock.seconds(t_us)
         self._out.append(PointBatch(sequence, time_s, xyz / UNITS_PER_MM))
 
-    def _learn_pace(self, sequence: int, raw_us: int) -> None:
-        """Follow the time from point to point in a running mean that a pause hardly changes."""
-        points = sequence - self._last_sequence
-        if self._last_us is not None and points > 0:
-            us = ((raw_us - self._last_us) % (1 << 32)) / points
-            self._us_per_point += 0.2 * (min(us, 2 * self._us_per_point) - self._us_per_point) if self._us_per_point else us
-        self._last_sequence, self._last_us = sequence, raw_us
-
     def _estimate_missed(self, raw_us: int) -> int:
-        """Estimate from the clock how many points were taken while the link was away."""
-        if self._last_us is None or not self._us_per_point:
+        """Estimate from the clock how many points were taken while the link was away, by the pace of the points before it.
+
+        Which points those are does not depend on how the bytes were cut. A pause of the device is no part of its pace.
+        """
+        points, us = np.diff(self._newest, axis=0).T
+        us = us[points > 0] % (1 << 32)
+        points = points[points > 0]
+        if not len(points):
             return 0
-        return round(((raw_us - self._last_us) % (1 << 32)) / self._us_per_point) - 1
+        usual = us / points <= PAUSE * np.median(us / points)
+        us_per_point = us[usual].sum() / points[usual].sum()
+        away_us = (raw_us - int(self._newest[-1, 1])) % (1 << 32)
+        return round(away_us / us_per_point) - 1 if us_per_point else 0
 
     def _reach(self, total: int) -> None:
         self._hear_counter(total, total, self._counter.expected)

@@ -407,10 +407,24 @@ def test_results_cannot_be_changed_and_inputs_are_left_alone() -> None:
         found.deviation_mm[0] = 0.0
 
 
+@pytest.mark.parametrize("name", [name for name in profiles.EVERY if curve_of(name).closed])
+def test_a_parameter_and_its_point_agree_at_the_seam(name: str) -> None:
+    curve, nominal = curve_of(name), nominal_of(name)
+    (start, end), off_mm = curve.domain, np.array([0.0, 1e-15, 2e-13, 5e-11, 3e-8, 1e-4])
+    place, after = curve.derivatives(start, 1)[:, 0]
+    before = curve.derivatives(end, 1)[1, 0]
+    points = np.concatenate([place + np.outer(off_mm, after / np.hypot(*after)), place - np.outer(off_mm, before / np.hypot(*before))])
+    found = deviations(points, nominal)
+    assert np.abs(curve.point(found.parameter) - found.foot_mm).max() <= 1e-12
+    around = np.abs(found.station_mm - curve.station_mm(found.parameter))
+    assert np.minimum(around, curve.length_mm - around).max() <= 1e-9
+
+
 BAD: dict[str, tuple[Callable[[], Any], str]] = {
     "three columns": (lambda: np.zeros((4, 3)), r"shape \(m, 2\), got \(4, 3\)"),
     "one row of numbers": (lambda: np.zeros(4), r"shape \(m, 2\), got \(4,\)"),
     "not a number in row 3": (lambda: np.array([[0.0, 0], [1, 1], [np.nan, 2], [3, 3]]), "point 3 is not finite"),
+    "beyond a kilometre in row 2": (lambda: np.array([[0.0, 0], [1, -1.1e6], [2, 2]]), r"point 2 lies beyond 1e\+06 mm, where no part is"),
     "infinite in row 2": (lambda: np.array([[0.0, 0], [np.inf, 1], [2, 2]]), "point 2 is not finite"),
     "text": (lambda: [["a", "b"]], "could not convert string to float: 'a'"),
 }

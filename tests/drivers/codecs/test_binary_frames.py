@@ -3,6 +3,7 @@
 import struct
 from binascii import crc32, crc_hqx
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from drivers.source import Heartbeat, ScanClosed, ScanOpened
 from simulators.devices.binary_scanner import BinaryDevice, BlockDevice
 from simulators.stream import Sample
 from tests.drivers.codecs.streams import account, any_cut_is_the_same, decoded, flipped, only_sent_points
+from tests.drivers.codecs.wire_bytes import binary_frame
 
 # Written by hand from the format's definition, checksums with a bit-by-bit CRC (check values 29B1 and CBF43926):
 # opening of device 4711 with 3 points; point 0 at 1000 us (1.5, -2.25, 0.125) mm; heartbeat "1 sent";
@@ -145,6 +147,30 @@ def test_a_gap_longer_than_the_counter_is_told_by_the_clock(away: int) -> None:
     assert book.lost == away
     assert book.sequence[5000] == 5000 + away
     only_sent_points(book, sent_mm, within_mm=0.0)
+
+
+@pytest.mark.parametrize("jitter_us", [0, 90])
+@pytest.mark.parametrize("away", [30_000, 70_000, 250_000])
+def test_how_the_bytes_were_cut_changes_nothing_of_what_the_clock_tells(away: int, jitter_us: int) -> None:
+    """Points at an uneven pace, a pause among them, a few late ones: each frame is an own piece, or all are one, or any pieces."""
+    rng = np.random.default_rng(away + jitter_us)
+    times = 100 * np.arange(400) + rng.integers(-jitter_us // 2, jitter_us // 2 + 1, 400) + 5_000_000 * (np.arange(400) >= 250)
+    numbers = [*range(120), 121, 120, *range(122, 400)]
+    before = [binary_frame(1, n, int(times[n]), struct.pack("<iii", n, -n, 0)) for n in numbers]
+    after = [binary_frame(1, n, int(times[399]) + 100 * (n - 399), struct.pack("<iii", n, -n, 0)) for n in (400 + away, 401 + away)]
+
+    def decoded_of(pieces: list[bytes]) -> tuple[list[int], int]:
+        made = BinaryDecoder()
+        arrivals = [arrival for piece in pieces for arrival in made.feed(piece)]
+        book = account([*arrivals, *made.break_off(), *made.feed(b"".join(after))])
+        return book.sequence, book.lost
+
+    wire = b"".join(before)
+    whole = decoded_of([wire])
+    assert whole == ([*numbers, 400 + away, 401 + away], away)
+    cuts = [0, *sorted(rng.integers(0, len(wire), 40).tolist()), len(wire)]
+    assert decoded_of(before) == whole
+    assert decoded_of([wire[first:stop] for first, stop in pairwise(cuts)]) == whole
 
 
 def test_a_heartbeat_puts_a_wrong_guess_right() -> None:

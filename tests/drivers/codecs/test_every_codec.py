@@ -53,13 +53,14 @@ def events(arrivals: list[Arrival]) -> list[Event]:
     return found
 
 
-def outcome(make: Callable[[], Decoder], data: bytes, cuts: list[int]) -> tuple[list[Event], str]:
-    """What is decoded of the bytes cut at the given places, and what ended it."""
+def outcome(make: Callable[[], Decoder], data: bytes, cuts: list[int], lost_at: int) -> tuple[list[Event], str]:
+    """What is decoded of the bytes cut at the given places, and what ended it; the link is lost once, at a place of its own."""
     made, failure = make(), ""
     arrivals: list[Arrival] = []
     try:
-        for first, last in pairwise([0, *cuts, len(data)]):
+        for first, last in pairwise([0, *sorted([*cuts, lost_at]), len(data)]):
             arrivals += made.feed(data[first:last])
+            arrivals += made.break_off() if first < last == lost_at else []
     except DeviceError as error:
         failure = str(error)
     return events(arrivals + made.break_off()), failure
@@ -97,7 +98,8 @@ def test_every_format_is_tried() -> None:
 def test_no_cut_changes_what_is_decoded_nor_its_order(name: str, seed: int) -> None:
     rng = Random(seed)
     make, wire = wire_of(name, rng)
-    whole, *others = [outcome(make, wire, cuts) for cuts in cuttings(len(wire), rng)]
+    lost_at = rng.choice([0, 0, rng.randint(0, len(wire))])
+    whole, *others = [outcome(make, wire, cuts, lost_at) for cuts in cuttings(len(wire), rng)]
     assert all(other == whole for other in others)
 
 

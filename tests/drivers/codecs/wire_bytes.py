@@ -85,8 +85,8 @@ def binary_pieces(rng: Random) -> Pieces:
         if blocks:
             pieces.append(binary_block(number, 100 * number, points))
         else:
-            pieces.append(binary_frame(1, number, 100 * number, struct.pack("<iii", *points[0][:3]), points[0][3]))
-        number += size
+            pieces.append(binary_frame(1, number, 100 * number + rng.randint(0, 60), struct.pack("<iii", *points[0][:3]), points[0][3]))
+        number += size + (rng.choice([40_000, 70_000, 200_000]) if rng.random() < 0.05 else 0)
         if rng.random() < 0.1:
             pieces.append(binary_frame(2, number, 0, struct.pack("<Q4x", rng.choice([number, number + 2, 2**63, 2**64 - 1]))))
         if rng.random() < 0.05:
