@@ -54,10 +54,10 @@ def _never(command: Sequence[str]) -> int:
 def test_the_command_says_what_was_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
     said: list[str] = []
     monkeypatch.setattr("typer.echo", said.append)
-    monkeypatch.setattr(setup, "look_after_open3d", lambda say: say("Open3D: looked at") is None)
+    monkeypatch.setattr("cmmlink.commands.open3d_doctor.look_after_open3d", lambda say: say("Open3D: looked at") is None)
     assert setup.doctor() == 0
     assert said[0].startswith("cmmlink ")
     assert said[1:2] == ["inspection: compiled and working"]
     assert said[-1] == "Open3D: looked at"
-    monkeypatch.setattr(setup, "look_after_open3d", lambda _: False)
+    monkeypatch.setattr("cmmlink.commands.open3d_doctor.look_after_open3d", lambda _: False)
     assert setup.doctor() == 2

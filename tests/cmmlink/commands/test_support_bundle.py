@@ -7,14 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from cmmlink.commands import setup
 from tests.cmmlink.command import Ended, cmmlink
 from tests.cmmlink.recorded import Script, record, scan_arrivals
 
 
 @pytest.fixture(autouse=True)
 def _no_look_at_open3d(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(setup, "look_after_open3d", lambda say: say("Open3D: looked at") is None)
+    monkeypatch.setattr("cmmlink.commands.open3d_doctor.look_after_open3d", lambda say: say("Open3D: looked at") is None)
 
 
 def bundled(file: Path, records: Path) -> tuple[Ended, dict[str, bytes]]:
@@ -53,7 +52,7 @@ def test_a_bundle_is_packed_also_where_the_inspection_cannot_work(tmp_path: Path
     def broken(_: object) -> None:
         raise OSError(28, "no room for compiled code", "cache")
 
-    monkeypatch.setattr(setup, "rehearse", broken)
+    monkeypatch.setattr("inspection.rehearse", broken)
     ended, files = bundled(tmp_path / "bundle.zip", tmp_path / "none")
     assert ended.code == 2
     assert "no room for compiled code" in ended.err
