@@ -36,6 +36,7 @@ from tests.cmmlink.oval_part import oval_points, write_nominal
 from tests.cmmlink.recorded import Script, record, scan_arrivals, today
 from tests.drivers.codecs.test_every_codec import MAPS, OPTIONS, talk
 from tests.drivers.codecs.wire_bytes import PIECES, TURNS, Registers
+from tests.fuzz.console_socket import change_command, workshop
 from tests.fuzz.mutations import ANY, TEXT, TREE, Mutation, change_npy, change_stl
 
 POINTS_AT_MOST = 200_000  # of a profile or a file that is worked on further: what takes long by its size is no hang
@@ -187,6 +188,18 @@ def _messages() -> list[bytes]:
     ]
 
 
+def _talks() -> list[bytes]:
+    """Sound messages of a page, some in a row, most of which a station refuses while it measures."""
+    workshop().hear(b"")  # its first run prepares the nominal, which is no input's fault
+    plain = [b'{"do": "%s", "number": 9}' % do for do in (b"test", b"devices", b"live", b"another page", b"take control", b"end", b"abort")]
+    messages = [*_messages(), *plain, b'{"do": "replay", "number": 7, "run": "last"}', b'{"do": "import", "number": 8, "plan": "x"}']
+    return [
+        *messages,
+        b"\n".join(messages[:5]),
+        b"\n".join(message for message in messages if b"end" not in message and b"abort" not in message),
+    ]
+
+
 def _read_message(data: bytes, _: Path) -> None:
     receive(data.decode("utf-8", "surrogateescape" if len(data) % 2 else "replace")).command()
 
@@ -310,6 +323,7 @@ TARGETS: dict[str, Target] = {
     "map": Target(_maps, TREE, _file(map_of, ".yaml"), (PlanError,)),
     "address": Target(_addresses, TEXT, lambda data, _: device_address(data.decode("utf-8", "surrogateescape")), (ValueError,)),
     "message": Target(_messages, TREE, _read_message, (Refused,)),
+    "socket": Target(_talks, (*ANY, change_command, change_command, change_command), lambda data, _: workshop().hear(data), ()),
     "record": Target(lambda: [_recorded()], ANY, _read_records, ()),
     "bodies": Target(_bodies, (change_body,), _read_bodies, ()),
     **{f"codec-{name}": _codec(name) for name in (*PIECES, *TURNS)},
