@@ -7,7 +7,17 @@ from contextlib import suppress
 import numpy as np
 import pytest
 
-from inspection import NominalProfile, Registration, RegistrationError, RigidTransform, register, register_coarse, register_fine
+from inspection import (
+    NominalProfile,
+    NurbsCurve,
+    Registration,
+    RegistrationError,
+    RigidTransform,
+    discretize,
+    register,
+    register_coarse,
+    register_fine,
+)
 from tests.inspection import profiles
 from tests.inspection.best_pose import farthest_mm, optimum
 from tests.inspection.profiles import Array, curve_of, measured, nominal_of
@@ -35,7 +45,10 @@ def test_all_360_one_degree_rotations_register_without_a_flip(name: str) -> None
 
 @pytest.mark.parametrize("ratio", [1e3, 1e5, 1e7])
 def test_a_scan_far_larger_than_the_nominal_costs_no_memory(ratio: float) -> None:
-    nominal, points = nominal_of("P1"), measured("P1", 250, 3) * ratio
+    """The nominal is a ten-thousandth of P1, so that no point lies where no part can be."""
+    curve = profiles.p1()
+    nominal = discretize(NurbsCurve(curve.degree, 1e-4 * curve.control_points_mm, curve.knots, curve.weights, closed=curve.closed))
+    points = 1e-4 * ratio * measured("P1", 250, 3)
     points[1::2] *= -1.0  # to and fro
     tracemalloc.start()
     with suppress(RegistrationError):
@@ -43,6 +56,14 @@ def test_a_scan_far_larger_than_the_nominal_costs_no_memory(ratio: float) -> Non
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 30e6
+
+
+@pytest.mark.parametrize("registration", [register, register_coarse])
+def test_points_where_no_part_can_be_are_refused_at_once(registration: Callable[[Array, NominalProfile], Registration]) -> None:
+    points = measured("P1", 250, 3)
+    points[6, 1] = -1.5e6
+    with pytest.raises(ValueError, match=r"point 7 lies beyond 1e\+06 mm, where no part is"):
+        registration(points, nominal_of("P1"))
 
 
 CANNOT_BE: dict[str, tuple[Array, str]] = {
