@@ -14,7 +14,7 @@ demo: .venv/installed
 install: .venv/all-installed
 
 # A file stays with one process, which so prepares its nominals and its browser once; tests/conftest.py has the order.
-# Three on two cores: a third of the time a test waits, for a device, a page or a process of its own.
+# Three on two cores: tests often wait for a device, a page or a process of their own.
 AT_ONCE := -n 3 --dist loadfile --no-loadscope-reorder
 
 test: checks compiled
