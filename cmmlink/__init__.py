@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from cmmlink.stack import StackOutcome, inspect_stack
     from cmmlink.version import __version__
 else:
+    from cmmlink.front_door import load_on_use
+
     _PLACES = {
         "cmmlink.devices": ("Connected", "connect"),
         "cmmlink.errors": ("PlanError", "RunError", "StoreError"),
@@ -30,13 +32,7 @@ else:
         "cmmlink.version": ("__version__",),
     }
 
-    def __getattr__(name: str) -> object:
-        from importlib import import_module  # noqa: PLC0415 - nothing is loaded before a name is used
-
-        for place, names in _PLACES.items():
-            if name in names:
-                return getattr(import_module(place), name)
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    __getattr__ = load_on_use(__name__, _PLACES)
 
 
 __all__ = [

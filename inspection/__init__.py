@@ -50,6 +50,8 @@ if TYPE_CHECKING:
     from inspection.verdict import NOT_JUDGED, Rejection, Verdict
     from inspection.zones import Transition, VaryingZone
 else:
+    from inspection.front_door import load_on_use
+
     _PLACES = {
         "inspection.synthetic": ("synthetic",),
         "inspection.certificate": ("ZoneCertificate", "certify_minimum_zone"),
@@ -96,14 +98,7 @@ else:
         "inspection.zones": ("Transition", "VaryingZone"),
     }
 
-    def __getattr__(name: str) -> object:
-        from importlib import import_module  # noqa: PLC0415 - nothing is loaded before a name is used
-
-        for place, names in _PLACES.items():
-            if name in names:
-                found = import_module(place)
-                return found if place == f"{__name__}.{name}" else getattr(found, name)
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    __getattr__ = load_on_use(__name__, _PLACES)
 
 
 __all__ = [

@@ -13,6 +13,8 @@ Array = NDArray[np.float64]
 ROWS_AT_ONCE = 1 << 16  # rows gone through together: what is worked out of them takes a few megabytes
 MANY = 1 << 18  # points of which what costs memory is asked of a choice of them
 _GOLDEN = 0.6180339887498949
+_LARGEST_WORD = 2.0**64 * (1.0 - 2.0**-53)
+_ODD = np.array([0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9], dtype=np.uint64)  # the steps and a factor of SplitMix64 (Steele et al. 2014)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,10 +63,10 @@ class Cloud:
             return np.concatenate([np.empty((0, 2)), *self.blocks()]) if len(self.left_out) else self.points_mm
         return few_of(self.blocks(), self.count, most)
 
-    def about(self, most: int) -> Array:
-        """At most so many of the points (k, 2), in their order, from all stretches of the rows; no more rows are looked at."""
-        rows = even_choice(len(self.points_mm), most)
-        return self.points_mm[rows[self.left_out[rows] == 0] if len(self.left_out) else rows]
+    def sample(self, about: int) -> Array:
+        """About so many of the points (k, 2), in their order: drawn by their coordinates, so the same ones in whatever order they came."""
+        below = np.uint64(min(about / max(self.count, 1), 1.0) * _LARGEST_WORD)
+        return np.concatenate([np.empty((0, 2)), *(points[_scattered(points) <= below] for points in self.blocks())])
 
     def corners(self) -> Array:
         """The lowest and the highest x and y (2, 2)."""
@@ -80,6 +82,16 @@ def corners_of(points: Array) -> Array:
     """The lowest and the highest x and y (2, 2) of at least one point (k, 2). Numpy goes along columns ten times as fast as over pairs."""
     x, y = points.T
     return np.array([[x.min(), y.min()], [x.max(), y.max()]])
+
+
+def _scattered(points: Array) -> NDArray[np.uint64]:
+    """A number for each of the points (k, 2) that follows from its coordinates, and is spread evenly over all numbers of 64 bits."""
+    bits = np.ascontiguousarray(points).view(np.uint64)
+    words = bits[:, 0] * _ODD[0] + bits[:, 1] * _ODD[1]
+    for odd in _ODD:
+        words ^= words >> np.uint64(32)
+        words *= odd
+    return np.asarray(words ^ (words >> np.uint64(32)))
 
 
 def few_of(blocks: Iterable[Array], count: int, most: int = MANY) -> Array:

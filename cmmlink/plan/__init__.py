@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from cmmlink.plan.surface import CtPlan, NominalAt, load_ct_plan
     from cmmlink.plan.yaml_model import Positive, Settings, line_of, read_model, words_of_allowed
 else:
+    from cmmlink.front_door import load_on_use
+
     _PLACES = {
         "cmmlink.plan.own_maps": ("map_of",),
         "cmmlink.plan.scan": (
@@ -47,13 +49,7 @@ else:
         "cmmlink.plan.yaml_model": ("Positive", "Settings", "line_of", "read_model", "words_of_allowed"),
     }
 
-    def __getattr__(name: str) -> object:
-        from importlib import import_module  # noqa: PLC0415 - nothing is loaded before a name is used
-
-        for place, names in _PLACES.items():
-            if name in names:
-                return getattr(import_module(place), name)
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    __getattr__ = load_on_use(__name__, _PLACES)
 
 
 __all__ = [

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from cmmlink.record.station_lock import PATIENCE_S
     from cmmlink.record.store import FILE_NAME, Store
 else:
+    from cmmlink.front_door import load_on_use
+
     _PLACES = {
         "cmmlink.record.against": ("disagreements", "read_result"),
         "cmmlink.record.bodies": ("unpack_judged",),
@@ -55,13 +57,7 @@ else:
         "cmmlink.record.store": ("FILE_NAME", "Store"),
     }
 
-    def __getattr__(name: str) -> object:
-        from importlib import import_module  # noqa: PLC0415 - nothing is loaded before a name is used
-
-        for place, names in _PLACES.items():
-            if name in names:
-                return getattr(import_module(place), name)
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    __getattr__ = load_on_use(__name__, _PLACES)
 
 
 __all__ = [

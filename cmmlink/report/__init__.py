@@ -10,19 +10,15 @@ if TYPE_CHECKING:
     from cmmlink.report.stack_folder import write_stack
     from cmmlink.report.terminal import STYLE_OF, STYLES, LiveTable, print_summary
 else:
+    from cmmlink.front_door import load_on_use
+
     _PLACES = {
         "cmmlink.report.folder": ("prepare", "write_results", "write_run"),
         "cmmlink.report.stack_folder": ("write_stack",),
         "cmmlink.report.terminal": ("STYLE_OF", "STYLES", "LiveTable", "print_summary"),
     }
 
-    def __getattr__(name: str) -> object:
-        from importlib import import_module  # noqa: PLC0415 - nothing is loaded before a name is used
-
-        for place, names in _PLACES.items():
-            if name in names:
-                return getattr(import_module(place), name)
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    __getattr__ = load_on_use(__name__, _PLACES)
 
 
 __all__ = [

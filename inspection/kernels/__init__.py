@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from inspection.kernels.side_by_side import fit_compiled_beside
     from inspection.kernels.thinning import strides
 else:
+    from inspection.front_door import load_on_use
+
     _PLACES = {
         "inspection.kernels.blocks": ("CurveTables", "compile_projection", "project"),
         "inspection.kernels.compile_notice": ("while_compiling",),
@@ -39,13 +41,7 @@ else:
         "inspection.kernels.thinning": ("strides",),
     }
 
-    def __getattr__(name: str) -> object:
-        from importlib import import_module  # noqa: PLC0415 - nothing is loaded before a name is used
-
-        for place, names in _PLACES.items():
-            if name in names:
-                return getattr(import_module(place), name)
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    __getattr__ = load_on_use(__name__, _PLACES)
 
 
 __all__ = [

@@ -6,6 +6,7 @@ Nothing is compiled at import; the first call of a kernel does it.
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -56,8 +57,8 @@ def inlined_kernel(function: _Function) -> _Function:
 
 def code_of(function: Callable[..., None], *given: types.Type) -> int:
     """Where in memory the code of a kernel is for arguments of these types. It is compiled, or loaded, where that was not done yet."""
-    compiled = cast(Any, function).get_compile_result(types.void(*given))
-    return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
+    code, described = attrgetter("library", "fndesc")(cast(Any, function).get_compile_result(types.void(*given)))
+    return int(code.get_pointer_to_function(described.llvm_func_name))
 
 
 def call_of(*wanted: types.Type) -> Any:

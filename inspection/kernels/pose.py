@@ -19,7 +19,7 @@ Pose = tuple[float, float, float]  # rotation about the origin in rad, then shif
 
 NONE_LEFT_OUT: Marks = np.empty(0, dtype=np.uint8)
 _NO_WEIGHING: Array = np.empty(0)
-MANY = 1 << 20  # points from which on a median is taken of a choice of them
+MANY = 1 << 20  # points from which on a median is counted out, without a copy of them
 _STANDSTILL_MM = 1e-9  # Gauss-Newton ends when no point moves further
 _HALVINGS = 12
 _HOVERING_STEPS = 3  # after them points that come and go at an open end in small steps are left out: no pose suits both
@@ -368,14 +368,34 @@ def _look_at_distances(problem: Any, projection: Any, pose: Any, moved: Any, tak
 
 @inner_kernel
 def _median(off: Any, takes_part: Any) -> float:
-    """The median of the values of points that take part: of many points, of a choice in every stretch of the scan."""
-    step = max(1.0, len(off) / MANY)
-    chosen, count, at = np.empty(min(len(off), MANY)), 0, 0.0
-    while at < len(off) and count < len(chosen):
-        shift = (0.6180339887498949 * (at / step)) % 1.0 if step > 1.0 else 0.0  # no rhythm of the scan is in step with it
-        i = min(int(at + shift * step), len(off) - 1)
+    """The median of the values of points that take part; of many it is counted out, which takes no copy of them."""
+    count = 0
+    for i in range(len(off)):
+        count += takes_part[i] > 0
+    if count == 0:
+        return np.inf
+    if count > MANY:
+        return 0.5 * (_value_of_rank(off, takes_part, (count - 1) // 2) + _value_of_rank(off, takes_part, count // 2))
+    chosen, at = np.empty(count), 0
+    for i in range(len(off)):
         if takes_part[i] > 0:
-            chosen[count] = off[i]
-            count += 1
-        at += step
-    return float(np.median(chosen[:count])) if count > 0 else np.inf
+            chosen[at] = off[i]
+            at += 1
+    return float(np.median(chosen))
+
+
+@inner_kernel
+def _value_of_rank(values: Any, takes_part: Any, rank: int) -> float:
+    """The value with so many smaller or equal ones before it, of values that are not negative: their bits are ordered like themselves."""
+    bits, tally, found = values.view(np.int64), np.empty(1 << 16, dtype=np.int64), np.zeros(1, dtype=np.int64)
+    for shift in (48, 32, 16, 0):
+        tally[:] = 0
+        for i in range(len(bits)):
+            if takes_part[i] > 0 and bits[i] >> shift >> 16 == found[0]:
+                tally[(bits[i] >> shift) & 0xFFFF] += 1
+        digit = 0
+        while rank >= tally[digit]:
+            rank -= tally[digit]
+            digit += 1
+        found[0] = found[0] << 16 | digit
+    return float(found.view(np.float64)[0])

@@ -41,6 +41,24 @@ def test_few_of_many_are_one_of_every_stretch_and_in_no_rhythm() -> None:
     assert even_choice(5, 1000).tolist() == [0, 1, 2, 3, 4]
 
 
+GRID = np.stack(np.meshgrid(np.arange(150) * 0.001, np.arange(200) * 0.5), axis=-1).reshape(-1, 2)
+LINE = np.column_stack([np.arange(30_000.0), np.zeros(30_000)])
+
+
+@pytest.mark.parametrize("points", [GRID, LINE, np.random.default_rng(2).normal(size=(30_000, 2))], ids=["grid", "line", "random"])
+def test_a_sample_does_not_depend_on_the_order_of_the_points_and_is_spread_over_them(points: np.ndarray) -> None:
+    sample = Cloud(points).sample(1200)
+    assert 1000 < len(sample) < 1400
+    assert np.array_equal(Cloud(points[::-1]).sample(1200)[::-1], sample)
+    for axis in (0, 1):
+        lower_half = sample[:, axis] <= np.median(points[:, axis])
+        assert lower_half.mean() == pytest.approx((points[:, axis] <= np.median(points[:, axis])).mean(), abs=0.06)
+    left_out = (np.arange(len(points)) % 3 == 0).astype(np.uint8)
+    some = Cloud(points, left_out).sample(1200)
+    assert 1000 < len(some) < 1400
+    assert {tuple(point) for point in some}.isdisjoint(map(tuple, points[::3]))
+
+
 @settings(deadline=None, max_examples=50)
 @given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=60), st.integers(0, 59))
 def test_the_value_of_a_rank_is_that_of_the_sorted_values(values: list[float], rank: int) -> None:

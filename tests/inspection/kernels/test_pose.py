@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from inspection import RigidTransform, discretize, fine, register_fine
 from inspection.cloud import Cloud
-from inspection.kernels import OutlierLimit, PoseFit
+from inspection.kernels import OutlierLimit, PoseFit, pose, project
 from inspection.kernels.pose import _median_near
 from tests.inspection import profiles
 from tests.inspection.profiles import Array, nominal_of
@@ -108,3 +108,14 @@ def test_a_median_does_not_depend_on_its_guess(count: int, guess: float) -> None
 
 def test_no_values_have_no_median() -> None:
     assert _median_near(np.full(4, np.nan), 1.0) == np.inf
+
+
+@pytest.mark.parametrize("more", [1, 2])
+def test_the_median_of_very_many_points_is_exact(more: int) -> None:
+    """A choice of the points in their order would give another limit in another order."""
+    nominal, count = nominal_of("P3"), pose.MANY + more
+    points = np.repeat(scan("P3"), -(-count // COUNT), axis=0)[:count] + np.random.default_rng(8).normal(0, 0.01, (count, 2))
+    fit = PoseFit(points, nominal.grid, None, "exact", nominal.outward, 0.0)
+    found = fit.find_outliers(NUMBERS, OutlierLimit(6.0, 0.0, 1e-6), 1)
+    moved = RigidTransform(NUMBERS[0], np.array(NUMBERS[1:])).apply(points)
+    assert found.limit_mm == pytest.approx(6.0 * np.median(np.abs(project(moved, nominal.grid).distance_mm)), rel=1e-12)
