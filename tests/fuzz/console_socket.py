@@ -105,7 +105,8 @@ class Workshop:
     @contextmanager
     def _page(self) -> Iterator[ClientConnection]:
         """A page in control."""
-        with connect(f"ws://127.0.0.1:{self._server.port}/live", origin=Origin(f"http://127.0.0.1:{self._server.port}")) as page:
+        place, origin = f"ws://127.0.0.1:{self._server.port}/live", Origin(f"http://127.0.0.1:{self._server.port}")
+        with connect(place, origin=origin, max_queue=1 << 16) as page:  # else the client itself hears no end while it waits to be read
             page.send(json.dumps({"token": TOKEN}))
             page.send(json.dumps({"do": "take control", "number": 0}))
             yield page

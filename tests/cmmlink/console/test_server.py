@@ -197,7 +197,7 @@ def test_what_the_system_refuses_in_a_command_is_answered(server: ConsoleServer,
 
 
 def test_a_page_that_floods_the_station_is_closed(server: ConsoleServer) -> None:
-    with joined(server) as socket:
+    with joined(server, max_queue=1 << 16) as socket:  # else the client itself hears no end while it waits to be read
         with suppress(ConnectionClosed):
             for _ in range(2000):
                 socket.send('{"do": "live"}')
