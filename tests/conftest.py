@@ -1,6 +1,7 @@
 """Options that point the tests of devices at hardware, and those of the console at a browser; what all tests of a process share."""
 
 import sys
+import threading
 from collections.abc import Iterator
 
 import pytest
@@ -58,3 +59,14 @@ def _preparations_made_once() -> Iterator[None]:
 
     with preparations_made_once():
         yield
+
+
+OURS = {"acquisition", "console", "plans", "proof", "record"}  # what the program calls its own threads
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _no_thread_left() -> Iterator[None]:
+    """Let no file of tests leave a run or a server behind: later tests of the process would measure beside it."""
+    before = set(threading.enumerate())
+    yield
+    assert not [thread.name for thread in set(threading.enumerate()) - before if thread.name in OURS]

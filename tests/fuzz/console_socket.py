@@ -74,16 +74,21 @@ def change_command(data: bytes, rng: Random) -> bytes:
 
 
 class Workshop:
-    """A server of a station, and the device that it scans for as long as this process lives."""
+    """A server of a station, and the device that it scans until the workshop is closed."""
 
     def __init__(self) -> None:
-        folder = TemporaryDirectory()
-        atexit.register(folder.cleanup)
+        self._folder = folder = TemporaryDirectory()
         self._device, self._numbers = Device(), count()
         self._station = Station(setup_of({"blade.yaml": write_plan(Path(folder.name))}, self._device.connect))
         self._server = ConsoleServer(self._station, "fuzzed", token=TOKEN)
         self._server.start()
         atexit.register(self._server.stop)
+
+    def close(self) -> None:
+        """End the run that goes on, and the server."""
+        self._end()
+        self._server.stop()
+        self._folder.cleanup()
 
     def hear(self, data: bytes) -> None:
         """Take an input, each line as a message of its own, and look whether everything goes on. Raises AssertionError."""
@@ -154,5 +159,12 @@ class Workshop:
 
 @cache
 def workshop() -> Workshop:
-    """The one of this process."""
+    """The one of this process, until it is closed."""
     return Workshop()
+
+
+def close_workshop() -> None:
+    """Leave nothing of it running, if there is one."""
+    if workshop.cache_info().currsize:
+        workshop().close()
+        workshop.cache_clear()

@@ -3,14 +3,23 @@
 `make fuzz MINUTES=10` tries as many as there is time for, and keeps what goes wrong in the corpus.
 """
 
+from collections.abc import Iterator
+
 import pytest
 
 pytest.importorskip("resource", reason="time and memory of an input are measured on POSIX systems only")
 
+from tests.fuzz.console_socket import close_workshop
 from tests.fuzz.grow import CORPUS, flaw_of, input_of
 from tests.fuzz.targets import TARGETS
 
 INPUTS = 6
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _no_workshop_left() -> Iterator[None]:
+    yield
+    close_workshop()
 
 
 @pytest.mark.parametrize("kept", sorted(path.name for path in CORPUS.iterdir()))
