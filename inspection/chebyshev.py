@@ -7,7 +7,7 @@ all where no other exceeds it.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -89,12 +89,16 @@ def descend(
     is_over : asked before every program; once it says so, the descent ends where it stands, not converged
     unit_mm : what a value of 1 is in mm: the first trust region is the largest value
     """
+    order = np.lexsort(points.T)  # by their places, so that the order in which they came does not show in the last digit
+    points = points[order]
     if freedoms is None:
         freedoms = Freedoms.about(start.apply(points).mean(axis=0))
     problem = _Problem(look, start, freedoms, unit_mm, is_over)
-    if len(points) <= MANY:
-        return problem.descend(points, np.zeros(len(freedoms)))
-    return _descend_by_few(problem, points, length_mm)
+    few = len(points) <= MANY
+    found = problem.descend(points, np.zeros(len(freedoms))) if few else _descend_by_few(problem, points, length_mm)
+    active = order[found.active]
+    by_row = np.argsort(active)
+    return replace(found, active=active[by_row], multipliers=found.multipliers[by_row])
 
 
 def _descend_by_few(problem: "_Problem", points: Array, length_mm: float) -> Descent:

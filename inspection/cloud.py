@@ -1,6 +1,7 @@
 """Points that a fit is made to, where they lie: rows of a long scan are gone through in pieces instead of being copied."""
 
-from collections.abc import Iterable, Iterator
+import math
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,9 +13,11 @@ Array = NDArray[np.float64]
 
 ROWS_AT_ONCE = 1 << 16  # rows gone through together: what is worked out of them takes a few megabytes
 MANY = 1 << 18  # points of which what costs memory is asked of a choice of them
-_GOLDEN = 0.6180339887498949
-_LARGEST_WORD = 2.0**64 * (1.0 - 2.0**-53)
-_ODD = np.array([0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9], dtype=np.uint64)  # the steps and a factor of SplitMix64 (Steele et al. 2014)
+_MARGIN = 6.0  # standard deviations of the number of lots within a share of all
+_HELD = 3  # times as many rows as are drawn are held before they are sifted
+_LOTS = 2**64
+_MIXED_BY = np.array([0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9], dtype=np.uint64)  # step and factor of SplitMix64 (Steele et al. 2014)
+_COLUMN_BY = np.array([*_MIXED_BY, 0x94D049BB133111EB], dtype=np.uint64)  # and its other factor
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,15 +61,10 @@ class Cloud:
         return Cloud(self.points_mm, left_out, self.room)
 
     def few(self, most: int = MANY) -> Array:
-        """At most so many of the points (k, 2), in their order: all, or one of every stretch of the scan."""
-        if self.count <= most:
-            return np.concatenate([np.empty((0, 2)), *self.blocks()]) if len(self.left_out) else self.points_mm
-        return few_of(self.blocks(), self.count, most)
-
-    def sample(self, about: int) -> Array:
-        """About so many of the points (k, 2), in their order: drawn by their coordinates, so the same ones in whatever order they came."""
-        below = np.uint64(min(about / max(self.count, 1), 1.0) * _LARGEST_WORD)
-        return np.concatenate([np.empty((0, 2)), *(points[_scattered(points) <= below] for points in self.blocks())])
+        """At most so many of the points (k, 2), in their order: all, or those that are drawn by their coordinates (see `few_of`)."""
+        if self.count <= most and not len(self.left_out):
+            return self.points_mm
+        return few_of(self.blocks, self.count, most)
 
     def corners(self) -> Array:
         """The lowest and the highest x and y (2, 2)."""
@@ -84,24 +82,54 @@ def corners_of(points: Array) -> Array:
     return np.array([[x.min(), y.min()], [x.max(), y.max()]])
 
 
-def _scattered(points: Array) -> NDArray[np.uint64]:
-    """A number for each of the points (k, 2) that follows from its coordinates, and is spread evenly over all numbers of 64 bits."""
-    bits = np.ascontiguousarray(points).view(np.uint64)
-    words = bits[:, 0] * _ODD[0] + bits[:, 1] * _ODD[1]
-    for odd in _ODD:
-        words ^= words >> np.uint64(32)
-        words *= odd
-    return np.asarray(words ^ (words >> np.uint64(32)))
+def few_of(blocks: Callable[[], Iterable[Array]], count: int, most: int = MANY) -> Array:
+    """At most so many of `count` rows of numbers that come piece by piece (k, c), in their order: all, or so many that are drawn.
+
+    Rows are drawn by their numbers, so that the same ones are drawn in whatever order and pieces they come. Equal rows draw the same
+    lot; where only some of them are wanted, any will do.
+    """
+    if count <= most:
+        return np.concatenate(list(blocks()))
+    drawn = _drawn(blocks(), most, (most + _MARGIN * math.sqrt(most)) / count)
+    return drawn if len(drawn) == most else _drawn(blocks(), most, 1.0)  # of many equal rows fewer than expected have low lots
 
 
-def few_of(blocks: Iterable[Array], count: int, most: int = MANY) -> Array:
-    """At most so many of `count` rows that come piece by piece (k, c): all, or one of every stretch of them."""
-    wanted, chosen, at = even_choice(count, most), [], 0
+def _drawn(blocks: Iterable[Array], most: int, share: float) -> Array:
+    """The rows with the lowest lots, at most so many, of those whose lots are within a share of all lots."""
+    highest = np.uint64(share * _LOTS if share < 1.0 else _LOTS - 1)
+    rows: list[Array] = []
+    lots: list[NDArray[np.uint64]] = []
     for block in blocks:
-        inside = wanted[np.searchsorted(wanted, at) : np.searchsorted(wanted, at + len(block))]
-        chosen.append(block[inside - at])
-        at += len(block)
-    return np.concatenate(chosen)
+        own = _lots(block)
+        low = own <= highest
+        rows.append(block[low])
+        lots.append(own[low])
+        if sum(map(len, lots)) > _HELD * most:
+            rows, lots = _lowest(rows, lots, most)
+            highest = lots[0].max(initial=np.uint64(0))
+    return _lowest(rows, lots, most)[0][0]
+
+
+def _lowest(rows: list[Array], lots: list[NDArray[np.uint64]], most: int) -> tuple[list[Array], list[NDArray[np.uint64]]]:
+    """The rows with the lowest lots, and these, as one piece each."""
+    every, lot = np.concatenate(rows), np.concatenate(lots)
+    if len(lot) <= most:
+        return [every], [lot]
+    last = np.partition(lot, most - 1)[most - 1]
+    drawn = lot < last
+    drawn[np.flatnonzero(lot == last)[: most - np.count_nonzero(drawn)]] = True
+    return [every[drawn]], [lot[drawn]]
+
+
+def _lots(rows: Array) -> NDArray[np.uint64]:
+    """A number for each of the rows (k,) or (k, c) that follows from its values, and is spread evenly over all numbers of 64 bits."""
+    lots = np.zeros(len(rows), dtype=np.uint64)
+    for column, factor in zip(np.atleast_2d(rows.T), _COLUMN_BY, strict=False):
+        lots += np.ascontiguousarray(column).view(np.uint64) * factor
+    for factor in _MIXED_BY:
+        lots ^= lots >> np.uint64(32)
+        lots *= factor
+    return np.asarray(lots ^ (lots >> np.uint64(32)))
 
 
 def row_blocks(count: int, at_once: int | None = None) -> Iterator[slice]:
@@ -109,11 +137,3 @@ def row_blocks(count: int, at_once: int | None = None) -> Iterator[slice]:
     at_once = at_once or ROWS_AT_ONCE
     for first in range(0, count, at_once):
         yield slice(first, min(first + at_once, count))
-
-
-def even_choice(count: int, most: int) -> NDArray[np.int64]:
-    """At most so many of the numbers 0 .. count - 1, rising, one of every stretch; in no rhythm, since a scan may have one."""
-    if count <= most:
-        return np.arange(count)
-    k = np.arange(most)
-    return np.asarray((k + np.mod(k * k * _GOLDEN, 1.0)) * (count / most), dtype=np.int64)

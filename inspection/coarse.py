@@ -41,8 +41,8 @@ def register_coarse(points_mm: ArrayLike, nominal: NominalProfile) -> Registrati
     """
     points = check_registrable(points_mm)
     poses = poses_of_contour(contour_of(Cloud(points), nominal), nominal)
-    scores = [trimmed_mean_square(points, pose, nominal) for pose in poses]
-    pose = poses[int(np.argmin(scores))]
+    few = Cloud(points).few(_SCORED_POINTS)
+    pose = min(poses, key=lambda one: trimmed_mean_square(few, one, nominal))
     return Registration(
         pose,
         float(np.sqrt(mean_square(points, pose, nominal))),
@@ -140,9 +140,8 @@ def mean_square(points_mm: Array, pose: RigidTransform, nominal: NominalProfile)
 
 
 def trimmed_mean_square(points_mm: Array, pose: RigidTransform, nominal: NominalProfile) -> float:
-    """Mean square distance of the nearer 80 % of at most 500 points, so that outliers do not choose the pose."""
-    few = points_mm[:: max(1, len(points_mm) // _SCORED_POINTS)]
-    distance = np.sort(np.abs(project(pose.apply(few), nominal.grid).distance_mm))
+    """Mean square distance of the nearer 80 % of points (m, 2), so that outliers do not choose the pose."""
+    distance = np.sort(np.abs(project(pose.apply(points_mm), nominal.grid).distance_mm))
     return float((distance[: max(1, int(0.8 * len(distance)))] ** 2).mean())
 
 

@@ -190,7 +190,7 @@ def _find_outliers(
 def _fit_to_few(points: Cloud, nominal: NominalProfile, method: Method, aimed_mm: float) -> PoseFit | None:
     """A fit to a sample of the points, None where there are too few points for that to be quicker."""
     few = max(_FEWEST, len(points) // _THINNED)
-    return _pose_fit(Cloud(points.sample(few)), nominal, method, aimed_mm) if len(points) >= _WORTH_THINNING * few else None
+    return _pose_fit(Cloud(points.few(few)), nominal, method, aimed_mm) if len(points) >= _WORTH_THINNING * few else None
 
 
 def _weigh_by_arc_length(fit: PoseFit, points: Cloud, found: PoseEstimate, nominal: NominalProfile) -> None:

@@ -4,6 +4,7 @@ Nothing of this copies the scan: it is gone through piece by piece, its rows are
 given back before the rows are judged.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -131,6 +132,7 @@ def _prove_no_placement(rows: ScanRows, settled: _Settled, terms: Terms) -> _Set
     for _ in range(_ROUNDS):
         telling = np.union1d(telling, _telling_rows(rows, terms))
         points, all_told = rows.points[telling], len(telling) == rows.judged
+        points = points[np.lexsort(points.T)]  # so that the search takes the same way in whatever order they came
         smallest = fit_minimum_zone(points, terms.nominal, settled.registration, terms.method, terms.tip_radius_mm, zone.middle_mm)
         at_zone = _judge_at(rows, _with_pose(settled.registration, smallest.nominal_from_section), "minimum-zone", terms)
         width_mm = smallest.zone_mm if all_told else at_zone.zone_error_mm
@@ -211,6 +213,7 @@ def _fit_best(points: Cloud, terms: Terms) -> Registration:
 def _fit_smallest(rows: ScanRows, registration: Registration, terms: Terms) -> Registration:
     """The minimum zone from a best fit on: of many points that of the telling ones, which those join that are out of it."""
     points, telling = rows.usable(), np.empty(0, dtype=np.int64)
+    registration = _with_pose(registration, registration.nominal_from_section)
     settings = (registration, terms.method, terms.tip_radius_mm, terms.zone.middle_mm)
     if len(points) <= MANY:
         smallest = fit_minimum_zone(points.few(), terms.nominal, *settings)
@@ -283,7 +286,10 @@ def _result(rows: ScanRows, settled: _Settled, terms: Terms, complete: bool, mis
 
 def _few_judged(rows: ScanRows) -> Array:
     """The deviations (k,) of the judged points, or of a choice of them."""
-    judged = (rows.deviation[part][rows.verdicts[part] != NOT_JUDGED] for part in row_blocks(rows.count))
+
+    def judged() -> Iterator[Array]:
+        return (rows.deviation[part][rows.verdicts[part] != NOT_JUDGED] for part in row_blocks(rows.count))
+
     return few_of(judged, rows.judged)
 
 

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial import ConvexHull, KDTree, QhullError
 
 from inspection.cloud import MANY, Cloud, few_of
 from inspection.coarse import FEWEST_POINTS
+from inspection.contour_order import trace_contour
 from inspection.errors import NotMeasured
 from inspection.far_points import Away, far_points, refuse_beyond_a_kilometre, space_of, words_of_far
 from inspection.fine import MISFIT, register
@@ -28,8 +29,9 @@ _FAR_STRAIGHTER = 0.1  # of the rms at the best fit
 _SIZES_APART = 1.25
 _GROUPS_APART = 0.2  # of the size: no gap of a scan that still goes round is so wide
 _FACTOR_NEAR = 1.05
-_NEARLY_CLOSED = 3.0  # steps between the last point and the first
-_IN_ORDER = 3.0  # times the length round the points: a longer way leaps to and fro
+_NEARLY_CLOSED = 3.0  # steps between the two ends of the line on which the points lie
+_WAY_ROUND = (0.8, 3.0)  # times the length round the points: a shorter line does not go round, a longer one leaps to and fro
+_MOST_STEPS = 2000  # of that line
 _MIRROR_FAR_BETTER = 0.35  # of the rms: no defect makes the mirror image fit so much better
 _MIRROR_BETTER = 0.5  # and this with every point inside the zone
 _SHIFT_ZONES, _SHIFT_MM, _SHIFT_SCATTERS = 3.0, 0.2, 10.0  # widths of the zone, mm, and scatters by which all points are out
@@ -57,13 +59,13 @@ def check_points(rows: ScanRows, points: Cloud, terms: Terms) -> NDArray[np.bool
     check_section(rows, len(points), terms.off_section_max_mm)
     if len(points) < FEWEST_POINTS:
         return no_outliers(len(points))
-    space = few_of(space_of(rows, points), len(points))
+    space = few_of(lambda: space_of(rows, points), len(points))
     refuse_beyond_a_kilometre(space, len(points))
     away = Away.of(space, terms.nominal)
     far = far_points(rows, points, away)
     if far.any() and not terms.reject_outliers:
         raise NotMeasured(words_of_far(rows, points, far))
-    near = few_of(space_of(rows, points, far), len(points) - int(np.count_nonzero(far))) if far.any() else space
+    near = few_of(lambda: space_of(rows, points, far), len(points) - int(np.count_nonzero(far))) if far.any() else space
     check_plane(near, rows.plane, terms)
     _check_size(near[:, :2], terms)
     return far
@@ -167,7 +169,8 @@ def _check_size(points_mm: Array, terms: Terms) -> None:
 def _words_of_groups(points_mm: Array, across_mm: float) -> str:
     """Say where the points (m, 2) lie in two groups, far apart: another part, or a fixture, is among them."""
     centred = points_mm - points_mm.mean(axis=0)
-    along = centred @ np.linalg.svd(centred, full_matrices=False)[2][0]
+    axis = np.linalg.svd(centred, full_matrices=False)[2][0]
+    along = centred @ (axis * np.sign(axis[np.argmax(np.abs(axis))]))  # the sign of an axis may depend on the order of the points
     order = np.argsort(along)
     gaps = np.diff(along[order])
     cut = int(np.argmax(gaps)) + 1
@@ -195,15 +198,18 @@ def _across(points_mm: Array) -> float:
 
 
 def _goes_round(points_mm: Array) -> bool:
-    """Tell whether the points (m, 2), in the order of the scan, end where they begin and go round something."""
-    steps = np.hypot(*np.diff(points_mm, axis=0).T)
+    """Tell whether the points (m, 2), in whatever order, lie along a line that ends where it begins and goes round something."""
+    places = np.unique(points_mm, axis=0)
     try:
-        hull = ConvexHull(points_mm)
+        round_mm = float(ConvexHull(places).area)  # of a hull in the plane, the area is its circumference
     except QhullError:
         return False
-    gap = float(np.hypot(*(points_mm[-1] - points_mm[0])))
-    in_order = float(steps.sum()) < _IN_ORDER * hull.area  # of a hull in the plane, the area is its circumference
-    return in_order and gap <= _NEARLY_CLOSED * float(np.quantile(steps, 0.95)) and gap < 0.1 * hull.area
+    apart = float(np.quantile(np.asarray(KDTree(places).query(places, k=2)[0])[:, 1], 0.95))
+    walk = trace_contour(Cloud(places).blocks, max(apart, round_mm / _MOST_STEPS)).walk_mm
+    steps = np.hypot(*np.diff(walk, axis=0).T)
+    gap, length = float(np.hypot(*(walk[-1] - walk[0]))), float(steps.sum())
+    goes_along = _WAY_ROUND[0] * round_mm < length < _WAY_ROUND[1] * round_mm
+    return goes_along and gap <= _NEARLY_CLOSED * float(np.quantile(steps, 0.95)) and gap < 0.1 * round_mm
 
 
 def _fits_whole(points_mm: Array, terms: Terms) -> bool:

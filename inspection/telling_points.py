@@ -23,7 +23,7 @@ def telling_rows(
 ) -> Rows:
     """Rows (k,), in rising order, of the lowest and the highest of points (m,) in each of the shares of the length; k <= 2 * shares.
 
-    Of equally low points in a share it is the first, of equally high ones the last.
+    Of equally low points in a share it is the one with the least station, of equally high ones the one with the greatest.
 
     station_mm, deviation_mm : (m,) at the pose of this moment; NaN for points that do not count
     told, since : rows that tell of the points before the row `since`, found earlier; only the points from there on are looked at
@@ -38,13 +38,19 @@ def telling_rows(
     for _, share, deviation in pieces():
         np.minimum.at(low, share, deviation)
         np.maximum.at(high, share, deviation)
-    lowest, highest = np.full(shares, _NONE), np.full(shares, _NONE)
+    lowest, highest, least, greatest = (np.full(shares, fill) for fill in (_NONE, _NONE, np.inf, np.inf))
     for rows, share, deviation in pieces():
-        found = np.flatnonzero((deviation == low[share]) & (lowest[share] == _NONE))[::-1]
-        lowest[share[found]] = rows[found]  # where several rows go to one place, the last one stays
-        found = np.flatnonzero(deviation == high[share])
-        highest[share[found]] = rows[found]
+        for extreme, chosen, nearest, way in ((low, lowest, least, 1.0), (high, highest, greatest, -1.0)):
+            equal = np.flatnonzero(deviation == extreme[share])
+            _keep_nearest(rows[equal], share[equal], way * station_mm[rows[equal]], chosen, nearest)
     return np.setdiff1d(np.concatenate([lowest, highest]), [_NONE])
+
+
+def _keep_nearest(rows: Rows, share: Rows, at: Array, chosen: Rows, nearest: Array) -> None:
+    """Let each share choose the row that is least far along, the first one of several at one place, if it is nearer than its choice."""
+    nearer = np.flatnonzero(at < nearest[share])
+    order = nearer[np.argsort(at[nearer], kind="stable")[::-1]]  # where several rows go to one share, the last one stays
+    chosen[share[order]], nearest[share[order]] = rows[order], at[order]
 
 
 def _counted(deviation_mm: Array, told: Rows | None, since: int) -> Iterator[Rows]:

@@ -1,11 +1,13 @@
 """Points gone through in pieces: which take part, which few stand for many, and their exact median."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inspection.cloud import Cloud, even_choice
+from inspection.cloud import Cloud, few_of
 from inspection.medians import median_place, value_of_rank
 
 
@@ -27,36 +29,54 @@ def test_pieces_together_are_the_points_that_take_part(at_once: int, monkeypatch
     marked = np.random.default_rng(1).random(len(points)) < 0.2
     assert np.array_equal(cloud.without(marked).few(), points[~marked])
     assert cloud.without(np.zeros(len(points), dtype=bool)) is cloud
-    few = cloud.few(40)
-    rows = np.searchsorted(np.flatnonzero(cloud.left_out == 0), np.flatnonzero((cloud.points_mm[:, None] == few).all(axis=2).any(axis=1)))
-    assert rows.tolist() == even_choice(len(points), 40).tolist()
-
-
-def test_few_of_many_are_one_of_every_stretch_and_in_no_rhythm() -> None:
-    chosen = even_choice(1_000_000, 1000)
-    assert np.array_equal(chosen // 1000, np.arange(1000))
-    for rhythm in (2, 4, 7, 10, 1000):  # a scan by several heads, or with lines of so many points
-        counts = np.bincount(chosen % rhythm * min(rhythm, 10) // rhythm)
-        assert counts.min() > 0.7 * counts.max(), "one in step with it would see one kind alone"
-    assert even_choice(5, 1000).tolist() == [0, 1, 2, 3, 4]
+    assert np.array_equal(cloud.few(40), few_of(lambda: [points], len(points), 40))
 
 
 GRID = np.stack(np.meshgrid(np.arange(150) * 0.001, np.arange(200) * 0.5), axis=-1).reshape(-1, 2)
 LINE = np.column_stack([np.arange(30_000.0), np.zeros(30_000)])
 
 
-@pytest.mark.parametrize("points", [GRID, LINE, np.random.default_rng(2).normal(size=(30_000, 2))], ids=["grid", "line", "random"])
-def test_a_sample_does_not_depend_on_the_order_of_the_points_and_is_spread_over_them(points: np.ndarray) -> None:
-    sample = Cloud(points).sample(1200)
-    assert 1000 < len(sample) < 1400
-    assert np.array_equal(Cloud(points[::-1]).sample(1200)[::-1], sample)
+def in_place_order(points: np.ndarray) -> np.ndarray:
+    """The points, or numbers, by their values."""
+    return np.asarray(points[np.lexsort(points.reshape(len(points), -1).T)])
+
+
+RANDOM = np.random.default_rng(2).normal(size=(30_000, 2))
+DWELLING = np.where((np.arange(30_000) % 10 == 0)[:, None], RANDOM, RANDOM[7])  # nine of ten points at one place
+
+
+@pytest.mark.parametrize("points", [GRID, LINE, RANDOM, DWELLING, RANDOM[:, 0]], ids=["grid", "line", "random", "dwelling", "one column"])
+def test_few_of_many_do_not_depend_on_the_order_of_the_points_or_on_their_pieces(points: np.ndarray) -> None:
+    few = few_of(lambda: [points], len(points), 1200)
+    assert len(few) == 1200
+    columns = points.reshape(len(points), -1).T
+    mixed = points[np.random.default_rng(3).permutation(len(points))]
+    for other in (points[::-1], mixed, points[np.lexsort(columns)]):
+        for pieces in (1, 7):
+            again = few_of(partial(np.array_split, other, pieces), len(points), 1200)
+            assert np.array_equal(in_place_order(again), in_place_order(few))
+
+
+@pytest.mark.parametrize("points", [GRID, LINE, RANDOM], ids=["grid", "line", "random"])
+def test_few_of_many_are_spread_over_them_and_stay_in_their_order(points: np.ndarray) -> None:
+    few = Cloud(points).few(1200)
+    at = np.array([np.flatnonzero((points == point).all(axis=1))[0] for point in few[:40]])
+    assert (np.diff(at) > 0).all()
     for axis in (0, 1):
-        lower_half = sample[:, axis] <= np.median(points[:, axis])
-        assert lower_half.mean() == pytest.approx((points[:, axis] <= np.median(points[:, axis])).mean(), abs=0.06)
+        assert (few[:, axis] <= np.median(points[:, axis])).mean() == pytest.approx(
+            (points[:, axis] <= np.median(points[:, axis])).mean(), abs=0.06
+        )
     left_out = (np.arange(len(points)) % 3 == 0).astype(np.uint8)
-    some = Cloud(points, left_out).sample(1200)
-    assert 1000 < len(some) < 1400
+    some = Cloud(points, left_out).few(1200)
+    assert len(some) == 1200
     assert {tuple(point) for point in some}.isdisjoint(map(tuple, points[::3]))
+
+
+def test_places_that_hold_all_points_are_drawn_as_often_as_they_fit() -> None:
+    points = np.repeat([[1.0, 2.0], [3.0, 4.0]], 500, axis=0)
+    few = few_of(lambda: [points], 1000, 600)
+    assert sorted(np.unique(few, axis=0, return_counts=True)[1].tolist()) == [100, 500]
+    assert few_of(lambda: [points], 1000, 1000).tolist() == points.tolist()
 
 
 @settings(deadline=None, max_examples=50)

@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from inspection import LiveInspection, NominalProfile, NotMeasured, NurbsCurve, SectionPlane, ToleranceZone, Verdict, discretize
+from inspection.cloud import MANY
 
 Array = NDArray[np.float64]
 ZONE = ToleranceZone(-0.05, 0.05)
@@ -88,6 +89,14 @@ def test_a_scan_in_micrometres_is_not_measured_while_its_pose_is_sought(nominal:
 def test_a_unit_is_named_for_points_in_any_order(nominal: NominalProfile) -> None:
     points = np.random.default_rng(3).permutation(scan(nominal)) / 25.4
     assert "--unit inch" in refusal(points, nominal, zone=ToleranceZone(-0.5, 0.5), coverage_min=0.0)
+
+
+def test_another_size_is_named_for_points_in_any_order_and_no_part_of_the_profile_is_taken_for_one(nominal: NominalProfile) -> None:
+    wide, small, part = ToleranceZone(-0.5, 0.5), scan(nominal) * 0.5, scan(nominal, share=0.55)
+    told = refusal(small, nominal, zone=wide)
+    for order in (np.arange(400)[::-1], np.roll(np.arange(400), 150), np.random.default_rng(3).permutation(400)):
+        assert refusal(small[order], nominal, zone=wide) == told
+        assert judge(part[order], nominal, zone=wide).verdict == Verdict.UNCERTAIN, "a part of the profile, not a smaller one"
 
 
 def test_a_nominal_in_chord_units_is_named() -> None:
@@ -346,3 +355,10 @@ def test_a_bad_part_is_always_measured(nominal: NominalProfile, seed: int) -> No
     # a part that another placement takes into the zone is no bad part: the rule then says so
     assert result.verdict is not Verdict.CONFORM or result.minimum_zone_mm <= 0.1 < result.best_fit_error_mm
     assert result.judged > 350
+
+
+def test_what_few_of_very_many_points_tell_does_not_depend_on_their_order(nominal: NominalProfile) -> None:
+    points = scan(nominal, 3.0, count=MANY + 4000)  # where they are, every digit of scatter and shift follows from which are drawn
+    told = refusal(points, nominal, fit="none")
+    assert "scatter" in told
+    assert refusal(np.random.default_rng(5).permutation(points), nominal, fit="none") == told
