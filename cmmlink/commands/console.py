@@ -136,7 +136,7 @@ def inspect_surface(
     )
     folder = None if plan.out is None else stack.folder_of(plan.out, plan)
     if folder is not None:
-        write_stack(folder, stack, plan.tolerance.zone, plan.part.name, pictures=False)
+        write_stack(folder, stack, plan.tolerance.zone, plan.part.name)
     worst = max(section.verdict for section in stack.sections)
     count = sum(section.verdict is worst for section in stack.sections)
     words = f"{count} of {stack.asked} sections of {plan.mesh.file.name} {VERDICT_WORDS[worst]}"

@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from cmmlink.plan import CtPlan
+    from cmmlink.report import SectionPictures
     from cmmlink.stack import SectionOutcome, StackOutcome
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
@@ -167,37 +168,56 @@ def _inspect_stack(plan: "CtPlan", output: Output, pictures: bool, no_record: bo
     """Inspect a stack with a progress bar; write its files and print what came of it, each even if the other fails."""
     from rich.console import Console
 
-    from cmmlink.report import prepare, write_stack
-    from cmmlink.stack import inspect_stack
+    from cmmlink.report import SectionPictures, prepare, write_stack
 
     pattern = output.out or plan.out
     prepare(pattern)
     bar = _SectionBar(Console(stderr=True), visible=not output.as_json and sys.stderr.isatty())
+    with SectionPictures(plan.part.name) as drawn:
+        wanted = drawn if pictures and pattern is not None else None
+        stack = _judge_stack(plan, output, bar, wanted, no_record)
+        folder = None if pattern is None else stack.folder_of(pattern, plan)
+        try:
+            if folder is not None:
+                with bar.show():
+                    done = bar.begin_round("written", len(stack.sections))
+                    write_stack(folder, stack, plan.tolerance.zone, plan.part.name, pictures=wanted, on_section=done)
+        finally:
+            if output.as_json:
+                print_json(stack.result_json())
+            else:
+                _print_stack(terminal(), stack)
+    if folder is not None and not output.as_json:
+        typer.echo(f"results in {folder}: result.json, sections.csv, a folder for each section{', stack.png' if pictures else ''}")
+    return EXIT_OF[stack.verdict]
+
+
+def _judge_stack(plan: "CtPlan", output: Output, bar: "_SectionBar", pictures: "SectionPictures | None", no_record: bool) -> "StackOutcome":
+    """Inspect the sections, each of which is drawn as soon as it is judged, where pictures are wanted."""
+    from cmmlink.stack import inspect_stack
+
     steps: list[Callable[[], None]] = []
+
+    def begin(sections: int) -> None:
+        steps.append(bar.begin_round("inspected", sections))
+        if pictures is not None:
+            pictures.expect(sections)
+
+    def add(section: "SectionOutcome") -> None:
+        if pictures is not None:
+            pictures.begin(section)
+        steps[0]()
+
     with bar.show(), stop_on_ctrl_c() as stop:
-        stack = inspect_stack(
+        return inspect_stack(
             plan,
             clock=time.monotonic,
             stop=stop,
             records=None if no_record else records_folder(output.records or plan.records),
             patience_s=_PATIENCE_S,
-            on_start=lambda sections: steps.append(bar.begin_round("inspected", sections)),
-            on_section=lambda _: steps[0](),
+            on_start=begin,
+            on_section=add,
         )
-    folder = None if pattern is None else stack.folder_of(pattern, plan)
-    try:
-        if folder is not None:
-            with bar.show():
-                done = bar.begin_round("written", len(stack.sections))
-                write_stack(folder, stack, plan.tolerance.zone, plan.part.name, pictures=pictures, on_section=done)
-    finally:
-        if output.as_json:
-            print_json(stack.result_json())
-        else:
-            _print_stack(terminal(), stack)
-    if folder is not None and not output.as_json:
-        typer.echo(f"results in {folder}: result.json, sections.csv, a folder for each section{', stack.png' if pictures else ''}")
-    return EXIT_OF[stack.verdict]
 
 
 def _own_nominals(texts: Sequence[str]) -> list[dict[str, object]]:

@@ -7,6 +7,7 @@ TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer 
 
 if TYPE_CHECKING:
     from cmmlink.report.folder import prepare, write_results, write_run
+    from cmmlink.report.section_pictures import SectionPictures
     from cmmlink.report.stack_folder import write_stack
     from cmmlink.report.terminal import STYLE_OF, STYLES, LiveTable, print_summary
 else:
@@ -14,6 +15,7 @@ else:
 
     _PLACES = {
         "cmmlink.report.folder": ("prepare", "write_results", "write_run"),
+        "cmmlink.report.section_pictures": ("SectionPictures",),
         "cmmlink.report.stack_folder": ("write_stack",),
         "cmmlink.report.terminal": ("STYLE_OF", "STYLES", "LiveTable", "print_summary"),
     }
@@ -25,6 +27,7 @@ __all__ = [
     "STYLES",
     "STYLE_OF",
     "LiveTable",
+    "SectionPictures",
     "prepare",
     "print_summary",
     "write_results",

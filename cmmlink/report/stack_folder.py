@@ -10,6 +10,7 @@ import numpy as np
 from cmmlink.csv_rows import Texts, write_rows
 from cmmlink.deviations_csv import write_deviations
 from cmmlink.errors import PlanError
+from cmmlink.report.section_pictures import SectionPictures
 from cmmlink.result_files import new_files
 from cmmlink.result_folder import make_room
 from cmmlink.result_keys import SectionInspected
@@ -45,14 +46,13 @@ def write_stack(
     zone: ToleranceZone,
     title: str,
     *,
-    pictures: bool = True,
+    pictures: SectionPictures | None = None,
     on_section: Callable[[], None] = lambda: None,
 ) -> None:
-    """Write result.json, sections.csv, stack.png and for each section its deviations, contours and picture."""
-    from cmmlink.report.picture import ProfilePictures  # noqa: PLC0415 - matplotlib takes half a second that other commands need not pay
-    from cmmlink.report.stack_picture import write_stack_picture  # noqa: PLC0415
+    """Write result.json, sections.csv, stack.png and for each section its deviations, contours and picture.
 
-    drawn = ProfilePictures()
+    pictures : draws those of the sections; None where no picture is wanted
+    """
     try:
         with new_files(folder, make_room) as files:
             files("result.json").write_text(json.dumps(stack.result_json(), indent=2) + "\n", encoding="utf-8")
@@ -63,11 +63,12 @@ def write_stack(
                 result = section.run.result
                 if result is not None and result.judged:
                     write_deviations(result.blocks(), files(f"{own}/deviations.csv"), section.run.ending)
-                    if pictures:
-                        heading = f"{title}, height {section.slice.height_mm:g} mm"
-                        drawn.write(result, section.profile, heading, files(f"{own}/profile.png"), section.run.ending)
+                    if pictures is not None:
+                        pictures.write(number, section, files(f"{own}/profile.png"))
                 on_section()
-            if pictures:
+            if pictures is not None:
+                from cmmlink.report.stack_picture import write_stack_picture  # noqa: PLC0415 - it loads matplotlib, half a second
+
                 write_stack_picture(stack, zone, title, files("stack.png"))
     except OSError as error:
         raise PlanError(f"{folder}: the results cannot be written ({error.strerror}); choose another folder with --out") from None

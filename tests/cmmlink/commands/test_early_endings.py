@@ -15,7 +15,7 @@ from rich.console import Console
 from cmmlink.console.past_runs import PastRuns
 from cmmlink.deviations_csv import COLUMNS, EARLY_COLUMNS
 from cmmlink.report import print_summary, write_results
-from cmmlink.report.picture import headline_on_picture
+from cmmlink.report.picture_content import headline_on_picture
 from cmmlink.result_json import result_json
 from cmmlink.run_view import RunView
 from drivers import LinkError

@@ -8,7 +8,8 @@ import pytest
 from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 
-from cmmlink.report.picture import ProfilePictures, headline_on_picture, magnification, names_of_limits, side_of_label, write_picture
+from cmmlink.report.picture import ProfilePictures, names_of_limits, side_of_label, write_picture
+from cmmlink.report.picture_content import content_of, headline_on_picture, magnification
 from inspection import NominalProfile, ToleranceZone
 from tests.cmmlink.judged_oval import bumped, inspect_oval
 
@@ -76,6 +77,6 @@ def test_pictures_on_one_figure_are_those_on_a_new_one_each(profile: NominalProf
     pictures, bad, uncertain = ProfilePictures(), inspect_oval(profile, 3 * bumped()), inspect_oval(profile, 0.065)
     for number, result in enumerate((bad, uncertain, bad)):
         said = f"run {number}" if number % 2 else ""
-        pictures.write(result, profile, f"part {number}", tmp_path / "one.png", "complete", said)
+        pictures.write(content_of(result, profile, f"part {number}", "complete", said), tmp_path / "one.png")
         write_picture(result, profile, f"part {number}", tmp_path / "new.png", "complete", said)
         np.testing.assert_array_equal(imread(tmp_path / "one.png"), imread(tmp_path / "new.png"))
