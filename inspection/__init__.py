@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from inspection.coarse import register_coarse
     from inspection.conclusion import Missing, Reason, reasons_of_abort
     from inspection.consumption import ConsumptionFit, fit_least_consumption
+    from inspection.consumption_proof import ConsumptionCertificate, certify_consumption
     from inspection.curve import NurbsCurve
     from inspection.curve_check import CurveCheck, Hollow, check_curve
     from inspection.errors import InspectionError, NominalError, NotMeasured, RegistrationError
@@ -69,6 +70,7 @@ else:
         "inspection.coarse": ("register_coarse",),
         "inspection.conclusion": ("Missing", "Reason", "reasons_of_abort"),
         "inspection.consumption": ("ConsumptionFit", "fit_least_consumption"),
+        "inspection.consumption_proof": ("ConsumptionCertificate", "certify_consumption"),
         "inspection.curve": ("NurbsCurve",),
         "inspection.curve_check": ("CurveCheck", "Hollow", "check_curve"),
         "inspection.errors": ("InspectionError", "NominalError", "NotMeasured", "RegistrationError"),
@@ -111,6 +113,7 @@ __all__ = [
     "ChordMethod",
     "ComparedAirfoil",
     "ComparedValue",
+    "ConsumptionCertificate",
     "ConsumptionFit",
     "Crossing",
     "CurveCheck",
@@ -167,6 +170,7 @@ __all__ = [
     "WeightName",
     "ZoneCertificate",
     "bow",
+    "certify_consumption",
     "certify_minimum_zone",
     "check_curve",
     "chord",

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inspection.bands import EvenBand
 from inspection.coarse import check_registrable
 from inspection.freedoms import gradients
 from inspection.minimum_zone import MinimumZone, fit_minimum_zone
@@ -136,7 +137,7 @@ def _prove(
     if half <= 0 or not len(zone.active):
         return PlacementProof("refuted" if half <= 0 else "undecided", None, (), 0), zone.active
     inside = np.flatnonzero(~deviations(zone.nominal_from_section.apply(points), nominal, "exact", tip_radius_mm).beyond_end)
-    search = PlacementSearch(nominal, half, zone.middle_mm, tip_radius_mm)
+    search = PlacementSearch(nominal, EvenBand(half, zone.middle_mm), tip_radius_mm)
     proof, rows = search.look_with(points[inside], np.searchsorted(inside, np.sort(zone.active)), most_boxes, is_over)
     return proof, inside[rows]
 

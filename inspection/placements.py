@@ -3,7 +3,8 @@
 A motion is told by the place of one of the points, the anchor, and by an angle. The distance to the nominal changes by no more
 than a point moves, so in a box of motions (anchor within half widths h, angle within t) the point i moves from where the box's
 centre puts it by at most rho_i = sqrt(2) h + 2 sin(t / 2) |p_i - anchor|. A box is refuted by any point whose deviation at the
-centre is farther out of the zone than rho_i. When every box is refuted, no placement of the part can pass: whatever fit is
+centre is farther out of the zone than rho_i, and where the zone varies along the profile, out of the loosest zone of all stations
+that its foot may come to (see `bands`). When every box is refuted, no placement of the part can pass: whatever fit is
 used, whatever datum, and whatever points are still to come, since the maximum over more points is never smaller. The root of the
 search is every anchor in the nominal's box grown by the zone, and every angle, so the answer depends on no start.
 """
@@ -15,10 +16,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inspection.bands import Band, EvenBand
 from inspection.coarse import check_registrable
 from inspection.kernels import project
 from inspection.kernels.layout import OPEN_END
-from inspection.minimum_zone import MinimumZone, fit_minimum_zone
 from inspection.nominal import NominalProfile
 from inspection.rigid import RigidTransform
 from inspection.telling_points import MANY, telling_rows
@@ -29,7 +30,7 @@ Rows = NDArray[np.int64]
 _WAVE = 256  # boxes looked at together
 _STAGES = ((0, 4), (4, 12), (12, 40))  # positions in the list of witnesses: most boxes fall to the first few points
 _EVEN_WITNESSES = 24
-_SMALL = 4.0  # boxes that move points by less than this many half zones are asked with every point
+_SMALL = 4.0  # boxes that move points by less than this many half zones, where they are narrowest, are asked with every point
 _FULL_LOOKS = 16  # of those boxes, per wave
 _TURN_SHARE = 0.7  # a box is cut in place while that moves points at least this much as the angle does
 _ROUNDING_MM = 1e-9  # of a distance: far above what the projection errs by
@@ -77,16 +78,17 @@ class _Boxes:
 class PlacementSearch:
     """The search for a placement that passes, over the points of a growing scan.
 
-    half_mm, middle_mm : a placement passes when |deviation - middle_mm| <= half_mm for every point; with an uncertainty U, half_mm
-                         is half the zone's width plus U
-    tip_radius_mm      : the points are centres of a ball of this radius
+    allowed       : the deviations between which every point must lie for a placement to pass: a band, or half the width of one that
+                    is the same everywhere, about zero. With an uncertainty U it is the tolerance zone, wider by U on both sides
+    tip_radius_mm : the points are centres of a ball of this radius
 
     A search remembers which points refuted most, and a placement that passed, so that the next one is quick. Points beyond an open
     end count with their distance to that end; hand over only points that belong to the profile.
     """
 
-    def __init__(self, nominal: NominalProfile, half_mm: float, middle_mm: float = 0.0, tip_radius_mm: float = 0.0) -> None:
-        self._nominal, self._half, self._middle, self._tip = nominal, half_mm, middle_mm, tip_radius_mm
+    def __init__(self, nominal: NominalProfile, allowed: Band | float, tip_radius_mm: float = 0.0) -> None:
+        self._band = EvenBand(allowed) if isinstance(allowed, float) else allowed
+        self._nominal, self._tip = nominal, tip_radius_mm
         self._ends = np.empty((0, 2)) if nominal.curve.closed else nominal.curve.point(np.array(nominal.curve.domain))
         self._hits: dict[int, int] = {}
         self._passed: RigidTransform | None = None
@@ -108,13 +110,13 @@ class PlacementSearch:
         points = check_registrable(points_mm)
         if self._passed is not None and self._excess(points, self._passed) <= 0:
             return PlacementProof("fits", self._passed, (), 0)
-        zone = fit_minimum_zone(points, self._nominal, start, tip_radius_mm=self._tip, middle_mm=self._middle, is_over=is_over)
-        if self._excess(points, zone.nominal_from_section) <= 0:
-            self._passed = zone.nominal_from_section
-            return PlacementProof("fits", self._passed, (), 0)
+        pose, active = self._band.fit(points, self._nominal, start, self._tip, is_over)
+        if self._excess(points, pose) <= 0:
+            self._passed = pose
+            return PlacementProof("fits", pose, (), 0)
         if len(points) <= MANY:
-            return self._search(points, zone.active.tolist(), most_boxes, is_over)
-        return self._search_by_few(points, zone, most_boxes, is_over)
+            return self._search(points, active.tolist(), most_boxes, is_over)
+        return self._search_by_few(points, pose, active, most_boxes, is_over)
 
     def look_with(
         self, points_mm: Array, rows: Rows, most_boxes: int = 400_000, is_over: Callable[[], bool] = lambda: False
@@ -126,16 +128,19 @@ class PlacementSearch:
         """
         return self._search_with(points_mm, rows, rows, self._worst, most_boxes, is_over)
 
-    def _search_by_few(self, points: Array, zone: MinimumZone, most_boxes: int, is_over: Callable[[], bool]) -> PlacementProof:
+    def _search_by_few(
+        self, points: Array, pose: RigidTransform, active: Rows, most_boxes: int, is_over: Callable[[], bool]
+    ) -> PlacementProof:
         """Search with few points that stand for all."""
 
         def telling(points: Array, pose: RigidTransform) -> Rows:
             feet = project(pose.apply(points), self._nominal.grid)
-            out = self._nominal.outward * feet.distance_mm - self._tip - self._middle
-            return np.union1d(telling_rows(feet.station_mm, out, self._nominal.length_mm), self._worst(points, pose))
+            lower, upper = self._band.limits(feet)
+            share = (self._nominal.outward * feet.distance_mm - self._tip - (lower + upper) / 2) / (upper - lower)
+            return np.union1d(telling_rows(feet.station_mm, share, self._nominal.length_mm), self._worst(points, pose))
 
-        rows = np.union1d(zone.active, telling(points, zone.nominal_from_section))
-        return self._search_with(points, rows, zone.active, telling, most_boxes, is_over)[0]
+        rows = np.union1d(active, telling(points, pose))
+        return self._search_with(points, rows, active, telling, most_boxes, is_over)[0]
 
     def _search_with(
         self,
@@ -160,7 +165,7 @@ class PlacementSearch:
 
     def _worst(self, points: Array, pose: RigidTransform) -> Rows:
         """The row (1,) of the point that a pose leaves farthest out of the zone."""
-        return np.array([self._outside(pose.apply(points), np.zeros(len(points))).argmax()])
+        return np.array([self._outside(pose.apply(points)).argmax()])
 
     def _search(self, points: Array, active: list[int], most_boxes: int, is_over: Callable[[], bool]) -> PlacementProof:
         """Refute boxes of motions until none is left, best first; `active` are the points that hold the minimum zone nearby."""
@@ -187,7 +192,7 @@ class PlacementSearch:
     def _root(self) -> _Boxes:
         """Return the one box that holds every motion which could pass."""
         low, high = self._nominal.points_mm.min(axis=0), self._nominal.points_mm.max(axis=0)
-        side = float((high - low).max()) / 2 + self._half + abs(self._middle) + self._tip
+        side = float((high - low).max()) / 2 + self._band.farthest_mm + self._tip
         return _Boxes((low + high)[None, :] / 2, np.zeros(1), np.array([side]), np.array([np.pi]), np.zeros(1))
 
     def _not_refuted(self, wave: _Boxes, arms: Array) -> _Boxes:
@@ -214,11 +219,11 @@ class PlacementSearch:
         """Ask the small boxes with every point; return what is left, and the place and angle of a centre that passes."""
         reach = float(np.hypot(*arms.T).max())
         moves = np.sqrt(2) * boxes.half + 2 * np.sin(boxes.turn / 2) * reach
-        small = np.flatnonzero(moves < _SMALL * self._half)
+        small = np.flatnonzero(moves < _SMALL * self._band.narrowest_mm)
         left = np.ones(len(boxes), dtype=bool)
         for box in small[np.argsort(boxes.excess[small])][:_FULL_LOOKS].tolist():
             margin, excess = self._margins(boxes.rows(np.array([box])), arms)
-            if excess.max() <= 0:
+            if excess.max() <= 0 and self._outside(_moved(boxes, box, arms)).max() <= 0:
                 return boxes, (boxes.place[box], float(boxes.angle[box]))
             left[box] = margin.max() <= 0
             if not left[box]:
@@ -237,27 +242,35 @@ class PlacementSearch:
         return excess - moves - _ROUNDING_MM, excess
 
     def _excess(self, points: Array, pose: RigidTransform) -> float:
-        return float(self._outside(pose.apply(points), np.zeros(len(points))).max())
+        return float(self._outside(pose.apply(points)).max())
 
-    def _outside(self, places: Array, moves: Array) -> Array:
-        """How far out of the zone places (j, 2) lie, at least, when they may move by `moves` (j,) over the border beyond an end.
+    def _outside(self, places: Array, moves: Array | None = None) -> Array:
+        """How far places (j, 2) lie out of the zone, or of the loosest one that they may come to when they move by `moves` (j,).
 
         The sign of a distance turns round in the region beyond an open end. Where a place may come there, the kinder sign counts,
         so that the bound holds across the jump.
         """
         feet = project(places, self._nominal.grid)
-        left = self._nominal.outward * feet.distance_mm - self._tip - self._middle
-        outside = np.abs(left)
+        lower, upper = self._band.limits(feet) if moves is None else self._band.loosest(places, feet, moves)
+
+        def outside(outward: float) -> Array:
+            deviation = outward * feet.distance_mm - self._tip
+            return np.maximum(lower - deviation, deviation - upper)
+
+        found = outside(self._nominal.outward)
         if len(self._ends):
-            distance = np.abs(feet.distance_mm)
             to_end = np.hypot(*(places[:, None, :] - self._ends).T).min(axis=0)
-            either = (feet.vertex == OPEN_END) | (to_end <= distance + 2 * moves)
-            kinder = np.minimum(np.abs(distance - self._tip - self._middle), np.abs(distance + self._tip + self._middle))
-            outside = np.where(either, np.minimum(outside, kinder), outside)
-        return np.asarray(outside - self._half)
+            either = (feet.vertex == OPEN_END) | (to_end <= np.abs(feet.distance_mm) + (0.0 if moves is None else 2 * moves))
+            found = np.where(either, np.minimum(outside(1.0), outside(-1.0)), found)
+        return found
 
     def _witnesses(self) -> tuple[int, ...]:
         return tuple(row for row in sorted(self._hits, key=lambda row: -self._hits[row]) if self._hits[row])
+
+
+def _moved(boxes: _Boxes, box: int, arms: Array) -> Array:
+    """The places (m, 2) to which the centre of a box brings points that lie at `arms` (m, 2) from the anchor."""
+    return RigidTransform(float(boxes.angle[box]), boxes.place[box]).apply(arms)
 
 
 def _best(waiting: _Boxes) -> tuple[_Boxes, _Boxes]:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inspection.bands import EvenBand
 from inspection.cloud import MANY, row_blocks
 from inspection.errors import RegistrationError
 from inspection.placements import PlacementSearch
@@ -53,7 +54,7 @@ class PrefixSearch:
     def __init__(self, terms: Terms) -> None:
         zone = terms.zone
         self._length, self._middle = terms.nominal.length_mm, zone.middle_mm
-        self._search = PlacementSearch(terms.nominal, _half_mm(terms), zone.middle_mm, terms.tip_radius_mm)
+        self._search = PlacementSearch(terms.nominal, EvenBand(_half_mm(terms), zone.middle_mm), terms.tip_radius_mm)
 
     def refutes(self, prefix: Prefix, is_over: Callable[[], bool] = lambda: False) -> bool:
         """Whether it is proven that no placement of a prefix passes, and so that the part will fail. False says nothing.

@@ -11,6 +11,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from inspection.bands import EvenBand
 from inspection.cloud import MANY, Cloud, few_of, row_blocks
 from inspection.conclusion import Findings, Missing, Reason, conclude, word_points
 from inspection.fine import register
@@ -139,7 +140,7 @@ def _prove_no_placement(rows: ScanRows, settled: _Settled, terms: Terms) -> _Set
         settled = replace(settled, minimum_zone_mm=width_mm)
         if at_zone.points != Verdict.NONCONFORM:
             return replace(at_zone, best_fit_error_mm=error_mm, minimum_zone_mm=width_mm)
-        search = PlacementSearch(terms.nominal, half_mm, zone.middle_mm, terms.tip_radius_mm)
+        search = PlacementSearch(terms.nominal, EvenBand(half_mm, zone.middle_mm), terms.tip_radius_mm)
         proof = search.look(points, smallest.nominal_from_section, _MOST_BOXES)
         if proof.outcome == "refuted":
             return settled

@@ -26,6 +26,15 @@ class Limits(NamedTuple):
     upper_slope: Array
 
 
+class LimitRange(NamedTuple):
+    """The lowest and the highest (m,) in mm that each limit has anywhere on stretches."""
+
+    lowest_lower_mm: Array
+    highest_lower_mm: Array
+    lowest_upper_mm: Array
+    highest_upper_mm: Array
+
+
 class _Piece(NamedTuple):
     """Limits between two stations, at its start and at its end, and how far beyond them they hold as well."""
 
@@ -58,6 +67,7 @@ class VaryingZone:
     between: Transition = "linear"
     border_mm: float = 0.0
     _pieces: tuple[_Piece, ...] = field(init=False, repr=False)
+    _turns: "_Turns" = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         for name in ("station_mm", "lower_mm", "upper_mm"):
@@ -66,6 +76,7 @@ class VaryingZone:
             object.__setattr__(self, name, array)
         _check(self)
         object.__setattr__(self, "_pieces", _pieces(self))
+        object.__setattr__(self, "_turns", _Turns.of(self))
         lower, upper, _, _ = self.limits(self.station_mm)
         if not (lower < upper).all():
             at = float(self.station_mm[np.argmax(lower >= upper)])
@@ -85,7 +96,9 @@ class VaryingZone:
             if self.closed:
                 along = np.mod(along, self.length_mm)
                 along = np.where(along >= self.length_mm - piece.before_mm, along - self.length_mm, along)
-            here = (along >= -piece.before_mm) & (along <= piece.length_mm + piece.after_mm)
+                here = along <= piece.length_mm + piece.after_mm  # it is not before the start, but for round-off
+            else:
+                here = (along >= -piece.before_mm) & (along <= piece.length_mm + piece.after_mm)
             share, rate = _shape(np.clip(along / piece.length_mm, 0.0, 1.0), self.between)
             for at, strict, (first, last) in ((0, np.greater, piece.lower_mm), (1, np.less, piece.upper_mm)):
                 limit = first + share * (last - first)
@@ -96,10 +109,74 @@ class VaryingZone:
         found.lower_mm[unknown] = found.upper_mm[unknown] = np.nan
         return found
 
+    def extremes(self, from_mm: Array, to_mm: Array) -> LimitRange:
+        """What the limits are at most and at least anywhere between stations (m,), which on a closed profile may lie beyond its seam.
+
+        At a step the limits of both its sides count, and not the stricter alone: a station nearby has either.
+        """
+        slack = 2 * _ROUNDING * self.length_mm
+        low, high = from_mm - slack, to_mm + slack
+        whole = high - low >= self.length_mm
+        low, high = np.where(whole, 0.0, low), np.where(whole, self.length_mm, high)
+        ends = [self.limits(np.clip(at, *((-np.inf, np.inf) if self.closed else (0.0, self.length_mm)))) for at in (low, high)]
+        inside = self._turns.between(low, high)
+        found = []
+        for at in (0, 1):
+            one, other = ends[0][at], ends[1][at]
+            found += [np.minimum(np.minimum(one, other), inside[2 * at]), np.maximum(np.maximum(one, other), inside[2 * at + 1])]
+        return LimitRange(*found)
+
     def consumption(self, deviation_mm: ArrayLike, station_mm: ArrayLike) -> Array:
         """Share (m,) of the zone that deviations (m,) at stations (m,) consume: 0 in its middle, -1 and 1 at its limits."""
         lower, upper, _, _ = self.limits(station_mm)
         return np.asarray((2 * np.asarray(deviation_mm, dtype=np.float64) - lower - upper) / (upper - lower))
+
+
+class _Turns(NamedTuple):
+    """The stations (t,) between which both limits run one way, and ranges of limits at runs of 1, 2, 4 ... of them, both sides of each."""
+
+    station_mm: Array
+    runs: tuple[tuple[Array, Array, Array, Array], ...]
+
+    @classmethod
+    def of(cls, zone: VaryingZone) -> "_Turns":
+        """Those of a zone; of a closed profile with a turn more before and behind it."""
+        nudge, length = 2 * _ROUNDING * zone.length_mm, zone.length_mm
+        starts, stops = ([p.start_mm for p in zone._pieces], [p.start_mm + p.length_mm for p in zone._pieces])
+        borders = [p.start_mm - p.before_mm for p in zone._pieces], [p.start_mm + p.length_mm + p.after_mm for p in zone._pieces]
+        ends = np.concatenate([starts, stops, *borders])
+        at = np.unique(np.mod(ends, length) if zone.closed else np.clip(ends, 0.0, length))
+        sides = []
+        for way in (-nudge, 0.0, nudge):
+            beside = at + way if zone.closed else np.clip(at + way, 0.0, length)
+            limits, back = zone.limits(beside), at - beside
+            sides.append(np.stack([limits.lower_mm + back * limits.lower_slope, limits.upper_mm + back * limits.upper_slope]))
+        low, high = np.min(sides, axis=0), np.max(sides, axis=0)
+        values = np.stack([low[0], high[0], low[1], high[1]])
+        if zone.closed:
+            at, values = np.concatenate([at - length, at, at + length]), np.tile(values, 3)
+        runs, step = [values], 1
+        while 2 * step <= len(at):
+            before, after = runs[-1][:, :-step], runs[-1][:, step:]
+            runs.append(np.stack([worse(before[i], after[i]) for i, worse in enumerate(_WORSE)]))
+            step *= 2
+        return cls(at, tuple((run[0], run[1], run[2], run[3]) for run in runs))
+
+    def between(self, from_mm: Array, to_mm: Array) -> list[Array]:
+        """The lowest and highest lower limit, then upper limit (m,) at the turns on stretches; infinite the other way without one."""
+        first, stop = np.searchsorted(self.station_mm, from_mm, "left"), np.searchsorted(self.station_mm, to_mm, "right")
+        count = np.maximum(stop - first, 0)
+        found = [np.full(len(count), fill) for fill in (np.inf, -np.inf, np.inf, -np.inf)]
+        level = np.where(count > 0, np.frexp(np.maximum(count, 1))[1] - 1, -1)
+        for k in np.unique(level[level >= 0]).tolist():
+            rows = np.flatnonzero(level == k)
+            for i, worse in enumerate(_WORSE):
+                run = self.runs[k][i]
+                found[i][rows] = worse(run[first[rows]], run[stop[rows] - (1 << k)])
+        return found
+
+
+_WORSE = (np.minimum, np.maximum, np.minimum, np.maximum)
 
 
 def _shape(t: Array, between: Transition) -> tuple[Array, Array]:

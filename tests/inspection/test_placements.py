@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from inspection import RigidTransform, discretize, fit_minimum_zone
+from inspection.bands import EvenBand
 from inspection.placements import PlacementSearch
 from tests.inspection import profiles
 from tests.inspection.profiles import Array
@@ -63,7 +64,7 @@ def test_a_scan_that_runs_over_an_open_end_is_not_refuted_for_it() -> None:
     points = np.vstack([curve.point(u) + 0.02 * profiles.left_normal(curve, u), behind])
     for middle in (0.0, 0.02):
         half = 0.04
-        found = PlacementSearch(nominal, half, middle).look(RigidTransform(0.7, np.array([5.0, 9.0])).apply(points))
+        found = PlacementSearch(nominal, EvenBand(half, middle)).look(RigidTransform(0.7, np.array([5.0, 9.0])).apply(points))
         assert found.outcome == "fits"
 
 

@@ -60,3 +60,29 @@ def test_zones_that_contradict_themselves_are_refused() -> None:
         VaryingZone(STATIONS, LOWER, UPPER, 50.0, True)
     with pytest.raises(ValueError, match="one shape"):
         VaryingZone(STATIONS, LOWER[:1], UPPER, 100.0, True)
+
+
+@pytest.mark.parametrize("between", ["linear", "smooth", "constant"])
+@pytest.mark.parametrize("closed", [True, False])
+@pytest.mark.parametrize("border_mm", [0.0, 1.5, 12.0])
+def test_extremes_are_those_of_every_station_on_the_way(between: Transition, closed: bool, border_mm: float) -> None:
+    """Against limits at stations 5 um apart; on a step they have either side within that, and never more than the extremes."""
+    s = np.array([3.0, 20.0, 20.0, 42.0, 55.0, 55.0, 61.0, 90.0])
+    lower, upper = np.array([-4, -2, -7, -3, -3, -5, -6, -2.0]), np.array([5, 3, 4, 9, 9, 2, 6, 7.0])
+    wanted = VaryingZone(s, lower, upper, 100.0, closed, between, border_mm)
+    rng = np.random.default_rng(3)
+    low = rng.uniform(-60 if closed else 0, 100, 60)
+    high = np.minimum(low + 10.0 ** rng.uniform(-2, 2.2, 60), np.inf if closed else 100.0)
+    found = wanted.extremes(low, high)
+    for k in range(len(low)):
+        limits = wanted.limits(np.arange(low[k], min(high[k], low[k] + 100) + 1e-9, 0.005))
+        every = (limits.lower_mm.min(), limits.lower_mm.max(), limits.upper_mm.min(), limits.upper_mm.max())
+        for i, (one, way) in enumerate(zip(every, (-1, 1, -1, 1), strict=True)):
+            beyond = way * (found[i][k] - one)
+            at_step = np.abs(((np.array([20, 55.0])[:, None] - np.array([low[k], high[k]]) + 50) % 100) - 50).min() <= 0.005
+            assert -1e-9 <= beyond <= (8.0 if at_step else 0.03)
+
+
+def test_a_single_zone_is_its_own_extreme() -> None:
+    found = VaryingZone.constant(-0.1, 0.2, 50.0, True).extremes(np.array([3.0, -80.0]), np.array([3.0, 90.0]))
+    assert [side.tolist() for side in found] == [[-0.1, -0.1], [-0.1, -0.1], [0.2, 0.2], [0.2, 0.2]]
