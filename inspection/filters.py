@@ -6,6 +6,7 @@ to itself. The kernel's width follows from the order, so that a wave as long as 
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -25,7 +26,9 @@ _MOST_ROUNDS = 50
 _NO_SPIKE_MM = 1e-6  # a residual below a nanometre is none, however smooth the profile is
 _SETTLED = 1e-6  # relative change of Tukey's limit
 _DETERMINED = 1e-10  # determinant of the moments, in units of the cutoff, below which the points determine no parabola
-_PAIRS_AT_ONCE = 1 << 15  # their values stay in the cache
+_BLOCK = 128  # places whose sums are one product of matrices, where they lie within
+_BLOCK_REACH = 0.7  # of the cutoff: powers of greater distances lose digits
+_MOST_PAIRS = 1 << 22  # kernel values that are kept from round to round
 _NODES = 128  # a cutoff: where points are denser, those between two nodes are put together
 
 
@@ -70,7 +73,7 @@ class FilteredProfile:
     rounds      : of the robust filter; 1 without it
     settled     : the robust filter's limit changed by less than a millionth in its last round; True without it. Where it did not, the
                   limit goes to and fro between residuals of neighbouring size
-    pairs       : kernel values that were worked out, all rounds together
+    pairs       : kernel values that were worked out
     """
 
     waviness_mm: Array
@@ -139,6 +142,7 @@ def filter_profile(
         weight[rows], taken, stands = smoother.weigh()
         where = stretch.along(asked)
         here = np.flatnonzero(np.isfinite(where))
+        here = here[np.argsort(where[here], kind="stable")]
         waviness[here] = smoother.values(weight[rows], where[here])
         rounds, settled, pairs = max(rounds, taken), settled and stands, pairs + smoother.pairs
     return FilteredProfile(waviness, weight, rounds, settled, pairs)
@@ -163,7 +167,8 @@ class _Smoother:
     def __init__(self, stretch: _Stretch, station: Array, deviation: Array, wanted: ProfileFilter) -> None:
         self._stretch, self._station, self._deviation, self._filter = stretch, station, deviation, wanted
         self._share = _shares(station, stretch, wanted.cutoff_mm)
-        self.pairs = 0
+        self._known: _Known | None = None
+        self.pairs = 0  # kernel values that were worked out
 
     def weigh(self) -> tuple[Array, int, bool]:
         """Weight (k,) of each point by the robust filter, 1 without it; the rounds, and whether the weights stand."""
@@ -172,7 +177,7 @@ class _Smoother:
             return weight, 1, True
         limit = np.inf
         for taken in range(1, _MOST_ROUNDS + 1):
-            residual = np.abs(self._deviation - self.values(weight, self._station))
+            residual = np.abs(self._deviation - self._smooth(weight, self._station))
             residual = np.where(np.isnan(residual), 0.0, residual)
             before, limit = limit, max(_TUKEY * _weighted_median(residual, self._share), _NO_SPIKE_MM)
             if abs(limit - before) <= _SETTLED * limit:
@@ -181,17 +186,19 @@ class _Smoother:
         return weight, _MOST_ROUNDS, False
 
     def values(self, weight: Array, at: Array) -> Array:
-        """The waviness at places (n,) of the stretch, with weights (k,) beside the shares."""
-        station, heavy, deviation = self._station, weight * self._share, self._deviation
+        """The waviness at places (n,) of the stretch, with weights (k,) beside the shares; NaN far from every point."""
         far = self._distance_to_nearest(at) > _GAP * self._filter.cutoff_mm
+        return np.where(far, np.nan, self._smooth(weight, at))
+
+    def _smooth(self, weight: Array, at: Array) -> Array:
+        """The waviness at places (n,) of the stretch, near to points or not."""
+        station, heavy, deviation = self._station, weight * self._share, self._deviation
         step = self._filter.cutoff_mm / _NODES
         if len(station) * step <= self._stretch.length_mm:
-            found = self._regress(station, heavy, deviation, at)
-        else:
-            count = math.ceil(self._stretch.length_mm / step)
-            step = self._stretch.length_mm / count
-            found = self._by_nodes(*_put_together(station, heavy, deviation, step, count), at, step, count)
-        return np.where(far, np.nan, found)
+            return self._regress(station, heavy, deviation, at)
+        count = math.ceil(self._stretch.length_mm / step)
+        step = self._stretch.length_mm / count
+        return self._by_nodes(*_put_together(station, self._share, heavy, deviation, (step, count)), at, step, count)
 
     def _by_nodes(self, station: Array, heavy: Array, deviation: Array, at: Array, step: float, count: int) -> Array:
         """The waviness at places (n,), through four values of an even grid each."""
@@ -206,27 +213,23 @@ class _Smoother:
 
     def _regress(self, station: Array, heavy: Array, deviation: Array, at: Array) -> Array:
         """The local polynomial's value at places (n,), from points (k,) that weigh `heavy`."""
-        window, (s, a, z) = _WINDOW[self._filter.order] * self._filter.cutoff_mm, self._with_images(station, heavy, deviation)
-        low, high = np.searchsorted(s, at - window, side="left"), np.searchsorted(s, at + window, side="right")
-        found, ends = np.full(len(at), np.nan), np.cumsum(high - low)
-        filled, begin = np.flatnonzero(high > low), 0
-        self.pairs += int(ends[-1]) if len(ends) else 0
-        while begin < len(filled):
-            until = np.searchsorted(ends[filled], ends[filled[begin]] + _PAIRS_AT_ONCE, side="right")
-            part = filled[begin : max(int(until), begin + 1)]
-            found[part] = _local_values(s, a, z, at[part], low[part], high[part], self._filter)
-            begin += len(part)
-        return found
+        known = self._known
+        if known is None or not (np.array_equal(station, known.station) and np.array_equal(at, known.at)):
+            row, along = self._with_images(station)
+            known = self._known = _Known(station, at, row, _Kernel(along, at, self._filter))
+            self.pairs += known.kernel.pairs_kept
+        self.pairs += known.kernel.pairs_anew
+        return known.kernel.values(heavy[known.row], deviation[known.row])
 
-    def _with_images(self, station: Array, heavy: Array, deviation: Array) -> tuple[Array, Array, Array]:
-        """The points, and on a closed stretch their images before and behind it, as far as a window reaches."""
+    def _with_images(self, station: Array) -> tuple[Rows, Array]:
+        """Rows and stations of the points, and on a closed stretch of their images before and behind it, as far as a window reaches."""
         if not self._stretch.circular:
-            return station, heavy, deviation
+            return np.arange(len(station)), station
         length, reach = self._stretch.length_mm, (_WINDOW[self._filter.order] + 4 / _NODES) * self._filter.cutoff_mm
         around = range(-math.ceil(reach / length), math.ceil(reach / length) + 1)
         every = np.concatenate([station + k * length for k in around])
         near = np.flatnonzero((every >= -reach) & (every <= length + reach))
-        return every[near], np.tile(heavy, len(around))[near], np.tile(deviation, len(around))[near]
+        return near % len(station), every[near]
 
     def _distance_to_nearest(self, at: Array) -> Array:
         """How far places (n,) are from the nearest point."""
@@ -256,37 +259,107 @@ def _weighted_median(values: Array, weights: Array) -> float:
     return float(values[order[np.searchsorted(below, below[-1] / 2)]])
 
 
-def _put_together(station: Array, heavy: Array, deviation: Array, step: float, count: int) -> tuple[Array, Array, Array]:
-    """The points between two nodes of an even grid put together to one: its place and deviation are their weighted means."""
+def _put_together(station: Array, share: Array, heavy: Array, deviation: Array, cells: tuple[float, int]) -> tuple[Array, Array, Array]:
+    """The points between two nodes of an even grid put together to one, at their mean place, which their robust weights do not move.
+
+    Gives the place, the weight and the weighted mean deviation of each.
+    """
+    step, count = cells
     node = np.minimum((station / step).astype(np.int64), count - 1)
-    total = np.asarray(np.bincount(node, heavy, count), dtype=np.float64)
-    filled = np.flatnonzero(total > 0)
-    means = [
-        np.asarray(np.bincount(node, heavy * values, count)[filled] / total[filled], dtype=np.float64) for values in (station, deviation)
-    ]
-    return means[0], total[filled], means[1]
+    sums = [np.bincount(node, weights, count) for weights in (share, share * station, heavy, heavy * deviation)]
+    filled = np.flatnonzero(sums[0] > 0)
+    shares, places, total, mean = (np.asarray(each[filled], dtype=np.float64) for each in sums)
+    return places / shares, total, np.divide(mean, total, out=np.zeros(len(filled)), where=total > 0)
 
 
-def _local_values(s: Array, a: Array, z: Array, at: Array, low: Rows, high: Rows, wanted: ProfileFilter) -> Array:
-    """Values (n,) at places `at` of polynomials through the points from `low` to `high` of each, none of which is empty."""
-    count = high - low
-    starts = np.cumsum(count) - count
-    point = np.repeat(low - starts, count) + np.arange(int(count.sum()))
-    x = (s[point] - np.repeat(at, count)) / wanted.cutoff_mm
-    g = a[point] * np.exp(-math.pi / _GAMMA[wanted.order] ** 2 * x * x)
-    total, mean = np.add.reduceat(g, starts), np.add.reduceat(g * z[point], starts)
+class _Known(NamedTuple):
+    """A kernel, with what it was made for: stations (k,) of the points, places (n,), and the point (w,) of each that it takes."""
+
+    station: Array
+    at: Array
+    row: Rows
+    kernel: "_Kernel"
+
+
+class _Block(NamedTuple):
+    """Places (b,) near each other, the points (w,) in their windows, and the kernel (b, w) between them where it is kept."""
+
+    places: slice
+    points: slice
+    kernel: Array | None
+
+
+class _Kernel:
+    """The regression of points (k,) to places (n,), both at rising stations, of which weights and deviations alone change.
+
+    The sums over g x^k about each place are found from those about the middle of a block of places, which are one product of matrices;
+    the binomial theorem leads from one to the other.
+    """
+
+    def __init__(self, station: Array, at: Array, wanted: ProfileFilter) -> None:
+        self._station, self._places, self._filter = station, at, wanted
+        self.pairs_kept, self.pairs_anew = 0, 0  # kernel values that are worked out once, and those that are for each use
+        self._blocks: list[_Block] = []
+        middles: list[float] = []
+        for places, points, middle in self._cut():
+            block = _Block(places, points, None)
+            pairs = (places.stop - places.start) * (points.stop - points.start)
+            if self.pairs_kept + pairs <= _MOST_PAIRS:
+                self.pairs_kept += pairs
+                block = block._replace(kernel=self._values_of(block))
+            else:
+                self.pairs_anew += pairs
+            self._blocks.append(block)
+            middles.append(middle)
+        counts = [(block.places.stop - block.places.start, block.points.stop - block.points.start) for block in self._blocks]
+        of_place, of_point = (np.repeat(middles, [count[i] for count in counts]) for i in (0, 1))
+        self._rows = np.concatenate([np.arange(b.points.start, b.points.stop) for b in self._blocks] or [np.empty(0, np.int64)])
+        self._away = (self._places - of_place) / wanted.cutoff_mm
+        self._powers = ((station[self._rows] - of_point) / wanted.cutoff_mm)[:, None] ** np.arange(2 * wanted.order + 1)
+
+    def values(self, heavy: Array, deviation: Array) -> Array:
+        """The polynomial's value (n,) at the places, of points that weigh `heavy` (k,). NaN where they do not determine it."""
+        weights = heavy[self._rows, None]
+        columns = np.hstack([self._powers, self._powers[:, : self._filter.order + 1] * deviation[self._rows, None]]) * weights
+        sums, begin = np.empty((len(self._places), columns.shape[1])), 0
+        for block in self._blocks:
+            end = begin + block.points.stop - block.points.start
+            np.matmul(self._values_of(block) if block.kernel is None else block.kernel, columns[begin:end], out=sums[block.places])
+            begin = end
+        return _polynomial_values(sums, self._away, self._filter.order)
+
+    def _cut(self) -> Iterator[tuple[slice, slice, float]]:
+        """Blocks of places, with the points in their windows, and their middles."""
+        at, cutoff, first = self._places, self._filter.cutoff_mm, 0
+        window = _WINDOW[self._filter.order] * cutoff
+        while first < len(at):
+            stop = min(first + _BLOCK, int(np.searchsorted(at, at[first] + _BLOCK_REACH * cutoff, side="right")))
+            low = int(np.searchsorted(self._station, at[first] - window, "left"))
+            high = int(np.searchsorted(self._station, at[stop - 1] + window, "right"))
+            yield slice(first, stop), slice(low, high), float(at[first] + at[stop - 1]) / 2
+            first = stop
+
+    def _values_of(self, block: _Block) -> Array:
+        """The kernel (b, w) of a block, zero beyond the window."""
+        x = (self._station[block.points] - self._places[block.places, None]) / self._filter.cutoff_mm
+        g = np.exp(-math.pi / _GAMMA[self._filter.order] ** 2 * x * x)
+        g[np.abs(x) > _WINDOW[self._filter.order]] = 0.0
+        return g
+
+
+def _polynomial_values(sums: Array, away: Array, order: FilterOrder) -> Array:
+    """Values (n,) at places `away` (n,) from the middles that sums (n, ...) are about: those over g x^k, then over g z x^k."""
+    total = sums[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
-        if wanted.order == 0:
-            return np.asarray(np.where(total > 0, mean / total, np.nan))
-        s1, s2, s3, s4, t0, t1, t2 = (sums / total for sums in _moments(x, g, z[point], starts, mean))
+        if order == 0:
+            return np.asarray(np.where(total > 0, sums[:, 1] / total, np.nan))
+        m = [sums[:, k] / total for k in range(8)]
+        d = -away
+        s1 = m[1] + d
+        s2 = m[2] + d * (2 * m[1] + d)
+        s3 = m[3] + d * (3 * m[2] + d * (3 * m[1] + d))
+        s4 = m[4] + d * (4 * m[3] + d * (6 * m[2] + d * (4 * m[1] + d)))
+        t0, t1, t2 = m[5], m[6] + d * m[5], m[7] + d * (2 * m[6] + d * m[5])
         c0, c1, c2 = s2 * s4 - s3 * s3, s2 * s3 - s1 * s4, s1 * s3 - s2 * s2  # cofactors of the first row of the normal matrix
         determinant = c0 + s1 * c1 + s2 * c2
         return np.asarray(np.where(determinant > _DETERMINED, (c0 * t0 + c1 * t1 + c2 * t2) / determinant, np.nan))
-
-
-def _moments(x: Array, g: Array, z: Array, starts: Rows, mean: Array) -> list[Array]:
-    """Sums (n,) of g x^k for k = 1 to 4, then of g z x^k for k = 0 (known already), 1 and 2; each begins at its place in `starts`."""
-    gx = g * x
-    gxx = gx * x
-    four = [np.add.reduceat(part, starts) for part in (gx, gxx, gxx * x, gxx * x * x)]
-    return [*four, mean, np.add.reduceat(gx * z, starts), np.add.reduceat(gxx * z, starts)]
