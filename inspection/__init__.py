@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from inspection.characteristics.stack import StackedSections, StackingAxis, bow, fit_stacking_axis, relative_twist, taper
     from inspection.characteristics.thickness import ThicknessMethod, edge_thickness, maximum_thickness
     from inspection.coarse import register_coarse
+    from inspection.compensation import Compensation
     from inspection.conclusion import Missing, Reason, reasons_of_abort
     from inspection.consumption import ConsumptionFit, fit_least_consumption
     from inspection.consumption_proof import ConsumptionCertificate, certify_consumption
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
     from inspection.nominal import NominalProfile, discretize
     from inspection.placements import PlacementProof, PlacementSearch
     from inspection.prefix import Prefix, PrefixSearch
+    from inspection.profile_uncertainty import Contribution, ProfileUncertainty, StatedUncertainty, uncertainty_along
     from inspection.registration import Registration
     from inspection.result import InspectionResult, Stretch
     from inspection.rigid import RigidTransform
@@ -46,7 +48,7 @@ if TYPE_CHECKING:
     from inspection.self_crossings import Crossing, find_crossings
     from inspection.signed_deviations import Deviations, deviations, profile_error_mm
     from inspection.telling_points import telling_rows
-    from inspection.tolerance import ToleranceZone
+    from inspection.tolerance import DecisionRule, ToleranceZone
     from inspection.uncertainty import DeviationUncertainty, UncertaintyBudget, deviation_uncertainty, largest_by_noise_mm
     from inspection.verdict import NOT_JUDGED, Rejection, Verdict
     from inspection.zones import Transition, VaryingZone
@@ -68,6 +70,7 @@ else:
         "inspection.characteristics.stack": ("StackedSections", "StackingAxis", "bow", "fit_stacking_axis", "relative_twist", "taper"),
         "inspection.characteristics.thickness": ("ThicknessMethod", "edge_thickness", "maximum_thickness"),
         "inspection.coarse": ("register_coarse",),
+        "inspection.compensation": ("Compensation",),
         "inspection.conclusion": ("Missing", "Reason", "reasons_of_abort"),
         "inspection.consumption": ("ConsumptionFit", "fit_least_consumption"),
         "inspection.consumption_proof": ("ConsumptionCertificate", "certify_consumption"),
@@ -87,6 +90,7 @@ else:
         "inspection.nominal": ("NominalProfile", "discretize"),
         "inspection.placements": ("PlacementProof", "PlacementSearch"),
         "inspection.prefix": ("Prefix", "PrefixSearch"),
+        "inspection.profile_uncertainty": ("Contribution", "ProfileUncertainty", "StatedUncertainty", "uncertainty_along"),
         "inspection.registration": ("Registration",),
         "inspection.result": ("InspectionResult", "Stretch"),
         "inspection.rigid": ("RigidTransform",),
@@ -94,7 +98,7 @@ else:
         "inspection.self_crossings": ("Crossing", "find_crossings"),
         "inspection.signed_deviations": ("Deviations", "deviations", "profile_error_mm"),
         "inspection.telling_points": ("telling_rows",),
-        "inspection.tolerance": ("ToleranceZone",),
+        "inspection.tolerance": ("DecisionRule", "ToleranceZone"),
         "inspection.uncertainty": ("DeviationUncertainty", "UncertaintyBudget", "deviation_uncertainty", "largest_by_noise_mm"),
         "inspection.verdict": ("NOT_JUDGED", "Rejection", "Verdict"),
         "inspection.zones": ("Transition", "VaryingZone"),
@@ -113,10 +117,13 @@ __all__ = [
     "ChordMethod",
     "ComparedAirfoil",
     "ComparedValue",
+    "Compensation",
     "ConsumptionCertificate",
     "ConsumptionFit",
+    "Contribution",
     "Crossing",
     "CurveCheck",
+    "DecisionRule",
     "DeviationUncertainty",
     "Deviations",
     "EdgeRadiusMethod",
@@ -148,6 +155,7 @@ __all__ = [
     "Prefix",
     "PrefixSearch",
     "ProfileFilter",
+    "ProfileUncertainty",
     "Reason",
     "Registration",
     "RegistrationError",
@@ -160,6 +168,7 @@ __all__ = [
     "StackedSections",
     "StackingAxis",
     "State",
+    "StatedUncertainty",
     "Stretch",
     "ThicknessMethod",
     "ToleranceZone",
@@ -211,5 +220,6 @@ __all__ = [
     "telling_rows",
     "twist_by_chord",
     "twist_by_fit",
+    "uncertainty_along",
     "while_compiling",
 ]

@@ -143,7 +143,7 @@ def word_points(zone: ToleranceZone, beyond: int, within_uncertainty: int) -> Re
     """The reason that the points themselves give: some beyond a limit, or too near to one to be told; None where all are proven."""
     if beyond:
         limit = f"beyond the limits {zone.lower_mm:g} .. {zone.upper_mm:g} mm"
-        by = f" by more than U = {zone.uncertainty_mm:g} mm" if zone.uncertainty_mm else ""
+        by = f" by more than U = {zone.uncertainty_mm:g} mm" if zone.guard_mm else ""
         return Reason("out-of-tolerance", f"{_count(beyond, 'point')} {_verb(beyond, 'lies', 'lie')} {limit}{by}.")
     if within_uncertainty:
         lies = _verb(within_uncertainty, "lies", "lie")

@@ -11,19 +11,21 @@ judged are not judged again before the end.
 State moves only at fixed point numbers, never at the edges of batches: the same points in any batches give the same result.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inspection.cloud import MANY, Cloud
+from inspection.compensation import Compensation
 from inspection.conclusion import Missing
 from inspection.kernels import Room, compile_projection, fit_compiled_beside
 from inspection.methods import FitName, Method, RuleName, WeightName
 from inspection.nominal import NominalProfile
 from inspection.pose_track import PoseTrack, seek_pose
 from inspection.prefix import Prefix, PrefixSearch, PrefixWatch
+from inspection.profile_uncertainty import StatedUncertainty, uncertainty_along
 from inspection.registration import Registration
 from inspection.result import InspectionResult
 from inspection.rigid import RigidTransform
@@ -78,6 +80,8 @@ class LiveInspection:
     rule, weights   : what decides where there is no datum, and how points count in the best fit (see `Terms`)
     gap_max_mm, end_allowance_mm, allow_unseen_mm : what may be unmeasured, lie beyond an open end, or be missing before conformity is
                       not proven any more (see `Terms`)
+    uncertainty     : a budget of the uncertainty; the U of the zone is then its largest along the profile, and the zone comes without one
+    compensation    : takes the growth of a warm part out of every point before anything else is done with it
     provisional     : False seeks no pose before `finish`, for points that are all there from the start; the result is the same
     room            : gives the arrays that grow with the scan, like numpy.empty: about 60 bytes a point until `finish` returns
     """
@@ -100,16 +104,25 @@ class LiveInspection:
         gap_max_mm: float | None = None,
         end_allowance_mm: float | None = None,
         allow_unseen_mm: float | None = None,
+        uncertainty: StatedUncertainty | None = None,
+        compensation: Compensation | None = None,
         provisional: bool = True,
         room: Room = np.empty,
     ) -> None:
+        along = None
+        if uncertainty is not None:
+            if zone.uncertainty_mm:
+                raise ValueError(f"either a zone with an uncertainty ({zone.uncertainty_mm:g} mm) or a budget of it, not both")
+            along = uncertainty_along(nominal, uncertainty, RigidTransform.identity() if datum is None and fit == "none" else datum)
+            zone = replace(zone, uncertainty_mm=along.largest_mm)
+        self._compensation = compensation
         self._terms = Terms(
             nominal=nominal,
             zone=zone,
             datum=datum,
             fit=fit,
             method=method,
-            tip_radius_mm=tip_radius_mm,
+            tip_radius_mm=tip_radius_mm * (compensation.factor if compensation is not None else 1.0),  # the ball shrinks with its centre
             off_section_max_mm=float("inf") if off_section_max_mm is None else off_section_max_mm,
             coverage_min=coverage_min,
             reject_outliers=reject_outliers,
@@ -118,6 +131,7 @@ class LiveInspection:
             gap_max_mm=gap_max_mm,
             end_allowance_mm=end_allowance_mm,
             allow_unseen_mm=allow_unseen_mm,
+            uncertainty=along,
         )
         self._known_pose = self._terms.known_pose
         self._plane = section or SectionPlane(np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
@@ -155,6 +169,8 @@ class LiveInspection:
         points = np.asarray(points_mm, dtype=np.float64)
         if points.ndim != 2 or points.shape[1] not in (2, 3):
             raise ValueError(f"points must have shape (m, 2) or (m, 3), got {points.shape}")
+        if self._compensation is not None:
+            points = self._compensation.apply(points, self._plane)
         rows, first = self._rows, self._rows.count
         rows.take_in(points, self._plane, self._terms.off_section_max_mm)
         if self._known_pose is not None or not self._provisional:
@@ -177,9 +193,11 @@ class LiveInspection:
     def prefix(self) -> Prefix | None:
         """A copy of the points so far for a `prefix_search`, None where no point looks out of tolerance and without a provisional pose.
 
-        None as well where outliers are rejected: what looks out may be rejected in the end.
+        None as well where outliers are rejected, for what looks out may be rejected in the end, and where the U that judges in the end
+        is not known yet.
         """
-        if self._track is None or self._terms.reject_outliers:
+        not_final = self._terms.at_best_fit and self._terms.uncertainty is not None
+        if self._track is None or self._terms.reject_outliers or not_final:
             return None
         return self._watch.prefix(self._rows, self._track.pose, self._track.slide_mm())
 

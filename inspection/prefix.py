@@ -120,4 +120,4 @@ class PrefixWatch:
 
 def _half_mm(terms: Terms) -> float:
     """How far from the middle of the zone a point may lie before it is proven to be out."""
-    return (terms.zone.upper_mm - terms.zone.lower_mm) / 2 + terms.zone.uncertainty_mm
+    return (terms.zone.upper_mm - terms.zone.lower_mm) / 2 + terms.zone.guard_mm

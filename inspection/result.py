@@ -16,6 +16,7 @@ from inspection.judged_rows import JudgedRows
 from inspection.kernels import Room
 from inspection.methods import Method
 from inspection.nominal import NominalProfile
+from inspection.profile_uncertainty import ProfileUncertainty
 from inspection.registration import Registration
 from inspection.station_order import in_station_order
 from inspection.tolerance import ToleranceZone
@@ -59,6 +60,8 @@ class InspectionResult:
     weights      : how points counted in the best fit
     best_fit_error_mm : 2 * max |deviation - middle of the zone| at the best fit; NaN where there was none
     minimum_zone_mm   : width of the minimum zone about the middle of the tolerance zone; NaN where it was not needed
+    uncertainty       : of the deviations along the profile, None where no budget was stated; the U of `zone` is nowhere smaller
+    largest_by_noise_mm : how much the stated noise raises the largest |deviation| on average
     """
 
     station_mm: Array
@@ -88,6 +91,8 @@ class InspectionResult:
     minimum_zone_mm: float
     method: Method
     stretches: tuple[Stretch, ...]
+    uncertainty: ProfileUncertainty | None = None
+    largest_by_noise_mm: float = 0.0
 
     def __post_init__(self) -> None:
         for array in (self.station_mm, self.deviation_mm, self.verdicts, self.rejection):

@@ -18,6 +18,7 @@ from inspection.fine import register
 from inspection.gaps import measure
 from inspection.minimum_zone import fit_minimum_zone
 from inspection.placements import PlacementSearch
+from inspection.profile_uncertainty import uncertainty_at_fit
 from inspection.registration import Registration, datum_registration
 from inspection.result import InspectionResult, extent_of, stretches
 from inspection.rigid import RigidTransform
@@ -25,14 +26,17 @@ from inspection.scan_rows import ScanRows
 from inspection.setup_check import check_fit, check_points, shift_reservation
 from inspection.telling_points import telling_rows
 from inspection.terms import Terms
+from inspection.uncertainty import largest_by_noise_mm
 from inspection.verdict import NOT_JUDGED, Rejection, Verdict
 
 Array = NDArray[np.float64]
 
 _PLACED = 0.95  # share of the length whose points place the part, where the plan asks for no coverage
 _MOST_BOXES = 200_000  # of placements, before the search for one that passes is given up
+_FEWER = 1 << 14  # points of which the uncertainty after a fit is asked; fewer leave the pose less certain, never more
 _SHARES = 8192  # of the length, of which the lowest and the highest point tell, where a scan has more than MANY points
 _SAME_MM = 1e-9  # two zones that differ by less are the same
+_NEAR, _CLASSES = 8.0, 512  # noises below the largest deviation within which others may be largest by chance, and classes of them
 _ROUNDS = 6  # in which points that are out at a placement found by the telling ones join these
 
 
@@ -74,6 +78,8 @@ def settle(rows: ScanRows, terms: Terms, complete: bool, missing: Missing) -> In
     _reject_outliers(rows, far, registration)
     del usable, points  # and what they hold
     settled = _judge_at(rows, registration, "none", terms) if terms.known_pose is not None else _decide(rows, registration, terms, complete)
+    if terms.at_best_fit and terms.uncertainty is not None and rows.judged:
+        settled, terms = _judge_as_uncertain_as_fitted(rows, settled, registration, terms, complete)
     _stay_at(rows, settled, terms)
     return _result(rows, settled, terms, complete, missing)
 
@@ -116,7 +122,7 @@ def _decide(rows: ScanRows, registration: Registration, terms: Terms, complete: 
     settled = replace(settled, best_fit_error_mm=error) if terms.fit == "best-fit" else replace(settled, minimum_zone_mm=error)
     if settled.points != Verdict.NONCONFORM:
         return settled
-    if terms.rule == "best-fit" and terms.fit == "best-fit":
+    if terms.at_best_fit:
         return _doubt_free_pose(rows, settled, terms, complete)
     return _prove_no_placement(rows, settled, terms)
 
@@ -129,7 +135,7 @@ def _prove_no_placement(rows: ScanRows, settled: _Settled, terms: Terms) -> _Set
     """
     error_mm, telling = settled.best_fit_error_mm, np.empty(0, dtype=np.int64)
     zone = terms.zone
-    half_mm = (zone.upper_mm - zone.lower_mm) / 2 + zone.uncertainty_mm
+    half_mm = (zone.upper_mm - zone.lower_mm) / 2 + zone.guard_mm
     for _ in range(_ROUNDS):
         telling = np.union1d(telling, _telling_rows(rows, terms))
         points, all_told = rows.points[telling], len(telling) == rows.judged
@@ -180,6 +186,25 @@ def _doubt_free_pose(rows: ScanRows, settled: _Settled, terms: Terms, complete: 
         return replace(settled, minimum_zone_mm=proven.minimum_zone_mm)
     words = f"Too little of the profile was measured ({covered:.1%}) to place the part: in another placement no point is out."
     return replace(settled, points=Verdict.UNCERTAIN, why=Reason("placement", words), minimum_zone_mm=proven.minimum_zone_mm)
+
+
+def _judge_as_uncertain_as_fitted(
+    rows: ScanRows, settled: _Settled, registration: Registration, terms: Terms, complete: bool
+) -> tuple[_Settled, Terms]:
+    """Work out how uncertain the deviations are after the best fit, where it alone decides, and judge anew where that is more than U."""
+    assert terms.uncertainty is not None
+    _stay_at(rows, settled, terms)
+
+    def judged() -> Iterator[Array]:
+        return (rows.points[part][rows.verdicts[part] != NOT_JUDGED] for part in row_blocks(rows.count))
+
+    points = settled.registration.nominal_from_section.apply(few_of(judged, rows.judged, _FEWER))
+    found = uncertainty_at_fit(points, terms.nominal, terms.uncertainty.stated, terms.tip_radius_mm, terms.weights)
+    if found.largest_mm <= terms.zone.uncertainty_mm:
+        return settled, replace(terms, uncertainty=found)
+    zone = replace(terms.zone, uncertainty_mm=found.largest_mm, provable=False)
+    terms = replace(terms, zone=zone, uncertainty=found)
+    return _decide(rows, registration, terms, complete), terms
 
 
 def _with_pose(registration: Registration, pose: RigidTransform) -> Registration:
@@ -281,8 +306,23 @@ def _result(rows: ScanRows, settled: _Settled, terms: Terms, complete: bool, mis
         best_fit_error_mm=settled.best_fit_error_mm,
         minimum_zone_mm=settled.minimum_zone_mm,
         method=terms.method,
+        uncertainty=terms.uncertainty,
+        largest_by_noise_mm=_raised_by_noise_mm(deviation, max(abs(extent.max_deviation_mm), abs(extent.min_deviation_mm)), terms),
         stretches=stretches(station, deviation, verdicts, terms.zone, nominal, limits.gap_max_mm, room) if out else (),
     )
+
+
+def _raised_by_noise_mm(deviation_mm: Array, farthest_mm: float, terms: Terms) -> float:
+    """How much the stated noise raises the largest |deviation| of points (m,) on average: by how many come near to it."""
+    noise = terms.uncertainty.stated.budget.repeatability_mm if terms.uncertainty is not None else 0.0
+    if not noise or not np.isfinite(farthest_mm):
+        return 0.0
+    edges, counts = np.linspace(max(farthest_mm - _NEAR * noise, 0.0), farthest_mm, _CLASSES + 1), np.zeros(_CLASSES)
+    for part in row_blocks(len(deviation_mm)):
+        size = np.abs(deviation_mm[part])
+        counts += np.histogram(size[size >= edges[0]], edges)[0]
+    counts[-1] -= 1
+    return largest_by_noise_mm(np.append((edges[1:] + edges[:-1]) / 2, farthest_mm), noise, np.append(counts, 1.0))
 
 
 def _few_judged(rows: ScanRows) -> Array:

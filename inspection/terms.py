@@ -8,6 +8,7 @@ from inspection.gaps import default_gap_max_mm
 from inspection.kernels import Judgement
 from inspection.methods import FitName, Method, RuleName, WeightName
 from inspection.nominal import NominalProfile
+from inspection.profile_uncertainty import ProfileUncertainty
 from inspection.rigid import RigidTransform
 from inspection.signed_deviations import check_method, check_tip_radius
 from inspection.tolerance import ToleranceZone
@@ -32,6 +33,7 @@ class Terms:
                          `default_gap_max_mm`, infinite for no limit
     end_allowance_mm   : how far a point may lie beyond an open end; None for half the zone's width, the circle about the end in which
                          the zone ends
+    uncertainty        : of the deviations along the profile where a budget was stated; the zone's own U is its largest
     allow_unseen_mm    : the longest stretch that may be unseen although points are known to be missing; None allows none
     judgement          : what of this turns a foot into a verdict, as the compiled loops take it
     """
@@ -50,6 +52,7 @@ class Terms:
     gap_max_mm: float | None = None
     end_allowance_mm: float | None = None
     allow_unseen_mm: float | None = None
+    uncertainty: ProfileUncertainty | None = None
     judgement: Judgement = field(init=False)
 
     def __post_init__(self) -> None:
@@ -67,13 +70,18 @@ class Terms:
                 raise ValueError(f"{name} must be zero or more, not {value:g}")
         self.nominal.table_for(self.method)  # made now where it is needed, not when the first points wait for it
         zone = self.zone
-        limits = (float(self.tip_radius_mm), float(zone.lower_mm), float(zone.upper_mm), float(zone.uncertainty_mm))
+        limits = (float(self.tip_radius_mm), float(zone.lower_mm), float(zone.upper_mm), float(zone.guard_mm))
         object.__setattr__(self, "judgement", (self.nominal.outward, *limits))
 
     @property
     def known_pose(self) -> RigidTransform | None:
         """Where the points lie if that is known beforehand: by the datum, or because none is to be fitted."""
         return RigidTransform.identity() if self.datum is None and self.fit == "none" else self.datum
+
+    @property
+    def at_best_fit(self) -> bool:
+        """Whether the best fit alone decides, and no other placement of the part counts."""
+        return self.known_pose is None and self.rule == "best-fit" and self.fit == "best-fit"
 
     @property
     def target_mm(self) -> float:

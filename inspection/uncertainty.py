@@ -18,12 +18,12 @@ from inspection.freedoms import Freedoms, gradients
 from inspection.gaps import weigh_by_station
 from inspection.methods import WeightName
 from inspection.nominal import NominalProfile
-from inspection.signed_deviations import Deviations, check_points, deviations
+from inspection.signed_deviations import check_points, deviations
 
 Array = NDArray[np.float64]
-PartName = Literal["repeatability", "device", "tip radius", "temperature"]
+PartName = Literal["repeatability", "device", "tip radius", "temperature", "expansion"]
 
-_FREE = 1e-9  # a motion whose eigenvalue is below this share of the largest changes no deviation, and is not fitted
+_FREE = 1e-6  # a motion by a mm that changes deviations by less than a thousandth of it is not fitted: a circle turns in itself
 _MOST_GROUPS = 512  # of neighbouring points that stand together where the device's error is summed up: it changes slowly
 _AT_ONCE = 512  # places whose errors are compared with those of all points together
 _FAR = 8.0  # standard deviations: farther below the largest, a point has no share in what noise adds to it
@@ -40,8 +40,9 @@ class UncertaintyBudget:
     tip_radius_mm     : of the calibrated tip: the same for every point, so that it does not average
     temperature_k     : of the part's temperature
     expansion_per_k   : the part's coefficient of thermal expansion
-    off_reference_k   : how far from the reference temperature the part was measured and compensated for
+    off_reference_k   : how far above the reference temperature the part was measured
     u_expansion_per_k : of the coefficient, which counts by that distance
+    compensated       : the part's growth by that distance was taken out of the points; False where it stands in every deviation
     """
 
     repeatability_mm: float = 0.0
@@ -52,6 +53,7 @@ class UncertaintyBudget:
     expansion_per_k: float = 0.0
     off_reference_k: float = 0.0
     u_expansion_per_k: float = 0.0
+    compensated: bool = True
 
     def __post_init__(self) -> None:
         for name in self.__slots__:
@@ -64,35 +66,52 @@ class UncertaintyBudget:
         """Standard uncertainty of the part's size by temperature, mm a mm."""
         return float(np.hypot(self.expansion_per_k * self.temperature_k, self.u_expansion_per_k * self.off_reference_k))
 
+    @property
+    def growth_left(self) -> float:
+        """How much larger than at the reference temperature the part is known to be in the points, mm a mm."""
+        return 0.0 if self.compensated else self.expansion_per_k * self.off_reference_k
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DeviationUncertainty:
     """Standard uncertainties of n deviations.
 
+    station_mm  : (n,) where they are; NaN, as the others, beyond open ends
     standard_mm : (n,) all parts together
     pose_mm     : (n,) what of it the pose brings in, sqrt(j P j'); not a part beside the others, which hold it already
     parts_mm    : (n,) each, by name; their squares add up to that of `standard_mm`
+    lever_mm    : (n,) how much a deviation changes where the part grows by its own size, after the fit
+    left_mm     : (n,) known growth that was not taken out of the points, as it stands in the deviations
     covariance  : (3, 3) P of the pose: shift in mm and rotation in rad about `pivot_mm`; zero in motions that are locked
     pivot_mm    : (2,)
     """
 
+    station_mm: Array
     standard_mm: Array
     pose_mm: Array
     parts_mm: dict[PartName, Array]
+    lever_mm: Array
+    left_mm: Array
     covariance: Array
     pivot_mm: Array
 
     def expanded_mm(self, coverage_factor: float = 2.0) -> Array:
-        """Expanded uncertainty U (n,); a factor of 2 covers about 95 %."""
-        return coverage_factor * self.standard_mm
+        """Expanded uncertainty U (n,); a factor of 2 covers about 95 %. What is known and not corrected is added to it (GUM F.2.4.5)."""
+        return coverage_factor * self.standard_mm + np.abs(self.left_mm)
 
 
-class _Places(NamedTuple):
-    """Places where deviations are uncertain: where (n, 2), outward normals (n, 2), rates by the free motions (n, k)."""
+class Places(NamedTuple):
+    """Places where deviations are uncertain: stations (n,), where (n, 2), outward normals (n, 2), rates by the free motions (n, k)."""
 
+    station: Array
     at: Array
     normal: Array
     rates: Array
+
+
+def places_on(station_mm: Array, at_mm: Array, normal: Array, free: Freedoms) -> Places:
+    """Places (n, 2) with their stations (n,) and outward normals (n, 2), and how the free motions change the deviations there."""
+    return Places(station_mm, at_mm, normal, gradients(normal, at_mm - free.pivot_mm) @ free.directions.T)
 
 
 def deviation_uncertainty(
@@ -122,23 +141,44 @@ def deviation_uncertainty(
     shares = np.ones(len(points))
     if weights == "arc-length":
         weigh_by_station(np.where(d.beyond_end, np.nan, d.station_mm), shares, nominal)
-    fit = _places(points, d, free, used)
-    gain = _gain(fit.rates, shares[used])  # (k, m) amounts of the motions by deviations
-    there, known = fit, used
+    fit = places_on(d.station_mm[used], points[used], d.normal[used], free)
+    there, known, count = fit, used, len(points)
     if elsewhere_mm is not None:
         others = check_points(elsewhere_mm)
         beyond = deviations(others, nominal, tip_radius_mm=tip_radius_mm)
-        known = np.flatnonzero(~beyond.beyond_end)
-        there = _places(others, beyond, free, known)
+        known, count = np.flatnonzero(~beyond.beyond_end), len(others)
+        there = places_on(beyond.station_mm[known], others[known], beyond.normal[known], free)
     fixed = points[used].mean(axis=0) if fixed_mm is None else np.asarray(fixed_mm, dtype=np.float64)
-    variances, poses = {}, np.zeros((len(free), len(free)))
-    for name, variance, pose in _parts(fit, there, gain, budget, d.station_mm[used], fixed):
-        variances[name], poses = variance, poses + pose
-    count = len(points) if elsewhere_mm is None else len(others)
-    parts = {name: _spread(np.sqrt(np.maximum(variance, 0.0)), known, count) for name, variance in variances.items()}
+    found = propagate(fit, there, shares[used], free, budget, fixed)
+    return DeviationUncertainty(
+        _spread(found.station_mm, known, count),
+        _spread(found.standard_mm, known, count),
+        _spread(found.pose_mm, known, count),
+        {name: _spread(part, known, count) for name, part in found.parts_mm.items()},
+        _spread(found.lever_mm, known, count),
+        _spread(found.left_mm, known, count),
+        found.covariance,
+        found.pivot_mm,
+    )
+
+
+def propagate(
+    fit: Places, there: Places, shares: Array, free: Freedoms, budget: UncertaintyBudget, fixed_mm: Array
+) -> DeviationUncertainty:
+    """Uncertainty at the n places `there` after a fit to m places with shares (m,), the motions of `free` being fitted.
+
+    there : `fit` itself for the fitted points; the pose has followed the errors of these
+    """
+    reach = float(np.hypot(*(fit.at - free.pivot_mm).T).max(initial=0.0))
+    gain = _gain(fit.rates, shares, 1.0 / np.maximum(free.units_mm(reach), 1e-300))  # (k, m) amounts of the motions by deviations
+    parts, poses = {}, np.zeros((len(free), len(free)))
+    for name, variance, pose in _parts(fit, there, gain, budget, fixed_mm):
+        parts[name], poses = np.sqrt(np.maximum(variance, 0.0)), poses + pose
     pose_mm = np.sqrt(np.maximum(((there.rates @ poses) * there.rates).sum(axis=1), 0.0))
-    standard = np.sqrt(sum((np.square(part) for part in parts.values()), np.zeros(count)))
-    return DeviationUncertainty(standard, _spread(pose_mm, known, count), parts, free.directions.T @ poses @ free.directions, free.pivot_mm)
+    standard = np.sqrt(sum((np.square(part) for part in parts.values()), np.zeros(len(there.at))))
+    lever, _ = _carried(there, gain, _growth_of(there, fixed_mm), _growth_of(fit, fixed_mm))
+    covariance = free.directions.T @ poses @ free.directions
+    return DeviationUncertainty(there.station, standard, pose_mm, parts, lever, budget.growth_left * lever, covariance, free.pivot_mm)
 
 
 def _spread(values: Array, rows: NDArray[np.int64], count: int) -> Array:
@@ -148,51 +188,54 @@ def _spread(values: Array, rows: NDArray[np.int64], count: int) -> Array:
     return every
 
 
-def _places(points: Array, d: Deviations, free: Freedoms, rows: NDArray[np.int64]) -> _Places:
-    rates = gradients(d.normal, points - free.pivot_mm) @ free.directions.T
-    return _Places(points[rows], d.normal[rows], rates[rows])
-
-
-def _gain(rates: Array, weights: Array) -> Array:
-    """Amounts (k, m) by which a unit of each deviation moves the free motions."""
-    scale = np.maximum(np.abs(rates).max(axis=0, initial=0.0), 1e-300)
-    scaled = rates / scale
-    values, vectors = np.linalg.eigh((scaled.T * weights) @ scaled) if len(scale) else (np.empty(0), np.empty((0, 0)))
-    kept = values > _FREE * values.max(initial=0.0)
+def _gain(rates: Array, weights: Array, units: Array) -> Array:
+    """Amounts (k, m) by which a unit of each deviation moves the free motions; `units` (k,) of these move points by a mm at most."""
+    scaled = rates * units
+    values, vectors = np.linalg.eigh((scaled.T * weights) @ scaled) if len(units) else (np.empty(0), np.empty((0, 0)))
+    kept = values > _FREE * weights.sum()
     inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T
-    return np.asarray(-(inverse @ (scaled.T * weights)) / scale[:, None])
+    return np.asarray(-(inverse @ (scaled.T * weights)) * units[:, None])
 
 
-def _parts(
-    fit: _Places, there: _Places, gain: Array, budget: UncertaintyBudget, station_mm: Array, fixed_mm: Array
-) -> Iterator[tuple[PartName, Array, Array]]:
+def _parts(fit: Places, there: Places, gain: Array, budget: UncertaintyBudget, fixed_mm: Array) -> Iterator[tuple[PartName, Array, Array]]:
     """Variance (n,) of the deviations and of the amounts (k, k) by each part of the budget.
 
     A deviation after the fit is e = z + j gain z: what is added to the others by the motion that the fit makes of them.
     """
-    same = there is fit
-    yield "repeatability", *_independent(there, gain, budget.repeatability_mm**2, same)
-    yield "device", *_of_device(fit, there, gain, budget, station_mm)
-    common = ((there.normal * (there.at - fixed_mm)).sum(axis=1), (fit.normal * (fit.at - fixed_mm)).sum(axis=1))
+    yield "repeatability", *_independent(there, gain, budget.repeatability_mm**2, there is fit)
+    yield "device", *_of_device(fit, there, gain, budget)
     ones = (np.ones(len(there.at)), np.ones(len(fit.at)))
     yield "tip radius", *_common(there, gain, ones, budget.tip_radius_mm)
-    yield "temperature", *_common(there, gain, common, budget.growth)
+    grown = (_growth_of(there, fixed_mm), _growth_of(fit, fixed_mm))
+    yield "temperature", *_common(there, gain, grown, budget.expansion_per_k * budget.temperature_k)
+    yield "expansion", *_common(there, gain, grown, budget.u_expansion_per_k * budget.off_reference_k)
 
 
-def _common(there: _Places, gain: Array, shape: tuple[Array, Array], standard: float) -> tuple[Array, Array]:
+def _growth_of(places: Places, fixed_mm: Array) -> Array:
+    """Deviations (n,) of a part that grows by its own size about a fixed place (2,), before any fit."""
+    return np.asarray((places.normal * (places.at - fixed_mm)).sum(axis=1))
+
+
+def _carried(there: Places, gain: Array, shape: Array, at_fit: Array) -> tuple[Array, Array]:
+    """Deviations (n,) after the fit of an error of shapes (n,) at the places and (m,) at the fitted points; amounts (k,) of the motions."""
+    amounts = gain @ at_fit
+    return shape + there.rates @ amounts, amounts
+
+
+def _common(there: Places, gain: Array, shapes: tuple[Array, Array], standard: float) -> tuple[Array, Array]:
     """An error that all points share, of shapes (n,) at the places and (m,) at the fitted points."""
-    amounts = gain @ shape[1]
-    return standard**2 * np.square(shape[0] + there.rates @ amounts), standard**2 * np.outer(amounts, amounts)
+    carried, amounts = _carried(there, gain, *shapes)
+    return standard**2 * np.square(carried), standard**2 * np.outer(amounts, amounts)
 
 
-def _independent(there: _Places, gain: Array, variance: float, same: bool) -> tuple[Array, Array]:
+def _independent(there: Places, gain: Array, variance: float, same: bool) -> tuple[Array, Array]:
     """An error that no two points share. At a fitted point the pose has followed it a little."""
     pose = variance * gain @ gain.T
     own = 2 * variance * (there.rates * gain.T).sum(axis=1) if same else 0.0
     return variance + own + ((there.rates @ pose) * there.rates).sum(axis=1), pose
 
 
-def _of_device(fit: _Places, there: _Places, gain: Array, budget: UncertaintyBudget, station_mm: Array) -> tuple[Array, Array]:
+def _of_device(fit: Places, there: Places, gain: Array, budget: UncertaintyBudget) -> tuple[Array, Array]:
     """The device's error, a field over the plane of which only differences over a length are known: u^2 = (A + L/K)^2 / 3.
 
     With C0 = (A + D/K)^2 / 3 for the part's size D its covariance over a length L is C0 - (A + L/K)^2 / 6: of this A^2 / 6 is
@@ -201,7 +244,9 @@ def _of_device(fit: _Places, there: _Places, gain: Array, budget: UncertaintyBud
     A, share = budget.mpe_mm, budget.mpe_share
     size = float(np.hypot(*np.ptp(fit.at, axis=0)))
     near = (A + share * size) ** 2 / 3 - A * A / 6
-    order = np.argsort(station_mm, kind="stable")
+    if not len(gain):
+        return np.full(len(there.at), near + A * A / 6), np.zeros((0, 0))
+    order = np.argsort(fit.station, kind="stable")
     starts = np.unique(np.linspace(0, len(order), min(len(order), _MOST_GROUPS), endpoint=False).astype(np.int64))
     middles = order[(starts + np.append(starts[1:], len(order)) - 1) // 2]
     at = fit.at[middles]
@@ -229,16 +274,18 @@ def _covariance(places: Array, others: Array, near: float, A: float, share: floa
     return np.asarray(near - share / 6 * (2 * A * np.sqrt(square) + share * square))
 
 
-def largest_by_noise_mm(deviation_mm: ArrayLike, standard_mm: ArrayLike) -> float:
+def largest_by_noise_mm(deviation_mm: ArrayLike, standard_mm: ArrayLike, counts: ArrayLike = 1) -> float:
     """How much independent noise raises the largest |deviation| on average: the largest of many values is biased upward.
 
     deviation_mm : (m,) as measured or true; NaN counts for nothing
     standard_mm  : (m,) or one number: standard deviation of the noise of each
+    counts       : (m,) or one number: how many points have that deviation
     """
     e = np.abs(np.asarray(deviation_mm, dtype=np.float64))
     u = np.broadcast_to(np.asarray(standard_mm, dtype=np.float64), e.shape)
-    counted = np.isfinite(e) & np.isfinite(u)
-    e, u = e[counted], u[counted]
+    times = np.broadcast_to(np.asarray(counts, dtype=np.float64), e.shape)
+    counted = np.isfinite(e) & np.isfinite(u) & (times > 0)
+    e, u, times = e[counted], u[counted], times[counted]
     if not len(e) or not u.max() > 0:
         return 0.0
     largest, widest = float(e.max()), float(u.max())
@@ -246,6 +293,6 @@ def largest_by_noise_mm(deviation_mm: ArrayLike, standard_mm: ArrayLike) -> floa
     low, high = float(max(e[u <= 0].max(initial=0.0), largest - _FAR * widest, 0.0)), largest + _FAR * widest
     t = np.linspace(low, high, _NODES)
     below = np.ones(_NODES)
-    for value, spread in zip(e[near].tolist(), u[near].tolist(), strict=True):
-        below *= ndtr((t - value) / spread) - ndtr((-t - value) / spread)
+    for value, spread, count in zip(e[near].tolist(), u[near].tolist(), times[near].tolist(), strict=True):
+        below *= (ndtr((t - value) / spread) - ndtr((-t - value) / spread)) ** count
     return float(high - np.trapezoid(below, t) - largest)

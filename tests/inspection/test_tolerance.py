@@ -1,13 +1,14 @@
 """ISO 14253-1: conformity is proven inside the zone less U, nonconformity outside the zone plus U, the rest is not proven."""
 
 from functools import cache
+from typing import get_args
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inspection import NOT_JUDGED, NominalProfile, RigidTransform, SectionPlane, ToleranceZone, Verdict, discretize
+from inspection import NOT_JUDGED, DecisionRule, NominalProfile, RigidTransform, SectionPlane, ToleranceZone, Verdict, discretize
 from inspection.scan_rows import ScanRows
 from inspection.terms import Terms
 from tests.inspection import profiles
@@ -43,6 +44,33 @@ def test_a_zone_of_which_nothing_could_ever_be_proven_to_conform_is_refused() ->
     for uncertainty in (0.375, 0.5, 10.0):
         with pytest.raises(ValueError, match="uncertainty"):
             ToleranceZone(-0.5, 0.25, uncertainty)
+
+
+def test_a_decision_rule_counts_the_uncertainty_as_its_standard_says() -> None:
+    at = [-0.56, -0.51, -0.45, 0.0, 0.2, 0.26, 0.32]
+    by_iso = (NONCONFORM, UNCERTAIN, UNCERTAIN, CONFORM, UNCERTAIN, UNCERTAIN, NONCONFORM)
+    by_simple = (NONCONFORM, NONCONFORM, CONFORM, CONFORM, CONFORM, NONCONFORM, NONCONFORM)
+    zones = {rule: ToleranceZone(-0.5, 0.25, 0.0595, rule) for rule in get_args(DecisionRule)}
+    assert {rule: tuple(zone.verdicts(at)) for rule, zone in zones.items()} == {
+        "iso-14253-1": by_iso,
+        "ilac-g8": by_iso,
+        "simple": by_simple,
+    }
+    for rule, words in (
+        ("iso-14253-1", "ISO 14253-1: "),
+        ("ilac-g8", "ILAC-G8:09/2019, guard band w = U"),
+        ("simple", "simple acceptance"),
+    ):
+        assert zones[rule].decision_rule.startswith(words)
+        assert "U = 0.0595 mm" in zones[rule].decision_rule
+    assert "6.3 : 1" in zones["simple"].decision_rule
+    with pytest.raises(ValueError, match="iso-14253-1, ilac-g8, simple"):
+        ToleranceZone(-0.5, 0.25, 0.0, "some other")  # type: ignore[arg-type]
+
+
+def test_a_u_that_is_known_only_after_the_scan_may_leave_nothing_to_prove() -> None:
+    zone = ToleranceZone(-0.5, 0.25, 0.4, provable=False)
+    assert zone.verdicts([-0.95, -0.125, 0.66]).tolist() == [NONCONFORM, UNCERTAIN, NONCONFORM]
 
 
 def test_a_zone_on_one_side_of_the_nominal() -> None:
