@@ -1,26 +1,42 @@
 """Builds what a plan describes, except its device: the nominal profile and the inspection. Errors name file, line and key."""
 
-import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TypedDict
 
 import numpy as np
 
+from cmmlink.characteristics import Builder, base_of
 from cmmlink.errors import PlanError
 from cmmlink.events import RunStarted
 from cmmlink.nominal_files import NominalFile, load_nominal, material_side
-from cmmlink.plan import CtPlan, Datum, Discretisation, Nominal, Plan, place_of
-from inspection import FitName, LiveInspection, Method, NominalProfile, RigidTransform, Room, RuleName, SectionPlane, WeightName, discretize
+from cmmlink.plan import CtPlan, Discretisation, Nominal, Plan, place_of
+from inspection import (
+    Characteristic,
+    FitName,
+    LiveInspection,
+    Method,
+    NominalProfile,
+    RigidTransform,
+    Room,
+    RuleName,
+    SectionPlane,
+    WeightName,
+    discretize,
+)
 
 
 def check_plan(plan: Plan, plan_file: Path) -> NominalProfile:
     """Build the profile of a plan and check the values that depend on it. Raises PlanError with file, line and key."""
     with name_place(plan_file, "nominal.file"):
         profile = profile_of(plan)
+    builder = Builder(plan, profile)
+    for number in range(len(plan.characteristics)):
+        with name_place(plan_file, f"characteristics.{number}"):
+            builder.build(number)
     with name_place(plan_file, "probe.tip_radius_mm"):
-        inspection_of(plan, profile)
+        inspection_of(plan, profile, characteristics=())
     return profile
 
 
@@ -62,27 +78,44 @@ def discretize_file(file: NominalFile, path: Path, nominal: Nominal, finely: Dis
     return discretize(file.curve, finely.samples, finely.pole_angle_min_deg, finely.step_min, side)
 
 
-def pose_of(datum: Datum | None) -> RigidTransform | None:
-    """The known pose that a plan gives, if it gives one."""
-    return None if datum is None else RigidTransform(math.radians(datum.rotation_deg), np.array(datum.translation_mm))
-
-
-def inspection_of(plan: Plan, profile: NominalProfile, room: Room = np.empty, *, provisional: bool = True) -> LiveInspection:
+def inspection_of(
+    plan: Plan,
+    profile: NominalProfile,
+    room: Room = np.empty,
+    *,
+    provisional: bool = True,
+    characteristics: Sequence[Characteristic] | None = None,
+) -> LiveInspection:
     """A fresh inspection as a plan describes it. Points that are all there from the start need no provisional verdicts.
 
-    room : gives the arrays that grow with the scan, like numpy.empty
+    room            : gives the arrays that grow with the scan, like numpy.empty
+    characteristics : those of the plan for this profile, where they are built already
+
+    Raises PlanError for a characteristic that the nominal does not have.
     """
     section = plan.section
     return LiveInspection(
         profile,
-        plan.tolerance.zone,
+        plan.zone,
         **_fitting(plan),
         tip_radius_mm=plan.probe.tip_radius_mm,
         section=SectionPlane(np.array(section.origin_mm), np.array(section.x_axis), np.array(section.normal)),
         off_section_max_mm=section.off_plane_max_mm,
+        characteristics=asked_of(plan, profile) if characteristics is None else characteristics,
         provisional=provisional,
         room=room,
     )
+
+
+def asked_of(plan: Plan | CtPlan, profile: NominalProfile) -> tuple[Characteristic, ...]:
+    """The characteristics of a plan for a nominal. Raises PlanError for one that the nominal does not have."""
+    builder, found = Builder(plan, profile), []
+    for number, asked in enumerate(plan.characteristics):
+        try:
+            found.append(builder.build(number))
+        except ValueError as error:
+            raise PlanError(f"characteristics[{number}], {asked.name}: {error}") from None
+    return (*builder.short_form, *found)
 
 
 class _Fitting(TypedDict):
@@ -101,14 +134,14 @@ class _Fitting(TypedDict):
 
 
 def _fitting(plan: Plan) -> _Fitting:
-    registration = plan.registration
+    registration, base = plan.registration, base_of(plan)
     return {
-        "datum": pose_of(registration.datum),
-        "fit": registration.fit,
+        "datum": base.datum,
+        "fit": base.fit,
         "method": registration.method,
         "coverage_min": registration.coverage_min,
         "reject_outliers": registration.reject_outliers,
-        "rule": plan.rule,
+        "rule": base.rule,
         "weights": plan.weights,
         "gap_max_mm": plan.gap_max_mm,
         "end_allowance_mm": plan.end_allowance_mm,

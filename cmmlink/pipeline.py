@@ -7,7 +7,7 @@ verdict on what was received; a sink that raises ends it too, and its error is p
 import threading
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from cmmlink.errors import StoreError
 from cmmlink.events import Arrived, Counts, Ending, Event, Judged, ProvenOut, RunFinished, RunStarted, Sink
 from cmmlink.live_proof import LiveProof
 from drivers import HARMLESS_REASONS, Arrival, Damaged, DeviceError, Lost, PointBatch, Rejected, ScanClosed, ScanOpened, ScanSource
-from inspection import InspectionError, InspectionResult, LiveInspection, Missing, Reason, Rejection, Verdict, reasons_of_abort
+from inspection import InspectionError, InspectionResult, LiveInspection, Missing, Reason, Rejection, Verdict, doubt_part, reasons_of_abort
 
 Refusal = Callable[[int, int | None], str]
 """Says, from the points received and those announced, why there is no room for more; nothing where there is."""
@@ -247,11 +247,10 @@ def _finish(
     except InspectionError as error:
         return None, error
     if doubt is not None:
-        result = replace(result, verdict=Verdict.UNCERTAIN, reasons=(doubt, *result.reasons))
+        result = doubt_part(result, (doubt,))
     if ending != "aborted":
         return result, None
-    reasons = reasons_of_abort(result.reasons, proven_out=result.verdict == Verdict.NONCONFORM)
-    return replace(result, verdict=Verdict.UNCERTAIN, reasons=reasons), None
+    return doubt_part(result, reasons_of_abort(proven_out=result.verdict == Verdict.NONCONFORM)), None
 
 
 def _publish(sinks: Sequence[Sink], event: Event) -> None:

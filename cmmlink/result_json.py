@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cmmlink.characteristics_json import characteristic_json
 from cmmlink.events import Counts, RunStarted
 from inspection import Verdict
 
@@ -55,6 +56,7 @@ def result_json(result: "InspectionResult | None", counts: Counts) -> dict[str, 
             "uncertainty_mm": result.zone.uncertainty_mm,
             "decision_rule": result.zone.decision_rule,
         },
+        "characteristics": [characteristic_json(found) for found in result.characteristics],
         **tail,
     }
 
@@ -124,6 +126,7 @@ _NOTHING: Mapping[str, Any] = {
     "largest_gap": None,
     "complete": False,
     "tolerance": None,
+    "characteristics": [],
 }
 
 

@@ -75,6 +75,85 @@ class VerdictReason(_Json):
     words: str = Field(description="the reason as a sentence")
 
 
+class Region(_Json):
+    """A stretch of the profile."""
+
+    from_mm: float = Field(description="the station at which it begins")
+    to_mm: float = Field(description="the station at which it ends; below from_mm where it crosses the seam of a closed profile")
+
+
+class Placed(_Json):
+    """A place in the nominal's coordinates, and what it is."""
+
+    name: str = Field(description="what it is, like leading or centre")
+    x_mm: float = Field(description="its x")
+    y_mm: float = Field(description="its y")
+
+
+class Witness(_Json):
+    """A measured point that a proof needs."""
+
+    index: int = Field(description="the number of the point in deviations.csv")
+    x_mm: float = Field(description="its x in section coordinates")
+    y_mm: float = Field(description="its y in section coordinates")
+
+
+class Holding(Witness):
+    """A measured point that holds a minimum zone."""
+
+    deviation_mm: float = Field(description="its deviation from the middle of the zone: half the zone, with sign")
+    station_mm: float = Field(description="the arc length of its foot point")
+    multiplier: float = Field(description="its share in the balance of gradients; they are positive and add up to 1")
+
+
+class Certificate(_Json):
+    """What proves a minimum zone over every placement of the part."""
+
+    zone_mm: float = Field(description="the width of the zone")
+    middle_mm: float = Field(description="the deviation in its middle")
+    pose: Pose = Field(description="where the part lies in it")
+    active: list[Holding] = Field(description="the points that hold it: no small motion makes it smaller")
+    imbalance: float | None = Field(description="what is left of the sum of the points' gradients, by multiplier and sign; 0 is a proof")
+    gap_mm: float = Field(description="the proof is of half the zone less this")
+    proven: bool = Field(description="whether no rigid motion brings the witnesses into the zone made narrower by the gap to either side")
+    witnesses: list[Witness] = Field(description="the points that the proof over every placement needs")
+    boxes: int = Field(description="the boxes of motions that the proof looked at")
+    finest_mm: float | None = Field(description="the least by which one of them moves the point that refutes it")
+    words: str = Field(description="all this in three lines")
+
+
+class Characterised(_Json):
+    """A characteristic: its value, its tolerance, how it was found, and its verdict."""
+
+    name: str = Field(description="its name in the plan; profile for the tolerance of a plan")
+    type: str = Field(description="what it is, like line-profile or chord")
+    method: str = Field(description="how the value was found, with the window that the method used")
+    value: float | None = Field(description="its value in the unit; of a profile 2 * max |deviation - middle of the zone|; null: none")
+    nominal: float | None = Field(description="the value that the deviation is counted from; null for a profile")
+    unit: Literal["mm", "deg", "1"] = Field(description="the unit of all its numbers")
+    lower: float | None = Field(description="the lower limit of the deviation, of a varying zone at the worst point; null: no limit")
+    upper: float | None = Field(description="the upper limit, likewise")
+    deviation: float | None = Field(description="value - nominal; of a profile the deviation of the worst point")
+    consumption: float | None = Field(description="the share of the tolerance that the deviation consumes, 1 at a limit")
+    uncertainty: float = Field(description="the expanded uncertainty U that the verdict takes into account, 0 where none was stated")
+    rule: str = Field(description="what decided, and how U counts")
+    verdict: VerdictName = Field(description="the verdict on this characteristic; the part has the worst of all")
+    reasons: list[VerdictReason] = Field(description="why, the most important first; none for conform")
+    worst: Worst | None = Field(description="of a profile, the point that consumes most of its zone, at the pose of the characteristic")
+    fit: str = Field(description="how the pose was found, with what was locked or limited; none: that of the run")
+    filter: str = Field(description="what the deviations went through; none: raw")
+    weights: str = Field(description="how points counted in the fit; none where they all count alike")
+    region: Region | None = Field(description="the stretch of the profile; null: the whole")
+    region_words: str = Field(description="the region in words")
+    zone: str = Field(description="of a profile, the tolerance in the notations of ISO 1101 (UZ) and ASME Y14.5 (circled U, here (U))")
+    pose: Pose | None = Field(description="where it was judged; null where it was not")
+    coverage: float | None = Field(description="the share of what it depends on that was measured, from 0 to 1")
+    largest_gap_mm: float | None = Field(description="the longest stretch of that without a judged point")
+    places: list[Placed] = Field(description="the places that the value was found at, in the nominal's coordinates")
+    notes: list[str] = Field(description="what the method had to assume")
+    certificate: Certificate | None = Field(description="what proves a minimum zone; null for other fits")
+
+
 class Inspected(_Json):
     """What was found. Without a result (nothing could be registered) the counts stand beside nulls, and the verdict is uncertain."""
 
@@ -105,6 +184,7 @@ class Inspected(_Json):
     largest_gap: LargestGap | None = Field(description="where that stretch is, and what it could hide")
     complete: bool = Field(description="whether the scan came to its end")
     tolerance: Zone | None = Field(description="the tolerance that was applied")
+    characteristics: list[Characterised] = Field(description="every characteristic of the plan, in its order")
     rejected_by_reason: dict[str, int] = Field(description="the number of rejected points for each reason that occurred")
     damaged_bytes: int = Field(description="the bytes on the wire that were no valid frame")
 

@@ -13,6 +13,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from cmmlink.characteristics import notes_on_zone
 from cmmlink.devices import Connected
 from cmmlink.events import RunStarted, Sink
 from cmmlink.from_plan import inspection_of, notes_on_nominal, run_started
@@ -24,7 +25,7 @@ from cmmlink.result_json import density_notes, density_of, identity_json, result
 from cmmlink.run_log import log_event
 from cmmlink.scratch import scratch_in, words_of_room
 from cmmlink.words import utc_words
-from inspection import NominalProfile, rehearse
+from inspection import CharacteristicResult, NominalProfile, Verdict, rehearse
 
 _FILE_POINTS, _FILE_BYTES = 1 << 15, 4 << 20  # a file can wait: no more of it is held than keeps judging and recording busy
 _log = logging.getLogger(__name__)
@@ -42,6 +43,16 @@ class FinishedRun:
     outcome: RunOutcome
     evidence: RecordReference | None
     began: datetime
+
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict on the part, the worst of its characteristics; nothing is proven of one without a result."""
+        return Verdict.UNCERTAIN if self.outcome.result is None else self.outcome.result.verdict
+
+    @property
+    def characteristics(self) -> tuple[CharacteristicResult, ...]:
+        """What was found of every characteristic of the plan."""
+        return () if self.outcome.result is None else self.outcome.result.characteristics
 
     @property
     def title(self) -> str:
@@ -93,13 +104,13 @@ def carry_out(
     A device that fails does not raise: the outcome says so. Raises StoreError when the record cannot be kept, PlanError when
     the plan cannot be carried out, and whatever a sink raises.
     """
-    _log.info("nominal %s, %s, %s", plan.nominal.file, plan.tolerance.zone, plan.registration)
+    _log.info("nominal %s, %s, %s", plan.nominal.file, plan.zone, plan.registration)
     rehearse(profile, plan.registration.method, plan.registration.reject_outliers)
     scratch = scratch_in(records)
     _log.info("%s", words_of_room(scratch.folder))
     followed = bool(sinks) or not isinstance(plan.device, FileDevice)
     live = inspection_of(plan, profile, scratch, provisional=followed)
-    started = run_started(plan, device.device, device.simulated, (*notes_on_nominal(plan), *device.notes))
+    started = run_started(plan, device.device, device.simulated, (*notes_on_nominal(plan), *notes_on_zone(plan), *device.notes))
     on_ready()
     with ExitStack() as stack:
         recorder: Recorder | None = None

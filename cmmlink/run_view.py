@@ -48,7 +48,7 @@ class RunContext:
     def of(cls, plan: Plan, profile: NominalProfile, began: datetime, number: str, plan_name: str, kind: RunKind = "run") -> "RunContext":
         """What a plan says of a run that begins, or began, at a time of day."""
         coverage_min = plan.registration.coverage_min
-        return cls(number, plan_name, profile, plan.tolerance.zone, coverage_min, plan.buffer_points, began, kind)
+        return cls(number, plan_name, profile, plan.zone, coverage_min, plan.buffer_points, began, kind)
 
 
 class _Received(NamedTuple):

@@ -37,6 +37,7 @@ def plan_of_section(plan: CtPlan, cut: SurfaceSection, nominal: Path) -> Plan:
         part=plan.part,
         nominal=plan.nominal.model_copy(update={"file": nominal}),
         tolerance=plan.tolerance,
+        characteristics=plan.characteristics,
         device=FileDevice(type="file", file=plan.mesh.file, scale=plan.mesh.mm_per_unit),
         section=Section(origin_mm=origin, normal=normal, x_axis=x_axis),
         registration=plan.registration,

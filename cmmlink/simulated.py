@@ -33,7 +33,7 @@ def connect_demo_device(plan: Plan, profile: NominalProfile, seed: int, defect: 
 
 def _motion(plan: Plan, profile: NominalProfile, seed: int, defect: tuple[float, float] | None) -> list[str]:
     """Arguments of the simulator: form error and noise well inside the tolerance, an arbitrary pose on the table."""
-    zone = plan.tolerance.zone
+    zone = plan.zone
     motion = {
         "rate": RATE_HZ,
         "speed": profile.length_mm * RATE_HZ / _POINTS,

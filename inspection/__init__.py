@@ -7,10 +7,22 @@ TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer 
 
 if TYPE_CHECKING:
     from inspection import synthetic
-    from inspection.certificate import ZoneCertificate, certify_minimum_zone
+    from inspection.certificate import certify_minimum_zone
     from inspection.characteristics.actual import ActualSection, draw_actual_section
     from inspection.characteristics.airfoil import AirfoilValues, ComparedAirfoil, LeftOut, compare_airfoil, evaluate_airfoil
     from inspection.characteristics.camber import maximum_camber
+    from inspection.characteristics.characteristic import (
+        Characteristic,
+        CharacteristicFit,
+        CharacteristicKind,
+        CharacteristicResult,
+        LineProfile,
+        Region,
+        SectionCharacteristic,
+        SectionKind,
+        WholeProfile,
+        WorstPlace,
+    )
     from inspection.characteristics.chord import ChordAngleMethod, ChordMethod, chord, chord_angle
     from inspection.characteristics.edge_radius import EdgeRadiusMethod, edge_radius
     from inspection.characteristics.inscribed import CamberLine, InscribedCircles, find_camber_line
@@ -27,6 +39,10 @@ if TYPE_CHECKING:
     from inspection.curve import NurbsCurve
     from inspection.curve_check import CurveCheck, Hollow, check_curve
     from inspection.errors import InspectionError, NominalError, NotMeasured, RegistrationError
+    from inspection.evaluation.evaluate import doubt_part, evaluate
+    from inspection.evaluation.line_profile import zone_words
+    from inspection.evaluation.region import FeatureName, Features, features_of, region_between, station_near
+    from inspection.evaluation.section_value import METHODS_OF_SECTIONS, Outline, with_nominal
     from inspection.filters import FilteredProfile, FilterOrder, ProfileFilter, filter_profile
     from inspection.fine import register, register_fine
     from inspection.freedoms import FreedomName, Freedoms
@@ -51,13 +67,14 @@ if TYPE_CHECKING:
     from inspection.tolerance import DecisionRule, ToleranceZone
     from inspection.uncertainty import DeviationUncertainty, UncertaintyBudget, deviation_uncertainty, largest_by_noise_mm
     from inspection.verdict import NOT_JUDGED, Rejection, Verdict
+    from inspection.zone_certificate import ZoneCertificate
     from inspection.zones import Transition, VaryingZone
 else:
     from inspection.front_door import load_on_use
 
     _PLACES = {
         "inspection.synthetic": ("synthetic",),
-        "inspection.certificate": ("ZoneCertificate", "certify_minimum_zone"),
+        "inspection.certificate": ("certify_minimum_zone",),
         "inspection.characteristics.actual": ("ActualSection", "draw_actual_section"),
         "inspection.characteristics.airfoil": ("AirfoilValues", "ComparedAirfoil", "LeftOut", "compare_airfoil", "evaluate_airfoil"),
         "inspection.characteristics.camber": ("maximum_camber",),
@@ -101,6 +118,36 @@ else:
         "inspection.tolerance": ("DecisionRule", "ToleranceZone"),
         "inspection.uncertainty": ("DeviationUncertainty", "UncertaintyBudget", "deviation_uncertainty", "largest_by_noise_mm"),
         "inspection.verdict": ("NOT_JUDGED", "Rejection", "Verdict"),
+        "inspection.characteristics.characteristic": (
+            "Characteristic",
+            "CharacteristicFit",
+            "CharacteristicKind",
+            "CharacteristicResult",
+            "LineProfile",
+            "Region",
+            "SectionCharacteristic",
+            "SectionKind",
+            "WholeProfile",
+            "WorstPlace",
+        ),
+        "inspection.evaluation.evaluate": (
+            "doubt_part",
+            "evaluate",
+        ),
+        "inspection.evaluation.line_profile": ("zone_words",),
+        "inspection.evaluation.region": (
+            "FeatureName",
+            "Features",
+            "features_of",
+            "region_between",
+            "station_near",
+        ),
+        "inspection.evaluation.section_value": (
+            "METHODS_OF_SECTIONS",
+            "Outline",
+            "with_nominal",
+        ),
+        "inspection.zone_certificate": ("ZoneCertificate",),
         "inspection.zones": ("Transition", "VaryingZone"),
     }
 
@@ -108,11 +155,16 @@ else:
 
 
 __all__ = [
+    "METHODS_OF_SECTIONS",
     "NOT_JUDGED",
     "ActualSection",
     "AirfoilSection",
     "AirfoilValues",
     "CamberLine",
+    "Characteristic",
+    "CharacteristicFit",
+    "CharacteristicKind",
+    "CharacteristicResult",
     "ChordAngleMethod",
     "ChordMethod",
     "ComparedAirfoil",
@@ -127,6 +179,8 @@ __all__ = [
     "DeviationUncertainty",
     "Deviations",
     "EdgeRadiusMethod",
+    "FeatureName",
+    "Features",
     "FilterOrder",
     "FilteredProfile",
     "FitName",
@@ -140,6 +194,7 @@ __all__ = [
     "JudgedRows",
     "LeftOut",
     "LimitedFit",
+    "LineProfile",
     "LiveInspection",
     "LiveUpdate",
     "Material",
@@ -150,6 +205,7 @@ __all__ = [
     "NominalProfile",
     "NotMeasured",
     "NurbsCurve",
+    "Outline",
     "PlacementProof",
     "PlacementSearch",
     "Prefix",
@@ -157,12 +213,15 @@ __all__ = [
     "ProfileFilter",
     "ProfileUncertainty",
     "Reason",
+    "Region",
     "Registration",
     "RegistrationError",
     "Rejection",
     "RigidTransform",
     "Room",
     "RuleName",
+    "SectionCharacteristic",
+    "SectionKind",
     "SectionPlane",
     "SectionValue",
     "StackedSections",
@@ -177,6 +236,8 @@ __all__ = [
     "VaryingZone",
     "Verdict",
     "WeightName",
+    "WholeProfile",
+    "WorstPlace",
     "ZoneCertificate",
     "bow",
     "certify_consumption",
@@ -193,10 +254,13 @@ __all__ = [
     "deviations",
     "discretize",
     "displacement",
+    "doubt_part",
     "draw_actual_section",
     "edge_radius",
     "edge_thickness",
+    "evaluate",
     "evaluate_airfoil",
+    "features_of",
     "filter_profile",
     "find_airfoil",
     "find_camber_line",
@@ -209,12 +273,14 @@ __all__ = [
     "maximum_thickness",
     "profile_error_mm",
     "reasons_of_abort",
+    "region_between",
     "register",
     "register_coarse",
     "register_fine",
     "register_within",
     "rehearse",
     "relative_twist",
+    "station_near",
     "synthetic",
     "taper",
     "telling_rows",
@@ -222,4 +288,6 @@ __all__ = [
     "twist_by_fit",
     "uncertainty_along",
     "while_compiling",
+    "with_nominal",
+    "zone_words",
 ]

@@ -6,7 +6,6 @@ points, the nominal and a routine for the closest point to check it.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,74 +19,12 @@ from inspection.placements import PlacementProof, PlacementSearch
 from inspection.registration import Registration
 from inspection.rigid import RigidTransform
 from inspection.signed_deviations import deviations
+from inspection.zone_certificate import ZoneCertificate
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 _MOST_FITS = 8  # each from a placement that is better than the one before
-_BALANCED = 1e-6  # single gradients have a length near 1
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ZoneCertificate:
-    """The minimum zone of measured points, and what proves it.
-
-    nominal_from_section : pose of the zone
-    zone_mm, middle_mm   : its width, and the deviation in its middle
-    active               : (a,) indices of the points that hold it
-    active_place_mm      : (a, 2) where they were measured, in section coordinates
-    active_deviation_mm  : (a,) at the pose, from the middle: half the zone, with sign
-    active_station_mm    : (a,) where they are on the profile
-    multipliers          : (a,) positive, with the sum 1
-    imbalance            : length of the sum of gradients, weighted by multiplier and sign, a rotation counted in mm at the farthest
-                           point; with 0 no small motion makes the zone smaller
-    gap_mm               : the proof is of half the zone less this
-    proven               : no rigid motion brings the witnesses within half the zone less the gap; False where the search ended
-                           before it knew
-    witnesses            : (w,) indices of the points that the proof needs, the active ones and those that had to join them
-    witness_place_mm     : (w, 2) where they were measured, in section coordinates
-    boxes                : of motions that were looked at
-    finest_mm            : the least by which a refuted box moves the point that refutes it
-    """
-
-    nominal_from_section: RigidTransform
-    zone_mm: float
-    middle_mm: float
-    active: Rows
-    active_place_mm: Array
-    active_deviation_mm: Array
-    active_station_mm: Array
-    multipliers: Array
-    imbalance: float
-    gap_mm: float
-    proven: bool
-    witnesses: Rows
-    witness_place_mm: Array
-    boxes: int
-    finest_mm: float
-
-    @property
-    def balanced(self) -> bool:
-        """Whether the multipliers prove the zone smallest nearby; they do not where the fit had not converged."""
-        return self.imbalance <= _BALANCED
-
-    @property
-    def words(self) -> str:
-        """The certificate in three lines, as a report prints it."""
-        half, turned = self.zone_mm / 2, np.degrees(self.nominal_from_section.rotation_rad)
-        x, y = self.nominal_from_section.translation_mm.tolist()
-        each = zip(self.active.tolist(), self.active_place_mm, self.active_deviation_mm, self.multipliers, strict=True)
-        held = " | ".join(f"{row + 1} ({at[0]:.6f}, {at[1]:.6f}) {e:+.9f} multiplier {share:.6f}" for row, at, e, share in each)
-        last = (
-            f"proof: no rigid motion brings {len(self.witnesses)} of the measured points within {half - self.gap_mm:.9f} mm of it "
-            f"(gap {1e3 * self.gap_mm:g} um); {self.boxes:,} boxes of motions looked at, the finest {self.finest_mm:.1e} mm"
-            if self.proven
-            else f"no proof over every placement: the search ended after {self.boxes:,} boxes of motions"
-        )
-        return (
-            f"minimum zone {self.zone_mm:.6f} mm (half {half:.9f}) about {self.middle_mm:g} mm, "
-            f"turned {turned:.9f} deg, moved ({x:.9f}, {y:.9f}) mm\nheld by points {held}\n{last}"
-        )
 
 
 def certify_minimum_zone(

@@ -31,6 +31,8 @@ ReasonKind = Literal[
     "fit",
     "outline",
     "shift",
+    "unseen",
+    "no-value",
 ]
 
 
@@ -129,14 +131,14 @@ def conclude(found: Findings, missing: Missing, limits: Limits, complete: bool) 
     return Conclusion(max(found.points, doubtful), tuple(reasons))
 
 
-def reasons_of_abort(reasons: tuple[Reason, ...], proven_out: bool) -> tuple[Reason, ...]:
-    """The reasons of a run that the operator aborted, which has no verdict, whatever was found until then.
+def reasons_of_abort(proven_out: bool) -> tuple[Reason, ...]:
+    """The first reasons of a run that the operator aborted, which has no verdict, whatever was found until then.
 
     proven_out : the points received until then prove that the part fails
     """
     before = "The points received until then prove that the part fails."
-    told = [Reason("aborted", "The operator aborted the run, so there is no verdict.")]
-    return (*told, *([Reason("proven-out", before)] if proven_out else []), *reasons)
+    told = Reason("aborted", "The operator aborted the run, so there is no verdict.")
+    return (told, *([Reason("proven-out", before)] if proven_out else []))
 
 
 def word_points(zone: ToleranceZone, beyond: int, within_uncertainty: int) -> Reason | None:

@@ -4,6 +4,7 @@ What lies between two neighbouring points was not seen. It counts as measured wh
 only the places of the points decide, never their density: a further point never lowers the coverage, a lost one never raises it.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -82,6 +83,32 @@ def measure(station_mm: Array, nominal: NominalProfile, gap_max_mm: float | None
         return Measured(0.0, Gap(0.0, length, length, nominal.size_mm))
     gap = Gap(start, stop, longest, _off_the_line_mm(start, longest, nominal))
     return Measured(float(near[:count].sum() / length), gap)
+
+
+def measure_region(
+    station_mm: Array, nominal: NominalProfile, gap_max_mm: float, from_mm: float, to_mm: float, room: Room = np.empty
+) -> Measured:
+    """The same of one stretch of the profile: what of its gaps lies within it. `from_mm` is above `to_mm` where it crosses the seam.
+
+    Points beside the stretch count as well: what lies between them and it was seen up to them.
+    """
+    length, wraps = nominal.length_mm, nominal.curve.closed
+    span = (to_mm - from_mm) % length if wraps else to_mm - from_mm
+    span = span or length
+    near, longest, start = [], -1.0, 0.0
+    for stations, gaps in _gaps_in_order(station_mm, nominal, room):
+        begin = stations[:-1] - from_mm
+        for low in (np.mod(begin, length), np.mod(begin, length) - length) if wraps else (begin,):
+            first, last = np.clip(low, 0.0, span), np.clip(low + gaps, 0.0, span)
+            inside = last - first
+            near.append(inside[inside <= gap_max_mm * (1 + 1e-9)])
+            at = int(inside.argmax())
+            if inside[at] > longest:
+                longest, start = float(inside[at]), float(from_mm + first[at])
+    if longest < 0:
+        return Measured(0.0, Gap(from_mm, to_mm, span, nominal.size_mm))
+    first_mm, last_mm = (start % length, (start + longest) % length) if wraps else (start, start + longest)
+    return Measured(math.fsum(np.concatenate(near)) / span, Gap(first_mm, last_mm, longest, _off_the_line_mm(first_mm, longest, nominal)))
 
 
 def _gaps_in_order(station_mm: Array, nominal: NominalProfile, room: Room) -> Iterator[tuple[Array, Array]]:

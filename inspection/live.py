@@ -11,15 +11,18 @@ judged are not judged again before the end.
 State moves only at fixed point numbers, never at the edges of batches: the same points in any batches give the same result.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inspection.characteristics.characteristic import Characteristic
 from inspection.cloud import MANY, Cloud
 from inspection.compensation import Compensation
 from inspection.conclusion import Missing
+from inspection.evaluation.evaluate import evaluate
 from inspection.kernels import Room, compile_projection, fit_compiled_beside
 from inspection.methods import FitName, Method, RuleName, WeightName
 from inspection.nominal import NominalProfile
@@ -82,6 +85,7 @@ class LiveInspection:
                       not proven any more (see `Terms`)
     uncertainty     : a budget of the uncertainty; the U of the zone is then its largest along the profile, and the zone comes without one
     compensation    : takes the growth of a warm part out of every point before anything else is done with it
+    characteristics : what is evaluated at the end, each with a verdict of its own; none stands for the profile alone
     provisional     : False seeks no pose before `finish`, for points that are all there from the start; the result is the same
     room            : gives the arrays that grow with the scan, like numpy.empty: about 60 bytes a point until `finish` returns
     """
@@ -106,6 +110,7 @@ class LiveInspection:
         allow_unseen_mm: float | None = None,
         uncertainty: StatedUncertainty | None = None,
         compensation: Compensation | None = None,
+        characteristics: Sequence[Characteristic] = (),
         provisional: bool = True,
         room: Room = np.empty,
     ) -> None:
@@ -133,6 +138,7 @@ class LiveInspection:
             allow_unseen_mm=allow_unseen_mm,
             uncertainty=along,
         )
+        self._characteristics = tuple(characteristics)
         self._known_pose = self._terms.known_pose
         self._plane = section or SectionPlane(np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
         self._provisional = provisional
@@ -206,7 +212,7 @@ class LiveInspection:
         return PrefixSearch(self._terms)
 
     def finish(self, complete: bool = True, missing: Missing | None = None) -> InspectionResult:
-        """Register all points together, judge every one at that pose, and say the verdict on the part.
+        """Register all points together, judge every one at that pose, evaluate what was asked for, and say the verdict on the part.
 
         complete : False when the scan was cut short
         missing  : points that are known to be missing before they came here; None for none
@@ -214,7 +220,8 @@ class LiveInspection:
         Raises RegistrationError when the points cannot be brought onto the nominal.
         """
         rows, self._handed_over = self._rows, True
-        return settle(rows, self._terms, complete, missing or Missing())
+        missing = missing or Missing()
+        return evaluate(self._characteristics, settle(rows, self._terms, complete, missing), self._terms, missing, complete)
 
     @property
     def _rows(self) -> ScanRows:

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inspection.characteristics.characteristic import CharacteristicResult
 from inspection.cloud import ROWS_AT_ONCE, row_blocks
-from inspection.conclusion import Reason
+from inspection.conclusion import Findings, Reason
 from inspection.gaps import Gap
 from inspection.judged_rows import JudgedRows
 from inspection.kernels import Room
@@ -49,8 +50,11 @@ class InspectionResult:
     worst        : index of the point farthest from the middle of the zone, None when nothing was judged
     rms_mm       : root mean square deviation of the judged points; NaN when there are none
     max_deviation_mm, min_deviation_mm : largest and smallest deviation; NaN when nothing was judged
-    verdict      : on the part
+    verdict      : on the part: the worst of its characteristics
     reasons      : why it is that verdict, the most important first; none where the part conforms
+    findings     : what the verdict on the whole profile rests on
+    characteristics : what was found of each, in the order in which they were asked for; the profile alone where none were
+    section_at   : gives where points were measured (k, 2), in section coordinates, by a slice or by indices (k,)
     coverage     : share of the nominal's length that was measured
     gap          : the longest stretch without a judged point
     gap_max_mm   : the longest gap that counted as measured
@@ -91,8 +95,11 @@ class InspectionResult:
     minimum_zone_mm: float
     method: Method
     stretches: tuple[Stretch, ...]
+    findings: Findings
+    section_at: Callable[[slice | NDArray[np.int64]], Array]
     uncertainty: ProfileUncertainty | None = None
     largest_by_noise_mm: float = 0.0
+    characteristics: tuple[CharacteristicResult, ...] = ()
 
     def __post_init__(self) -> None:
         for array in (self.station_mm, self.deviation_mm, self.verdicts, self.rejection):

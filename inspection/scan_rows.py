@@ -118,6 +118,10 @@ class ScanRows:
         some.judge(0, m, pose, terms)
         return JudgedRows(some.actual, some.foot, some.station, some.deviation, some.verdicts, some.rejection)
 
+    def section_at(self, which: slice | Rows) -> Array:
+        """Where points (k, 2) were measured, in section coordinates."""
+        return np.array(self.points[: self.count][which])
+
     def reject(self, outliers: Rows) -> None:
         """Reject rows as outliers, until all rows are taken up again."""
         for code, count in zip(*np.unique(self.rejection[outliers], return_counts=True), strict=True):

@@ -309,6 +309,8 @@ def _result(rows: ScanRows, settled: _Settled, terms: Terms, complete: bool, mis
         uncertainty=terms.uncertainty,
         largest_by_noise_mm=_raised_by_noise_mm(deviation, max(abs(extent.max_deviation_mm), abs(extent.min_deviation_mm)), terms),
         stretches=stretches(station, deviation, verdicts, terms.zone, nominal, limits.gap_max_mm, room) if out else (),
+        findings=findings,
+        section_at=rows.section_at,
     )
 
 

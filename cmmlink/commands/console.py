@@ -136,7 +136,7 @@ def inspect_surface(
     )
     folder = None if plan.out is None else stack.folder_of(plan.out, plan)
     if folder is not None:
-        write_stack(folder, stack, plan.tolerance.zone, plan.part.name)
+        write_stack(folder, stack, plan.zone, plan.part.name)
     worst = max(section.verdict for section in stack.sections)
     count = sum(section.verdict is worst for section in stack.sections)
     words = f"{count} of {stack.asked} sections of {plan.mesh.file.name} {VERDICT_WORDS[worst]}"
@@ -151,9 +151,7 @@ def _section(plan: "CtPlan", outcome: "SectionOutcome", plan_name: str) -> "Sect
 
     height_mm, run = outcome.slice.height_mm, outcome.run
     title = f"Section at height {height_mm:.3f} mm of {plan.mesh.file.name}"
-    context = RunContext(
-        title, plan_name, outcome.profile, plan.tolerance.zone, plan.registration.coverage_min, CAPACITY_POINTS, now(), "section"
-    )
+    context = RunContext(title, plan_name, outcome.profile, plan.zone, plan.registration.coverage_min, CAPACITY_POINTS, now(), "section")
     ended = Ended(run.ending, str(run.refusal or ""), outcome.result_json(), run.result.blocks if run.result is not None else None)
     return Section(height_mm, context, outcome.started, ended, outcome.warnings)
 

@@ -95,7 +95,7 @@ def report_outcome(run: "FinishedRun", output: Output) -> int:
         typer.echo(f"recorded as run {evidence.run}")
     if outcome.failure is not None:
         return NO_RECORD if isinstance(outcome.failure, StoreError) else DEVICE_FAILED
-    return UNUSABLE if outcome.result is None else EXIT_OF[outcome.result.verdict]
+    return UNUSABLE if outcome.result is None else EXIT_OF[run.verdict]
 
 
 @contextmanager

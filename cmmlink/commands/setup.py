@@ -72,7 +72,7 @@ def check(plan_file: PlanFile) -> int:
     profile = check_plan(plan, plan_file)
     with name_place(plan_file, "device"), connect(plan) as device:
         notes = (*notes_on_nominal(plan), *device.notes)
-    zone = plan.tolerance.zone
+    zone = plan.zone
     typer.echo(f"{plan_file} can be run: {plan.part.name}, zone {zone.lower_mm:+g} .. {zone.upper_mm:+g} mm, {words_of(plan.device)}")
     typer.echo(f"records in {words_of_room(plan.records or records_folder(None))}")
     typer.echo(f"nominal {profile.length_mm:.3f} mm long, {len(profile)} samples, material on the {profile.material}")

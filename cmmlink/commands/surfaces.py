@@ -181,7 +181,7 @@ def _inspect_stack(plan: "CtPlan", output: Output, pictures: bool, no_record: bo
             if folder is not None:
                 with bar.show():
                     done = bar.begin_round("written", len(stack.sections))
-                    write_stack(folder, stack, plan.tolerance.zone, plan.part.name, pictures=wanted, on_section=done)
+                    write_stack(folder, stack, plan.zone, plan.part.name, pictures=wanted, on_section=done)
         finally:
             if output.as_json:
                 print_json(stack.result_json())

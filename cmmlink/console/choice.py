@@ -57,7 +57,7 @@ def _refusal(name: str, text: str, problem: str, line: int | None) -> Choice:
 
 
 def _description(name: str, text: str, plan: Plan, profile: NominalProfile) -> ChosenPlan:
-    zone, registration = plan.tolerance.zone, plan.registration
+    zone, registration = plan.zone, plan.registration
     uncertainty = f", U {zone.uncertainty_mm:g} mm" if zone.uncertainty_mm else ""
     facts = [
         ("Part", plan.part.name),

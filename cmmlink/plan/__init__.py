@@ -3,6 +3,7 @@
 TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer to load than all of this
 
 if TYPE_CHECKING:
+    from cmmlink.plan.characteristics import AskedCharacteristic, AskedFilter, AskedProfile, Place
     from cmmlink.plan.cutters import CutterName
     from cmmlink.plan.own_maps import map_of
     from cmmlink.plan.scan import (
@@ -44,6 +45,7 @@ else:
             "place_of",
             "with_own_maps",
         ),
+        "cmmlink.plan.characteristics": ("AskedCharacteristic", "AskedFilter", "AskedProfile", "Place"),
         "cmmlink.plan.cutters": ("CutterName",),
         "cmmlink.plan.surface": ("CtPlan", "NominalAt", "load_ct_plan"),
         "cmmlink.plan.yaml_model": ("Positive", "Settings", "line_of", "read_model", "words_of_allowed"),
@@ -53,6 +55,9 @@ else:
 
 
 __all__ = [
+    "AskedCharacteristic",
+    "AskedFilter",
+    "AskedProfile",
     "CtPlan",
     "CutterName",
     "Datum",
@@ -63,6 +68,7 @@ __all__ = [
     "Nominal",
     "NominalAt",
     "Part",
+    "Place",
     "Plan",
     "Positive",
     "Registration",

@@ -9,26 +9,17 @@ from math import hypot
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import yaml
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from cmmlink.buffer import CAPACITY_POINTS
 from cmmlink.errors import PlanError, YamlError
-from cmmlink.plan.yaml_model import Positive, Settings, line_of, read_model
+from cmmlink.plan.deciding import Deciding
+from cmmlink.plan.yaml_model import Positive, Settings, Text, line_of, read_model
 from cmmlink.result_folder import check_placeholders
 from drivers import AxisName, PointFileError, UnitName, device_address, read_text, shipped_maps
-from inspection import FitName, Material, Method, RuleName, ToleranceZone, WeightName
+from inspection import FitName, Material, Method
 
 Vector = tuple[float, float, float]
-
-
-def _on_one_line(text: str) -> str:
-    if not text.isprintable():
-        raise ValueError("printable text on one line")
-    return text
-
-
-Text = Annotated[str, Field(min_length=1), AfterValidator(_on_one_line)]
 
 
 def _with_known_placeholders(folder: Path) -> Path:
@@ -88,36 +79,6 @@ class Nominal(Settings):
     material: Material | None = Field(
         default=None, description="the side of the material, seen along the direction of travel; null: inside a closed profile"
     )
-
-
-class Tolerance(Settings):
-    """Limits of the deviation, positive out of material, and its expanded uncertainty."""
-
-    lower_mm: float = Field(description="the lower limit of the deviation in mm, like -0.05")
-    upper_mm: float = Field(description="the upper limit of the deviation in mm, like 0.05")
-    uncertainty_mm: float = Field(default=0.0, description="the expanded uncertainty U (95 %) of one deviation, as in ISO 14253-1")
-
-    @field_validator("upper_mm")
-    @classmethod
-    def _above_lower(cls, upper_mm: float, info: ValidationInfo) -> float:
-        lower_mm = info.data.get("lower_mm")
-        if lower_mm is not None and upper_mm <= lower_mm:
-            raise ValueError(f"a number above the lower limit, {lower_mm:g}")
-        return upper_mm
-
-    @field_validator("uncertainty_mm")
-    @classmethod
-    def _provable(cls, uncertainty_mm: float, info: ValidationInfo) -> float:
-        if "lower_mm" in info.data and "upper_mm" in info.data:
-            width = info.data["upper_mm"] - info.data["lower_mm"]
-            if not 0 <= 2 * uncertainty_mm < width:
-                raise ValueError(f"zero or more, and less than half the zone of {width:g} mm: more leaves nothing provable")
-        return uncertainty_mm
-
-    @property
-    def zone(self) -> ToleranceZone:
-        """The tolerance as the inspection takes it."""
-        return ToleranceZone(self.lower_mm, self.upper_mm, self.uncertainty_mm)
 
 
 class Axis(Settings):
@@ -287,39 +248,6 @@ class Registration(Settings):
         return reject
 
 
-class Allow(Settings):
-    """What may be missing although conformity is to be proven."""
-
-    unseen_mm: float | None = Field(
-        default=None,
-        ge=0,
-        description="the longest stretch of the profile that may be unseen where points were lost, damaged or rejected; null: none may be",
-    )
-
-
-class Deciding(Settings):
-    """How the verdict on the part is reached: what every plan may say, and how every plan is spelled in full."""
-
-    rule: RuleName = Field(
-        default="minimum-zone",
-        description="what decides without a datum: minimum-zone (a part conforms when any placement passes, ISO 1101), or best-fit",
-    )
-    weights: WeightName = Field(
-        default="arc-length", description="how points count in the best fit: by the length of profile that each stands for, or all alike"
-    )
-    gap_max_mm: Positive | None = Field(
-        default=None, description="the longest stretch without a point that counts as measured; null: a hundredth of the nominal's length"
-    )
-    end_allowance_mm: Annotated[float, Field(ge=0)] | None = Field(
-        default=None, description="how far points may lie beyond an end of an open profile; null: half the width of the zone"
-    )
-    allow: Allow = Field(default=Allow(), description="what may be missing although conformity is to be proven")
-
-    def effective_yaml(self) -> str:
-        """Spell the plan with every default filled in and every path absolute; as a plan it means the same."""
-        return yaml.safe_dump(self.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
-
-
 class Discretisation(Settings):
     """How finely the nominal is sampled."""
 
@@ -334,7 +262,6 @@ class Plan(Deciding):
     part: Part = Field(description="a mapping with the part's name")
     operator: Text | None = Field(default=None, description="who measures")
     nominal: Nominal = Field(description="a mapping with the nominal's file")
-    tolerance: Tolerance = Field(description="a mapping with lower_mm and upper_mm")
     device: Device = Field(description="a mapping with the device's type and address")
     probe: Probe = Field(default=Probe(), description="the tip of the probe")
     section: Section = Field(default=Section(), description="the plane of the section in machine coordinates")

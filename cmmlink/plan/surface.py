@@ -11,7 +11,8 @@ from pydantic import Field, field_validator, model_validator
 
 from cmmlink.errors import PlanError, YamlError
 from cmmlink.plan.cutters import CutterName
-from cmmlink.plan.scan import OUT, RECORDS, Deciding, Nominal, Part, Registration, ResultFolder, Tolerance, Unit
+from cmmlink.plan.deciding import Deciding
+from cmmlink.plan.scan import OUT, RECORDS, Nominal, Part, Registration, ResultFolder, Unit
 from cmmlink.plan.yaml_model import Positive, Settings, read_model
 from drivers import PointFileError, mm_per, read_text
 
@@ -84,7 +85,6 @@ class CtPlan(Deciding):
     part: Part = Field(description="a mapping with the part's name")
     mesh: Mesh = Field(description="a mapping with the surface's file")
     nominal: Nominal = Field(description="a mapping with the nominal's file")
-    tolerance: Tolerance = Field(description="a mapping with lower_mm and upper_mm")
     sections: Sections = Field(description="a mapping with heights_mm or every_mm")
     cut: Cut = Field(default=Cut(), description="how the surface is cut")
     registration: Registration = Field(default=Registration(), description="how the points of a section come onto its nominal")

@@ -14,7 +14,8 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, NoReturn, TypeVar
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from cmmlink.errors import YamlError
@@ -39,6 +40,15 @@ _IN_OUR_WORDS = {
 Model = TypeVar("Model", bound=BaseModel)
 Positive = Annotated[float, Field(gt=0)]
 
+
+def _on_one_line(text: str) -> str:
+    if not text.isprintable():
+        raise ValueError("printable text on one line")
+    return text
+
+
+Text = Annotated[str, Field(min_length=1), AfterValidator(_on_one_line)]
+
 _DEEPEST = 20
 _NULL = ("", "~", "null", "Null", "NULL")
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # libyaml where the wheel has it: a hundred times faster on long lists
@@ -49,7 +59,9 @@ _MANY_BRACKETS = re.compile(rf"[\[{{](?:[^\[\]{{}}]*[\[{{]){{{_DEEPEST}}}")
 class Settings(BaseModel):
     """Base of all groups of keys: immutable, unknown keys refused, numbers finite, blanks around text removed."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, str_strip_whitespace=True)
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", allow_inf_nan=False, str_strip_whitespace=True, serialize_by_alias=True, validate_by_name=True
+    )
 
 
 def read_model(text: str, model: type[Model]) -> Model:
@@ -69,7 +81,7 @@ def read_model(text: str, model: type[Model]) -> Model:
 def line_of(text: str, key: str) -> int:
     """Line of a dotted key in a text that was read before; where the key is not written, the line of the group that it belongs to."""
     lines = _read(text).lines
-    path: Path = tuple(key.split("."))
+    path: Path = tuple(int(part) if part.isdigit() else part for part in key.split("."))
     while path and path not in lines:
         path = path[:-1]
     return lines.get(path, 1)
@@ -181,7 +193,7 @@ def _expectation(error: ErrorDetails, owner: type[BaseModel] | None, path: Path)
     """Say what the model takes at a key, in our words where pydantic speaks of Python."""
     kind = error["type"]
     if kind in ("model_type", "model_attributes_type"):
-        known = owner.model_fields.get(str(path[-1])) if owner else None
+        known = _field(owner, str(path[-1]))
         return f"a mapping with {', '.join(_keys(_models(known.annotation)[0]))}" if known else "a mapping"
     if kind == "float_parsing" and re.fullmatch(r"\s*[+-]?\d+,\d+\s*", str(error["input"])):
         return "a number, with a decimal point"
@@ -205,12 +217,16 @@ def _place(location: tuple[str | int, ...], document: _Document, model: type[Bas
         if typing.get_origin(here) is dict:
             owner, here, path = None, typing.get_args(here)[1], (*path, part)
             continue
+        if isinstance(part, int):  # the place in a list, all of whose items are of one kind
+            owner, here, path = None, typing.get_args(here)[0] if typing.get_origin(here) is tuple else None, (*path, part)
+            continue
         chosen = [choice for choice in _models(here) if _tag(choice) == part]
         if (*path, part) not in document.lines and chosen:
             here = chosen[0]
             continue
         owner = next(iter(_models(here)), None)
-        here = owner.model_fields[str(part)].annotation if owner and str(part) in owner.model_fields else None
+        known = _field(owner, str(part))
+        here = known.annotation if known else None
         path = (*path, part)
     return path, owner
 
@@ -231,16 +247,22 @@ def _tag(model: type[BaseModel]) -> str | None:
 
 def _tags(owner: type[BaseModel] | None, path: Path) -> list[str]:
     """List the values of `type` where one of several models may stand."""
-    known = owner.model_fields.get(str(path[-1])) if owner else None
+    known = _field(owner, str(path[-1]))
     return [tag for model in _models(known.annotation) if (tag := _tag(model))] if known else []
 
 
 def _keys(model: type[BaseModel] | None) -> list[str]:
-    return list(model.model_fields) if model else []
+    return [field.alias or name for name, field in model.model_fields.items()] if model else []
+
+
+def _field(model: type[BaseModel] | None, key: str) -> FieldInfo | None:
+    """What a model says of a key, by the name that stands in a text."""
+    fields = model.model_fields if model else {}
+    return next((field for name, field in fields.items() if key in (name, field.alias)), None)
 
 
 def _meaning(model: type[BaseModel] | None, key: str) -> str:
-    known = model.model_fields.get(key) if model else None
+    known = _field(model, key)
     return known.description if known and known.description else "a value"
 
 

@@ -141,6 +141,8 @@ def _decoder_of(device: Device, recorded: RecordedRun, decoder_of: Callable[[Dev
 
 def _with_changes(plan: Plan, tolerance: tuple[float, float] | None, method: str | None) -> Plan:
     document = plan.model_dump()
+    if tolerance is not None and plan.tolerance is None:
+        raise PlanError("the recorded plan has no tolerance to be changed: its characteristics have limits of their own")
     if tolerance is not None:
         document["tolerance"] |= {"lower_mm": tolerance[0], "upper_mm": tolerance[1]}
     if method is not None:

@@ -9,11 +9,12 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn
 from rich.table import Table
 
+from cmmlink.characteristics import PROFILE
 from cmmlink.events import Counts, Ending
 from cmmlink.run_state import RunState
 from cmmlink.run_view import RunView
-from cmmlink.words import POSE_MOVES, Shape, headline_of
-from inspection import InspectionResult, Rejection, Verdict
+from cmmlink.words import POSE_MOVES, VERDICT_WORDS, Shape, headline_of
+from inspection import CharacteristicResult, InspectionResult, Rejection, Verdict
 
 STYLES = {Verdict.CONFORM: "bold green", Verdict.UNCERTAIN: "bold yellow", Verdict.NONCONFORM: "bold red"}
 STYLE_OF: Mapping[Shape, str] = {
@@ -124,6 +125,8 @@ def _print_numbers(console: Console, result: InspectionResult) -> None:
         f"(x {worst.actual_mm[0, 0]:.3f}, y {worst.actual_mm[0, 1]:.3f})"
     )
     _print_stretches(console, result)
+    if [one.name for one in result.characteristics] != [PROFILE]:
+        print_characteristics(console, result.characteristics)
     registration = result.registration
     pose = registration.nominal_from_section
     moved = f"({pose.translation_mm[0]:.4f}, {pose.translation_mm[1]:.4f}) mm"
@@ -133,6 +136,30 @@ def _print_numbers(console: Console, result: InspectionResult) -> None:
         f"method {result.method}; coverage {result.coverage:.1%}; largest gap {gap.length_mm:.3f} mm at station {gap.from_mm:.2f} .. "
         f"{gap.to_mm:.2f} mm ({result.gap_max_mm:.3f} mm count as measured)"
     )
+
+
+def print_characteristics(console: Console, found: Sequence[CharacteristicResult]) -> None:
+    """A line for every characteristic, with its verdict, its value and how it was found, and the reasons of those that do not conform."""
+    for one in found:
+        unit = "" if one.unit == "1" else f" {one.unit}"
+        value = "no value" if math.isnan(one.value) else f"{one.value:.4f}{unit}"
+        deviation = "" if math.isnan(one.deviation) else f", deviation {one.deviation:+.4f}"
+        limits = " .. ".join(f"{limit:+g}" if math.isfinite(limit) else "any" for limit in (one.lower, one.upper))
+        how = "; ".join(part for part in (one.method, _of_profile(one), f"filter {one.filter}" if one.filter != "none" else "") if part)
+        console.print(
+            f"  [{STYLES[one.verdict]}]{VERDICT_WORDS[one.verdict]:11}[/] {escape(one.name)}: {one.type} {value}{deviation} "
+            f"(limits {limits}{unit}) {escape(how)}"
+        )
+        if one.certificate is not None:
+            for line in one.certificate.words.splitlines():
+                console.print(f"      {line}", markup=False)
+
+
+def _of_profile(one: CharacteristicResult) -> str:
+    """Of a profile its region, its zone as drawings have it, and its fit."""
+    if one.type != "line-profile":
+        return f"fit {one.fit}" if one.fit != "none" else ""
+    return f"{one.region_words}; zone {one.zone_words}; fit {one.fit}"
 
 
 def _print_rule(console: Console, result: InspectionResult) -> None:

@@ -223,7 +223,7 @@ class Alone:
         profile = profile_of(plan)
         self.whole = inspection_of(plan, profile).add(source.points)
         self.source = source
-        self.view = RunView(RunContext("1", "blade.yaml", profile, plan.tolerance.zone, 0.95, 500_000, now()), time.monotonic, now)
+        self.view = RunView(RunContext("1", "blade.yaml", profile, plan.zone, 0.95, 500_000, now()), time.monotonic, now)
 
     def start(self) -> RunView:
         self.view(RunStarted("endurance", "", "", "benchmark", True))

@@ -119,7 +119,7 @@ def test_demonstration_plan_fits_its_nominal() -> None:
     profile = discretize(nominal.curve, samples=4000, step_min=2.5e-4, material="left")
     assert plan.probe.tip_radius_mm == 1.0
     assert profile.smallest_concave_radius_mm > 100 * plan.probe.tip_radius_mm
-    assert (plan.tolerance.lower_mm, plan.tolerance.upper_mm) == (-0.05, 0.05)
+    assert (plan.zone.lower_mm, plan.zone.upper_mm) == (-0.05, 0.05)
 
 
 def test_no_half_turn_brings_the_section_onto_itself(curve: NurbsCurve) -> None:

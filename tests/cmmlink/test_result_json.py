@@ -28,7 +28,7 @@ PROMISED = {
     "registration": dict,
     "stretches": list,
 }
-FURTHER = {"coverage", "largest_gap_mm", "largest_gap", "complete", "tolerance", "rejected_by_reason", "damaged_bytes"}
+FURTHER = {"characteristics", "coverage", "largest_gap_mm", "largest_gap", "complete", "tolerance", "rejected_by_reason", "damaged_bytes"}
 FURTHER |= {"zone_error_mm", "best_fit_error_mm", "minimum_zone_mm", "reasons", "rule", "target_mm", "weights"}
 
 

@@ -362,7 +362,7 @@ def test_every_connection_begins_with_a_hello_and_everything(server: ConsoleServ
 def test_points_of_another_run_are_another_generation_for_the_page(server: ConsoleServer, tmp_path: Path) -> None:
     """Every view numbers its generations from 0: what the page drew of one run must not stay under the next."""
     plan = load_plan(write_plan(tmp_path))
-    context = RunContext("1", "", profile_of(plan), plan.tolerance.zone, 0.95, 1000, datetime(2026, 11, 22, 12))
+    context = RunContext("1", "", profile_of(plan), plan.zone, 0.95, 1000, datetime(2026, 11, 22, 12))
     kinds: list[tuple[int, int]] = []
     with joined(server) as socket:
         for expected in (2, 4):

@@ -51,7 +51,7 @@ def test_short_plan_gets_the_documented_defaults(tmp_path: Path) -> None:
     assert (plan.part.name, plan.part.serial_number, plan.operator) == ("blade", "0012", None)
     assert (plan.nominal.file, plan.nominal.scale) == (tmp_path / "blade.dat", 100.0)
     assert (plan.nominal.closed, plan.nominal.material) == (None, None)
-    assert plan.tolerance.zone == ToleranceZone(-0.05, 0.05, 0.0)
+    assert plan.zone == ToleranceZone(-0.05, 0.05, 0.0)
     assert plan.device == SerialDevice(type="serial", address="COM3", baud_rate=115200, silence_s=5.0)
     assert plan.probe.tip_radius_mm == 0
     assert (plan.section.origin_mm, plan.section.x_axis, plan.section.normal) == ((0, 0, 0), (1, 0, 0), (0, 0, 1))
@@ -66,7 +66,7 @@ def test_full_plan_says_what_it_says(tmp_path: Path) -> None:
     plan = load_plan(written(tmp_path, FULL))
     assert (plan.part.name, plan.operator) == ("blade, left", "A. Operator")
     assert (plan.nominal.file, plan.nominal.closed, plan.nominal.material) == (Path("/nominals/blade.yaml"), True, "right")
-    assert plan.tolerance.zone == ToleranceZone(-0.1, 0.3, 0.01)
+    assert plan.zone == ToleranceZone(-0.1, 0.3, 0.01)
     assert plan.device == FileDevice(type="file", file=tmp_path / "points.csv", scale=25.4)
     assert plan.section.off_plane_max_mm == 0.5
     assert plan.registration.datum is not None

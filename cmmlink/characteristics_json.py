@@ -1,0 +1,78 @@
+"""The characteristics of a result as `--json` and result.json hold them: stable keys, numbers or null."""
+
+import math
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from inspection import CharacteristicResult, RigidTransform, WorstPlace, ZoneCertificate
+
+
+def characteristic_json(found: "CharacteristicResult") -> dict[str, Any]:
+    """One characteristic with everything that its value depends on."""
+    return {
+        "name": found.name,
+        "type": found.type,
+        "method": found.method,
+        "value": _number(found.value),
+        "nominal": _number(found.nominal),
+        "unit": found.unit,
+        "lower": _number(found.lower),
+        "upper": _number(found.upper),
+        "deviation": _number(found.deviation),
+        "consumption": _number(found.consumption),
+        "uncertainty": found.uncertainty,
+        "rule": found.rule,
+        "verdict": found.verdict.word,
+        "reasons": [{"kind": reason.kind, "words": reason.words} for reason in found.reasons],
+        "worst": None if found.worst is None else _worst(found.worst),
+        "fit": found.fit,
+        "filter": found.filter,
+        "weights": found.weights,
+        "region": None if found.region is None else {"from_mm": found.region.from_mm, "to_mm": found.region.to_mm},
+        "region_words": found.region_words,
+        "zone": found.zone_words,
+        "pose": None if found.pose is None else pose_json(found.pose),
+        "coverage": _number(found.coverage),
+        "largest_gap_mm": _number(found.gap_mm),
+        "places": [{"name": name, "x_mm": x, "y_mm": y} for name, x, y in found.places_mm],
+        "notes": list(found.notes),
+        "certificate": None if found.certificate is None else certificate_json(found.certificate),
+    }
+
+
+def certificate_json(proof: "ZoneCertificate") -> dict[str, Any]:
+    """What proves a minimum zone; the points have the numbers of their rows in deviations.csv."""
+    held = (proof.active, proof.active_place_mm, proof.active_deviation_mm, proof.active_station_mm, proof.multipliers)
+    columns = [array.tolist() for array in held]
+    return {
+        "zone_mm": proof.zone_mm,
+        "middle_mm": proof.middle_mm,
+        "pose": pose_json(proof.nominal_from_section),
+        "active": [
+            {"index": row, "x_mm": x, "y_mm": y, "deviation_mm": e, "station_mm": s, "multiplier": share}
+            for row, (x, y), e, s, share in zip(*columns, strict=True)
+        ],
+        "imbalance": _number(proof.imbalance),
+        "gap_mm": proof.gap_mm,
+        "proven": proof.proven,
+        "witnesses": [
+            {"index": row, "x_mm": x, "y_mm": y}
+            for row, (x, y) in zip(proof.witnesses.tolist(), proof.witness_place_mm.tolist(), strict=True)
+        ],
+        "boxes": proof.boxes,
+        "finest_mm": _number(proof.finest_mm),
+        "words": proof.words,
+    }
+
+
+def pose_json(pose: "RigidTransform") -> dict[str, Any]:
+    """A motion from section to nominal coordinates."""
+    return {"rotation_deg": math.degrees(pose.rotation_rad), "translation_mm": [float(value) for value in pose.translation_mm]}
+
+
+def _worst(worst: "WorstPlace") -> dict[str, float]:
+    return {"station_mm": worst.station_mm, "x_mm": worst.x_mm, "y_mm": worst.y_mm, "deviation_mm": worst.deviation_mm}
+
+
+def _number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None

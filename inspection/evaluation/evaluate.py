@@ -1,0 +1,57 @@
+"""All characteristics of a run, and the verdict on the part: that of the worst of them, with its reasons first."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+
+from inspection.characteristics.characteristic import (
+    Characteristic,
+    CharacteristicResult,
+    LineProfile,
+    WholeProfile,
+)
+from inspection.conclusion import Missing, Reason
+from inspection.evaluation.basis import Basis
+from inspection.evaluation.line_profile import judge_profile, judge_whole
+from inspection.evaluation.section_value import ActualOutlines, judge_value
+from inspection.result import InspectionResult
+from inspection.terms import Terms
+from inspection.verdict import Verdict
+
+PROFILE = WholeProfile("profile")
+"""What a plan without characteristics asks for."""
+
+
+def evaluate(asked: Sequence[Characteristic], result: InspectionResult, terms: Terms, missing: Missing, complete: bool) -> InspectionResult:
+    """The result of a run with its characteristics, and with the verdict on the part that follows from them.
+
+    asked  : in the order of the plan; none asks for the profile alone
+    result : the profile as the run judged it on its terms
+    """
+    basis = Basis(result, terms, missing, complete)
+    outlines = ActualOutlines(basis)
+    found = tuple(_judge(one, basis, outlines) for one in asked or (PROFILE,))
+    return replace(result, characteristics=found, verdict=max(one.verdict for one in found), reasons=_reasons_of_part(found))
+
+
+def doubt_part(result: InspectionResult, reasons: tuple[Reason, ...]) -> InspectionResult:
+    """The result where nothing of the part is proven, whatever was found, for reasons that stand before all others."""
+    doubted = tuple(replace(one, verdict=Verdict.UNCERTAIN, reasons=(*reasons, *one.reasons)) for one in result.characteristics)
+    return replace(result, verdict=Verdict.UNCERTAIN, reasons=(*reasons, *result.reasons), characteristics=doubted)
+
+
+def _judge(asked: Characteristic, basis: Basis, outlines: ActualOutlines) -> CharacteristicResult:
+    if isinstance(asked, WholeProfile):
+        return judge_whole(asked, basis)
+    return judge_profile(asked, basis) if isinstance(asked, LineProfile) else judge_value(asked, basis, outlines)
+
+
+def _reasons_of_part(found: Sequence[CharacteristicResult]) -> tuple[Reason, ...]:
+    """The reasons of all characteristics, those of the worst first; each begins with the name, but for those that several share."""
+    shared = Counter(reason for one in found for reason in set(one.reasons))
+    told: dict[Reason, None] = {}
+    for one in sorted(found, key=lambda one: -one.verdict):
+        for reason in one.reasons:
+            alone = len(found) == 1 or shared[reason] > 1
+            told[reason if alone else Reason(reason.kind, f"{one.name}: {reason.words}")] = None
+    return tuple(told)

@@ -1,0 +1,150 @@
+"""The pose at which a characteristic of the profile is judged: that of the run, the datum, or one of its own fits.
+
+Every fit begins at the datum, or at the pose of the run where there is none: a region alone could lie in many places, and what it is
+is known. What is said of every placement is said of the points of the region on the whole nominal.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inspection.certificate import certify_minimum_zone
+from inspection.characteristics.characteristic import LineProfile
+from inspection.consumption import ConsumptionFit, fit_least_consumption
+from inspection.evaluation.basis import Basis
+from inspection.freedoms import Freedoms
+from inspection.limited_fit import register_within
+from inspection.minimum_zone import MinimumZone, fit_minimum_zone
+from inspection.registration import Registration
+from inspection.rigid import RigidTransform
+from inspection.zone_certificate import ZoneCertificate
+from inspection.zones import VaryingZone
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.int64]
+
+_GAP_SHARE = 1e-3  # of the zone's width: by so much the proof of a minimum zone may fall short of it, and by 0.01 um at least
+_GAP_MM = 1e-5
+_MOST_BOXES = 200_000
+_FEWEST_POINTS = 4  # of a fit: one more than there are freedoms
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Placed:
+    """Where a characteristic is judged.
+
+    pose        : nominal from section
+    fit         : how it was found, in words, with what was locked or limited
+    is_known    : no fit could have put the part elsewhere: the pose is the datum, or was given
+    is_free     : the fit could make every motion
+    converged   : the fit settled
+    certificate : of a minimum zone over every placement; its rows are those of the run
+    """
+
+    pose: RigidTransform
+    fit: str
+    is_known: bool = False
+    is_free: bool = False
+    converged: bool = True
+    certificate: ZoneCertificate | None = None
+
+
+def place(asked: LineProfile, basis: Basis, rows: Rows) -> Placed:
+    """Find the pose of a characteristic from the rows (k,) of its region, in any order."""
+    start = basis.pose if asked.datum is None else asked.datum
+    start_known = asked.datum is not None or basis.terms.known_pose is not None
+    if asked.fit in ("none", "datum") or len(rows) < _FEWEST_POINTS:
+        return Placed(start, "datum" if asked.fit == "datum" else "none", is_known=start_known)
+    points = basis.result.section_at(rows)
+    freedoms = asked.freedoms or _all_free(points, start)
+    best = register_within(
+        points,
+        basis.nominal,
+        start,
+        freedoms,
+        basis.terms.method,
+        basis.terms.tip_radius_mm,
+        target_mm=middle_of(asked.zone, basis, rows),
+        weights=basis.terms.weights,
+    )
+    words, free = _words(asked), asked.freedoms is None
+    if asked.fit == "best-fit":
+        registration = best.registration
+        return Placed(registration.nominal_from_section.snap_to_grid(), words, start_known and not free, free, registration.converged)
+    if asked.fit == "tolerance":
+        least = consume_least(asked, basis, points, best.registration.nominal_from_section, None if free else start)
+        return Placed(least.nominal_from_section.snap_to_grid(), words, False, free, least.converged)
+    if not free:
+        zone = shrink_zone(asked, basis, points, start)
+        return Placed(zone.nominal_from_section.snap_to_grid(), words, False, False, zone.converged)
+    certificate = _certify(
+        basis, points, best.registration, middle_of(asked.zone, basis, rows), asked.zone.upper_mm[0] - asked.zone.lower_mm[0]
+    )
+    return Placed(certificate.nominal_from_section.snap_to_grid(), words, False, True, certificate.balanced, _in_run(certificate, rows))
+
+
+def middle_of(zone: VaryingZone, basis: Basis, rows: Rows) -> float:
+    """The deviation that a best fit aims at: the middle of the zone, of one that varies its mean over the points of the region."""
+    if is_constant(zone):
+        return float(zone.lower_mm[0] + zone.upper_mm[0]) / 2
+    lower, upper, _, _ = zone.limits(np.unique(basis.result.station_mm[rows]))
+    return float(np.mean((lower + upper) / 2))
+
+
+def is_constant(zone: VaryingZone) -> bool:
+    """Whether a zone has the same limits everywhere."""
+    return bool(np.ptp(zone.lower_mm) == 0 and np.ptp(zone.upper_mm) == 0)
+
+
+def consume_least(
+    asked: LineProfile, basis: Basis, points: Array, start: RigidTransform, limited_from: RigidTransform | None = None
+) -> ConsumptionFit:
+    """The pose near a start that consumes least of the zone; where freedoms are limited they count from another."""
+    begin, freedoms = (start, None) if limited_from is None else (limited_from, asked.freedoms)
+    terms = basis.terms
+    return fit_least_consumption(points, basis.nominal, asked.zone, begin, terms.method, terms.tip_radius_mm, freedoms=freedoms)
+
+
+def shrink_zone(asked: LineProfile, basis: Basis, points: Array, start: RigidTransform) -> MinimumZone:
+    """The pose near a start with the smallest zone, within the freedoms."""
+    terms, middle = basis.terms, float(asked.zone.lower_mm[0] + asked.zone.upper_mm[0]) / 2
+    return fit_minimum_zone(points, basis.nominal, start, terms.method, terms.tip_radius_mm, middle, freedoms=asked.freedoms)
+
+
+def certify_run(basis: Basis) -> ZoneCertificate | None:
+    """The certificate of the minimum zone of a run's points, begun at its pose; None where it judged none."""
+    rows, zone = basis.few(basis.rows(None)), basis.terms.zone
+    if len(rows) < _FEWEST_POINTS:
+        return None
+    points = basis.result.section_at(rows)
+    return _in_run(_certify(basis, points, basis.result.registration, zone.middle_mm, zone.upper_mm - zone.lower_mm), rows)
+
+
+def _certify(basis: Basis, points: Array, start: Registration, middle_mm: float, width_mm: float) -> ZoneCertificate:
+    """The minimum zone of points (k, 2) near a start, and what is proven of every other placement."""
+    gap_mm = max(_GAP_MM, _GAP_SHARE * float(width_mm))
+    return certify_minimum_zone(points, basis.nominal, start, basis.terms.tip_radius_mm, middle_mm, gap_mm, _MOST_BOXES)
+
+
+def _in_run(certificate: ZoneCertificate, rows: Rows) -> ZoneCertificate:
+    """A certificate whose points have the numbers of their rows in the run."""
+    return replace(certificate, active=rows[certificate.active], witnesses=rows[certificate.witnesses])
+
+
+def _all_free(points: Array, start: RigidTransform) -> Freedoms:
+    """Every motion, about the middle of the points."""
+    return Freedoms.about(start.apply(points).mean(axis=0))
+
+
+def _words(asked: LineProfile) -> str:
+    """How a pose was fitted, with what was locked or limited."""
+    if asked.freedoms is None:
+        return asked.fit
+    free = asked.freedoms
+    each = []
+    for name, low, high in zip(free.names, free.lower.tolist(), free.upper.tolist(), strict=True):
+        unit, turn = ("deg", float(np.degrees(1.0))) if name == "rotation" else ("mm", 1.0)
+        each.append(name if np.isinf(low) and np.isinf(high) else f"{name} {low * turn:g} .. {high * turn:g} {unit}")
+    pivot = free.pivot_mm.tolist()
+    return f"{asked.fit}, free: {', '.join(each) or 'none'} about ({pivot[0]:g}, {pivot[1]:g}) mm"

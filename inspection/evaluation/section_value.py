@@ -1,0 +1,250 @@
+"""Numbers of an airfoil section: measured on the actual section by the method that gave the nominal one, and held against limits.
+
+A value stands on places of the section. Where one of them was not measured, or the stretch that the method looks at has a gap longer
+than is allowed, neither side is proven, however the spline bridges it.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import cast, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inspection.characteristics.actual import ActualSection, draw_actual_section
+from inspection.characteristics.camber import maximum_camber
+from inspection.characteristics.characteristic import (
+    CharacteristicResult,
+    SectionCharacteristic,
+    SectionKind,
+    consumption_of,
+    rule_words,
+    verdict_of,
+)
+from inspection.characteristics.chord import ChordAngleMethod, ChordMethod, chord, chord_angle
+from inspection.characteristics.edge_radius import EdgeRadiusMethod, edge_radius
+from inspection.characteristics.inscribed import CamberLine, find_camber_line
+from inspection.characteristics.outline import AirfoilSection
+from inspection.characteristics.placement import displacement, twist_by_fit
+from inspection.characteristics.section_value import SectionValue, angle_within_half_a_turn, no_places
+from inspection.characteristics.thickness import ThicknessMethod, edge_thickness, maximum_thickness
+from inspection.conclusion import Reason
+from inspection.errors import InspectionError
+from inspection.evaluation.basis import Basis, filter_deviations
+from inspection.evaluation.region import features_of, region_around
+from inspection.filters import ProfileFilter
+from inspection.freedoms import Freedoms
+from inspection.gaps import Measured
+from inspection.limited_fit import register_within
+from inspection.registration import Registration
+from inspection.signed_deviations import deviations
+from inspection.verdict import Verdict
+
+Array = NDArray[np.float64]
+
+METHODS_OF_SECTIONS: Mapping[SectionKind, tuple[str, ...]] = {
+    "chord": get_args(ChordMethod),
+    "chord-angle": get_args(ChordAngleMethod),
+    "thickness": get_args(ThicknessMethod),
+    "edge-thickness": ("tip-arc",),
+    "edge-radius": get_args(EdgeRadiusMethod),
+    "camber": ("inscribed",),
+    "twist": ("best-fit", *get_args(ChordAngleMethod)),
+    "displacement": ("best-fit",),
+}
+PLACED: tuple[SectionKind, ...] = ("chord-angle", "twist", "displacement")  # kinds that are counted from a datum
+
+_NO_DATUM = "It is counted from a datum (registration.datum): a fit of all freedoms leaves nothing of it."
+_TIP_KNOTS = 3.0  # knots of the actual section to either side of a tip, on which its curvature depends
+_AXES = {"x": 0, "y": 1, "total": 2}
+
+
+class Outline:
+    """A section, nominal or actual, with the camber line that several of its values share; it is found when it is first asked for."""
+
+    def __init__(self, section: AirfoilSection) -> None:
+        self.section = section
+        self._camber: CamberLine | None = None
+
+    @property
+    def camber(self) -> CamberLine:
+        """The camber line."""
+        if self._camber is None:
+            self._camber = find_camber_line(self.section)
+        return self._camber
+
+
+_MEASURES: Mapping[str, Callable[[Outline, SectionCharacteristic], SectionValue]] = {
+    "chord": lambda of, asked: chord(of.section, of.camber, cast(ChordMethod, asked.method)),
+    "chord-angle": lambda of, asked: chord_angle(of.section, of.camber, cast(ChordAngleMethod, asked.method)),
+    "thickness": lambda of, asked: maximum_thickness(of.section, of.camber, cast(ThicknessMethod, asked.method)),
+    "edge-thickness": lambda of, asked: edge_thickness(of.section, of.camber, asked.edge, asked.offset_mm),
+    "edge-radius": lambda of, asked: edge_radius(of.section, asked.edge, cast(EdgeRadiusMethod, asked.method), asked.window_deg),
+    "camber": lambda of, asked: maximum_camber(of.section, of.camber),
+}
+
+
+def with_nominal(asked: SectionCharacteristic, nominal: Outline) -> SectionCharacteristic:
+    """The characteristic with the value of the nominal section. Raises InspectionError where the section has none by that method."""
+    if asked.method not in METHODS_OF_SECTIONS[asked.type]:
+        raise ValueError(f"the method of {asked.type} is {' or '.join(METHODS_OF_SECTIONS[asked.type])}, not {asked.method!r}")
+    if asked.type == "displacement" or (asked.type == "twist" and asked.method == "best-fit"):
+        found = SectionValue(asked.type, asked.method, 0.0, "deg" if asked.type == "twist" else "mm", no_places(), ())
+    elif asked.type == "twist":
+        found = chord_angle(nominal.section, nominal.camber, cast(ChordAngleMethod, asked.method))
+    else:
+        found = _MEASURES[asked.type](nominal, asked)
+    drawn = 0.0 if asked.type == "twist" else found.value
+    value = drawn if math.isnan(asked.nominal_value) else asked.nominal_value
+    return replace(asked, section=nominal.section, nominal=found, nominal_value=value)
+
+
+class ActualOutlines:
+    """The actual section of a run, drawn once for every filter that is asked for, and the best fit of its points."""
+
+    def __init__(self, basis: Basis) -> None:
+        self._basis = basis
+        self._drawn: dict[ProfileFilter | None, tuple[ActualSection, Outline]] = {}
+        self._fit: Registration | None = None
+
+    def drawn(self, asked: SectionCharacteristic) -> tuple[ActualSection, Outline]:
+        """The actual section as a characteristic wants it. Raises InspectionError where too few points lie on it."""
+        assert asked.section is not None
+        if asked.filter not in self._drawn:
+            d = self._basis.deviations_at(self._basis.few(self._basis.rows(None)), self._basis.pose)
+            filtered = None if asked.filter is None else filter_deviations(d, self._basis.nominal, asked.filter).waviness_mm.copy()
+            actual = draw_actual_section(asked.section, d, filtered, asked.filter, gap_max_mm=self._basis.result.gap_max_mm)
+            self._drawn[asked.filter] = actual, Outline(actual.section)
+        return self._drawn[asked.filter]
+
+    def best_fit(self) -> Registration:
+        """The best fit of all points, from the pose of the run on."""
+        if self._fit is None:
+            basis, terms = self._basis, self._basis.terms
+            points = basis.result.section_at(basis.few(basis.rows(None)))
+            free = Freedoms.about(basis.pose.apply(points).mean(axis=0))
+            settings = (terms.method, terms.tip_radius_mm, terms.target_mm, terms.weights)
+            self._fit = register_within(points, basis.nominal, basis.pose, free, *settings).registration
+        return self._fit
+
+
+def judge_value(asked: SectionCharacteristic, basis: Basis, outlines: ActualOutlines) -> CharacteristicResult:
+    """A number of the section with its limits, its deviation and its verdict."""
+    nominal = asked.nominal
+    assert nominal is not None
+    try:
+        if asked.type in PLACED and asked.datum is None:
+            raise InspectionError(_NO_DATUM)
+        value, actual = _find(asked, basis, outlines)
+    except InspectionError as error:
+        conclusion = basis.conclude(Verdict.UNCERTAIN, Reason("no-value", _sentence(str(error))), basis.measured(None), basis.result.judged)
+        return replace(_bare(asked, nominal), verdict=conclusion.verdict, reasons=conclusion.reasons)
+    deviation = value.value - asked.nominal_value
+    deviation = angle_within_half_a_turn(deviation) if nominal.unit == "deg" else deviation
+    measured = _measured(asked, basis, value, actual)
+    points, why = _judge(asked, value, deviation, measured, basis, actual)
+    conclusion = basis.conclude(points, why, measured, basis.result.judged)
+    places = tuple((name, float(x), float(y)) for name, (x, y) in zip(value.place_names, value.places_mm.tolist(), strict=True))
+    return replace(
+        _bare(asked, nominal),
+        method=_method_words(value),
+        value=value.value,
+        deviation=deviation,
+        consumption=consumption_of(deviation, asked.lower, asked.upper),
+        verdict=conclusion.verdict,
+        reasons=conclusion.reasons,
+        pose=basis.pose,
+        coverage=measured.coverage,
+        gap_mm=measured.gap.length_mm,
+        places_mm=places,
+        notes=(*value.notes, *(actual.notes[:1] if actual is not None else ())),
+    )
+
+
+def _bare(asked: SectionCharacteristic, nominal: SectionValue) -> CharacteristicResult:
+    """What is known of a characteristic before anything is measured."""
+    placed = asked.type in PLACED
+    return CharacteristicResult(
+        name=asked.name,
+        type=asked.type,
+        method=_method_words(nominal),
+        value=math.nan,
+        nominal=asked.nominal_value,
+        unit=nominal.unit,
+        lower=asked.lower,
+        upper=asked.upper,
+        deviation=math.nan,
+        consumption=math.nan,
+        uncertainty=asked.uncertainty,
+        rule=rule_words(asked.uncertainty, nominal.unit),
+        verdict=Verdict.UNCERTAIN,
+        reasons=(),
+        fit="datum" if placed else "none",
+        filter=asked.filter.words if asked.filter else "none",
+        region_words=f"{asked.edge} edge" if asked.type in ("edge-radius", "edge-thickness") else "whole profile",
+    )
+
+
+def _find(asked: SectionCharacteristic, basis: Basis, outlines: ActualOutlines) -> tuple[SectionValue, ActualSection | None]:
+    """The actual value, and the drawn section that it was found on; a place or an angle as the datum sees it."""
+    if asked.datum is not None and (asked.type == "displacement" or (asked.type == "twist" and asked.method == "best-fit")):
+        fit = outlines.best_fit()
+        seen = replace(fit, nominal_from_section=fit.nominal_from_section.after(asked.datum.inverse()))
+        return (twist_by_fit(seen) if asked.type == "twist" else displacement(seen, asked.place_mm)[_AXES[asked.axis]]), None
+    actual, outline = outlines.drawn(asked)
+    if asked.type not in PLACED:
+        return _MEASURES[asked.type](outline, asked), actual
+    assert asked.datum is not None
+    angle = chord_angle(outline.section, outline.camber, cast(ChordAngleMethod, asked.method))
+    turned = angle_within_half_a_turn(angle.value + math.degrees(asked.datum.rotation_rad - basis.pose.rotation_rad))
+    if asked.type == "chord-angle":
+        return replace(angle, value=turned), actual
+    assert asked.nominal is not None
+    return replace(angle, name="twist", value=angle_within_half_a_turn(turned - asked.nominal.value)), actual
+
+
+def _measured(asked: SectionCharacteristic, basis: Basis, value: SectionValue, actual: ActualSection | None) -> Measured:
+    """How much was measured of what the value depends on: of an edge the stretch around it, else the whole profile."""
+    if actual is None or asked.type not in ("edge-radius", "edge-thickness"):
+        return basis.measured(None)
+    where = (
+        value.places_mm[:2] if asked.type == "edge-thickness" else value.places_mm[2:] if len(value.places_mm) > 2 else value.places_mm[:1]
+    )
+    stations = deviations(where, basis.nominal).station_mm
+    regions = region_around(features_of(basis.nominal, asked.section), asked.edge, stations, _TIP_KNOTS * actual.knots_mm)
+    found = [basis.measured(region) for region in regions]
+    return Measured(min(one.coverage for one in found), max((one.gap for one in found), key=lambda gap: gap.length_mm))
+
+
+def _judge(
+    asked: SectionCharacteristic, value: SectionValue, deviation: float, measured: Measured, basis: Basis, actual: ActualSection | None
+) -> tuple[Verdict, Reason | None]:
+    """The verdict on a value, and its reason; nothing is proven of one that stands on what was not measured."""
+    unseen = actual.unseen_place(value) if actual is not None else None
+    if unseen is not None:
+        return Verdict.UNCERTAIN, Reason("unseen", f"It was found where nothing was measured ({unseen}); measure that stretch.")
+    verdict, unit = verdict_of(deviation, asked.lower, asked.upper, asked.uncertainty), value.unit if value.unit != "1" else ""
+    if verdict is Verdict.CONFORM:
+        return verdict, None
+    limits = f"{_limit(asked.lower)} .. {_limit(asked.upper)} {unit}".rstrip()
+    told = f"{value.value:.6g} {unit}, {deviation:+.4g} from the nominal {asked.nominal_value:.6g}; {limits} are allowed"
+    if verdict is Verdict.UNCERTAIN:
+        return verdict, Reason("within-uncertainty", f"It is {told}: nearer to a limit than U = {asked.uncertainty:g} {unit}.")
+    if measured.gap.length_mm > basis.terms.limits.gap_max_mm * (1 + 1e-9):
+        return Verdict.UNCERTAIN, Reason("unseen", f"It is {told}; a part of what it depends on was not measured.")
+    return verdict, Reason("out-of-tolerance", f"It is {told}.")
+
+
+def _limit(limit: float) -> str:
+    return f"{limit:+g}" if math.isfinite(limit) else "no limit"
+
+
+def _method_words(value: SectionValue) -> str:
+    """The method of a value with its window, such as "circle, window 30 deg"."""
+    window = (f"{name.rpartition('_')[0].replace('_', ' ')} {number:g} {name.rpartition('_')[2]}" for name, number in value.window)
+    return ", ".join([value.method, *window])
+
+
+def _sentence(words: str) -> str:
+    return words[:1].upper() + words[1:].removesuffix(".") + "."
