@@ -291,11 +291,18 @@ def rehearse(nominal: NominalProfile, method: Method = "exact", reject_outliers:
 
     Takes seconds on the first use after an installation, milliseconds from the cache afterwards.
     """
-    with fit_compiled_beside():
+    with fit_compiled_beside(reject_outliers) as fit_comes:
         compile_projection()
-    live = LiveInspection(nominal, ToleranceZone(-1.0, 1.0), method=method, reject_outliers=reject_outliers)
+        if fit_comes:  # meanwhile all that needs no fit
+            _rehearse(nominal, LiveInspection(nominal, ToleranceZone(-1.0, 1.0), datum=RigidTransform.identity(), method=method))
+    _rehearse(nominal, LiveInspection(nominal, ToleranceZone(-1.0, 1.0), method=method, reject_outliers=reject_outliers))
+
+
+def _rehearse(nominal: NominalProfile, live: LiveInspection) -> None:
+    """Inspect points of the nominal itself."""
     points = nominal.points_mm[:: max(1, len(nominal) // (4 * BLOCK))].copy()  # as a device gives them: of one type to the compiler
     live.add(np.column_stack([points, np.zeros(len(points))]))
     live.add(points)
+    live.add(points[:1])  # few points are judged by a loop of their own
     live.snapshot()
     live.finish()

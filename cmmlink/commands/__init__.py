@@ -17,7 +17,7 @@ from cmmlink.commands.console import serve_console
 from cmmlink.commands.exit_codes import DEVICE_FAILED, NO_RECORD, STOPPED, UNUSABLE, fail, fail_as_asked
 from cmmlink.commands.measure import demo, inspect, run
 from cmmlink.commands.records import export, replay, runs, show, verify
-from cmmlink.commands.setup import check, doctor, list_ports, nominal, simulate
+from cmmlink.commands.setup import check, doctor, list_ports, nominal, prepare, simulate
 from cmmlink.commands.surfaces import ManyHeights, ct
 from cmmlink.errors import PlanError, RunError, StoreError
 from cmmlink.log import keep_log, log_command, log_folder
@@ -40,6 +40,7 @@ app.command(cls=ManyHeights)(ct)
 app.command()(nominal)
 app.command()(check)
 app.command("console")(serve_console)
+app.command()(prepare)
 app.command()(doctor)
 app.command("ports")(list_ports)
 app.command(add_help_option=False, context_settings={"allow_extra_args": True, "ignore_unknown_options": True})(simulate)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cmmlink.commands.exit_codes import UNUSABLE
+from cmmlink.commands.exit_codes import UNUSABLE, fail
 from cmmlink.commands.options import Closed, Json, PlanFile, Records, records_folder
 from cmmlink.commands.output import now, print_json
 from cmmlink.errors import PlanError
@@ -78,6 +78,23 @@ def check(plan_file: PlanFile) -> int:
     typer.echo(f"nominal {profile.length_mm:.3f} mm long, {len(profile)} samples, material on the {profile.material}")
     for note in notes:
         typer.echo(f"  note: {note}")
+    return 0
+
+
+def prepare() -> int:
+    """Compile the inspection, once after an installation, so that no measurement waits for it."""
+    from cmmlink.demo import plan_file as demo_plan_file
+    from cmmlink.from_plan import profile_of
+    from cmmlink.plan import load_plan
+    from inspection import compiled_code_folder, rehearse
+
+    profile = profile_of(load_plan(demo_plan_file()))
+    rehearse(profile, "veaw", reject_outliers=True)  # the method and the fit that need the most
+    rehearse(profile)
+    folder = compiled_code_folder()
+    if folder is None:
+        return fail("no folder for compiled code can be written, so that every command compiles anew", UNUSABLE)
+    typer.echo(f"the inspection is compiled, in {folder}")
     return 0
 
 

@@ -228,12 +228,22 @@ def _median_near(values: Array, guess: float) -> float:
     return float(np.partition(inside, ranks)[ranks].mean())
 
 
-def compile_fit() -> None:
-    """Compile the search and the fit, or load them, as `PoseFit.settle` takes them. No point is settled, so none is projected."""
+def compile_fit(outliers: bool = False) -> None:
+    """Compile the search and the fit, or load them, as `PoseFit` takes them. No point is settled, so none is projected.
+
+    outliers : that which finds outliers as well
+    """
     search_code()
     none, integers = np.empty(0), np.frombuffer(bytes(4), dtype=np.int32)
     problem = (none, NONE_LEFT_OUT, none, NO_PROJECTION[0][0], integers, 1.0, 0.0)
-    _settle_pose(problem, NO_PROJECTION, (NONE_LEFT_OUT, NONE_LEFT_OUT, none, empty_feet(1)), np.zeros(6), np.empty((3, 3)), 0)
+    memory, chunks = (NONE_LEFT_OUT, NONE_LEFT_OUT, none, empty_feet(1)), np.empty(0, dtype=np.int64)
+    _settle_pose(problem, NO_PROJECTION, memory, np.zeros(6), np.empty((3, 3)), 0)
+    marks, tukey, span = (NONE_LEFT_OUT, NONE_LEFT_OUT), (0.0, _NO_WEIGHING), (0.0, 0.0, 1.0)
+    add_up(problem, NO_PROJECTION, (0.0, 0.0, 0.0), span, marks, chunks, tukey, np.zeros(1, dtype=np.int64), np.empty((0, SUMS)))
+    _next_pose((0.0, 0.0, 0.0), span, np.zeros(SUMS), 1.0)
+    if outliers:
+        limit, found = OutlierLimit(1.0, 0.0, 0.0), np.empty(0, dtype=np.bool_)
+        _find_outliers(problem, NO_PROJECTION, memory, np.zeros(4), limit, 0, found, none)
 
 
 @kernel

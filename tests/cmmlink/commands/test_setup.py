@@ -1,6 +1,8 @@
 """The commands `nominal`, `ports` and `simulate`."""
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -85,3 +87,42 @@ def test_an_address_that_cannot_be_served_is_named(tmp_path: Path) -> None:
     path = write_points(tmp_path / "path.csv", oval_points(0.0))
     message = cmmlink("simulate", "serial", "--address", "nowhere", "--path", path).failed(4)
     assert message.startswith("the simulated device cannot serve nowhere: ")
+
+
+LEFT_TO_COMPILE = """
+import contextlib, io, sys
+from typing import get_args
+from cmmlink.commands.setup import prepare
+from inspection import Method, discretize, rehearse
+from tests.inspection import profiles
+
+def compiled():
+    files = [file for name, file in sys.modules.items() if name.startswith("inspection.kernels.")]
+    kernels = {name: kernel for file in files for name, kernel in vars(file).items() if hasattr(kernel, "signatures")}
+    return {name: len(kernel.signatures) for name, kernel in kernels.items()}
+
+with contextlib.redirect_stdout(io.StringIO()):
+    assert prepare() == 0
+before, nominal = compiled(), discretize(profiles.p3(), samples=400)
+for method in get_args(Method):
+    rehearse(nominal, method, reject_outliers=True)
+    rehearse(nominal, method)
+after = compiled()
+print(sum(after.values()), *(name for name in after if after[name] != before.get(name)))
+"""
+
+
+def test_nothing_is_left_to_compile_after_prepare_whatever_the_method() -> None:
+    ended = subprocess.run([sys.executable, "-c", LEFT_TO_COMPILE], capture_output=True, text=True, check=True)
+    count, *left = ended.stdout.split()
+    assert int(count) > 12
+    assert left == []
+
+
+def test_prepare_says_where_the_compiled_code_is_or_that_it_cannot_be_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("inspection.compiled_code_folder", lambda: Path("/somewhere"))
+    ended = cmmlink("prepare")
+    assert ended.code == 0
+    assert str(Path("/somewhere")) in ended.out
+    monkeypatch.setattr("inspection.compiled_code_folder", lambda: None)
+    assert "compiles anew" in cmmlink("prepare").refused()

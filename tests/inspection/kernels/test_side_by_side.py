@@ -1,5 +1,6 @@
 """Two processes that compile at once: the other one is started where it pays, and its end is waited for, whatever happens."""
 
+import gc
 import os
 import subprocess
 import sys
@@ -9,11 +10,12 @@ from typing import Any
 
 import pytest
 
-from inspection.kernels import PoseFit, pose, side_by_side
+from inspection.kernels import OutlierLimit, PoseFit, pose, side_by_side
+from inspection.kernels.pose_sums import add_up
 from inspection.kernels.side_by_side import fit_compiled_beside
 from tests.inspection import profiles
 
-MARK = "import sys; from pathlib import Path; Path({!r}).write_text(sys.argv[1])"
+MARK = "import sys; from pathlib import Path; Path({!r}).write_text(chr(10).join(sys.argv[1:]))"
 
 
 @pytest.fixture
@@ -26,9 +28,14 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_the_other_process_has_ended_with_the_block_and_imports_this_very_package(folder: Path) -> None:
-    with fit_compiled_beside():
-        pass
-    assert Path((folder / "mark").read_text()) / "inspection" / "kernels" == Path(side_by_side.__file__).parent
+    for outliers in (False, True):
+        with fit_compiled_beside(outliers) as comes:
+            assert comes
+            assert not gc.isenabled()
+        assert gc.isenabled()
+        root, asked = (folder / "mark").read_text().splitlines()
+        assert Path(root) / "inspection" / "kernels" == Path(side_by_side.__file__).parent
+        assert asked == ("outliers" if outliers else "fit")
 
 
 def test_no_other_process_where_the_fit_is_on_disk_or_there_is_one_processor(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -38,8 +45,9 @@ def test_no_other_process_where_the_fit_is_on_disk_or_there_is_one_processor(fol
     monkeypatch.setattr(os, "cpu_count", lambda: 2)
     (folder / "of_this_package").mkdir()
     (folder / "of_this_package" / "pose._settle_pose-128.py311.nbi").touch()
-    with fit_compiled_beside():
-        pass
+    with fit_compiled_beside() as comes:
+        assert not comes
+        assert gc.isenabled()
     assert not (folder / "mark").exists()
 
 
@@ -59,6 +67,7 @@ def test_an_error_in_the_block_ends_the_other_process_at_once(monkeypatch: pytes
         raise KeyboardInterrupt
     assert started[0].returncode is not None
     assert time.monotonic() - began < 30
+    assert gc.isenabled()
 
 
 @pytest.mark.usefixtures("folder")
@@ -70,8 +79,14 @@ def test_where_no_process_can_be_started_this_one_goes_on(monkeypatch: pytest.Mo
 
 
 def test_nothing_is_left_to_compile_for_a_fit_once_it_was_compiled_without_a_point() -> None:
-    pose.compile_fit()
-    compiled = len(pose._settle_pose.signatures)  # type: ignore[attr-defined]  # numba has no types
+    pose.compile_fit(outliers=True)
+    kernels: list[Any] = [pose._settle_pose, pose._find_outliers, pose._next_pose, add_up]
+    compiled = [len(kernel.signatures) for kernel in kernels]
     nominal = profiles.nominal_of("P3", 500)
-    PoseFit(nominal.points_mm + 0.01, nominal.grid, None, "exact", nominal.outward, 0.0).settle((0.0, 0.0, 0.0), 5)
-    assert len(pose._settle_pose.signatures) == compiled  # type: ignore[attr-defined]
+    fit = PoseFit(nominal.points_mm + 0.01, nominal.grid, None, "exact", nominal.outward, 0.0)
+    fit.settle((0.0, 0.0, 0.0), 5)
+    fit.settle_nearby((0.0, 0.0, 0.0))
+    limit = OutlierLimit(10.0, 1e-3, 1e-6)
+    fit.find_outliers_nearby(fit.find_outliers((0.0, 0.0, 0.0), limit, 5), limit)
+    assert [len(kernel.signatures) for kernel in kernels] == compiled
+    assert all(compiled)
