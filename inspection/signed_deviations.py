@@ -8,7 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from inspection.curve import NurbsCurve
 from inspection.inversion import invert_points
-from inspection.kernels import Feet, project, project_on_samples, turn_outward
+from inspection.kernels import Feet, project, project_on_samples, project_outward
+from inspection.kernels.layout import INSIDE, OPEN_END
 from inspection.methods import Method
 from inspection.nominal import NominalProfile
 
@@ -73,14 +74,26 @@ def deviations(points_mm: ArrayLike, nominal: NominalProfile, method: Method = "
                     on the bottom: that stretch stays unmeasured. Raises ValueError for a radius that no ball has,
                     and for a ball that fits nowhere.
     """
-    points = check_points(points_mm)
+    points = _pairs(points_mm)
     check_tip_radius(tip_radius_mm, nominal)
     check_method(method)
-    feet = feet_on(points, nominal, method)
-    if method == "exact" and nominal.curve.closed:
+    if method == "inversion":
+        return _invert(check_points(points), nominal, tip_radius_mm)
+    asked = (nominal.grid, nominal.table_for(method), method, nominal.outward, tip_radius_mm, KILOMETRE_MM)
+    feet, beyond_end, at_vertex, is_any_far, is_any_at_seam = project_outward(points, *asked)
+    if is_any_far:
+        check_points(points)
+    if is_any_at_seam and method == "exact" and nominal.curve.closed:
         _set_seam(feet, nominal.curve)
-    beyond_end, at_vertex, _ = turn_outward(feet, nominal.outward, tip_radius_mm)
     return Deviations(feet.distance_mm, feet.foot_mm, feet.parameter, feet.station_mm, feet.gradient, feet.curvature, beyond_end, at_vertex)
+
+
+def _invert(points_mm: Array, nominal: NominalProfile, tip_radius_mm: float) -> Deviations:
+    """Signed deviations of points (m, 2) by point inversion."""
+    feet = invert_points(points_mm, nominal)
+    deviation, normal = nominal.outward * feet.distance_mm - tip_radius_mm, nominal.outward * feet.gradient
+    ends, vertices = feet.vertex == OPEN_END, feet.vertex != INSIDE
+    return Deviations(deviation, feet.foot_mm, feet.parameter, feet.station_mm, normal, feet.curvature, ends, vertices)
 
 
 def _set_seam(feet: Feet, curve: NurbsCurve) -> None:

@@ -11,15 +11,15 @@ What the rest of the project may call stands here; the files behind it are this 
 TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer to load than all of this
 
 if TYPE_CHECKING:
-    from inspection.kernels.blocks import CurveTables, compile_projection, project
+    from inspection.kernels.blocks import CurveTables, compile_projection
     from inspection.kernels.compile_notice import while_compiling
     from inspection.kernels.compiling import compiled_code_folder
-    from inspection.kernels.feet import Feet, Marks, Room, turn_outward
+    from inspection.kernels.feet import Feet, Marks, Room
     from inspection.kernels.growing import GrowingSums
-    from inspection.kernels.layout import SAMPLE_METHODS
-    from inspection.kernels.on_samples import SampleTables, project_on_samples
+    from inspection.kernels.layout import AT_ONCE, SAMPLE_METHODS
+    from inspection.kernels.on_samples import SampleTables
     from inspection.kernels.pose import NONE_LEFT_OUT, OutlierLimit, PoseEstimate, PoseFit
-    from inspection.kernels.pose_sums import AT_ONCE
+    from inspection.kernels.projection import Turned, project, project_on_samples, project_outward
     from inspection.kernels.rows import JUDGED_AS, TALLY, Columns, Judgement, Places, judge_few_rows, judge_rows, take_in
     from inspection.kernels.side_by_side import fit_compiled_beside
     from inspection.kernels.thinning import strides
@@ -27,15 +27,15 @@ else:
     from inspection.front_door import load_on_use
 
     _PLACES = {
-        "inspection.kernels.blocks": ("CurveTables", "compile_projection", "project"),
+        "inspection.kernels.blocks": ("CurveTables", "compile_projection"),
         "inspection.kernels.compile_notice": ("while_compiling",),
         "inspection.kernels.compiling": ("compiled_code_folder",),
-        "inspection.kernels.feet": ("Feet", "Marks", "Room", "turn_outward"),
+        "inspection.kernels.feet": ("Feet", "Marks", "Room"),
         "inspection.kernels.growing": ("GrowingSums",),
-        "inspection.kernels.layout": ("SAMPLE_METHODS",),
-        "inspection.kernels.on_samples": ("SampleTables", "project_on_samples"),
+        "inspection.kernels.layout": ("AT_ONCE", "SAMPLE_METHODS"),
+        "inspection.kernels.on_samples": ("SampleTables",),
         "inspection.kernels.pose": ("NONE_LEFT_OUT", "OutlierLimit", "PoseEstimate", "PoseFit"),
-        "inspection.kernels.pose_sums": ("AT_ONCE",),
+        "inspection.kernels.projection": ("Turned", "project", "project_on_samples", "project_outward"),
         "inspection.kernels.rows": ("JUDGED_AS", "TALLY", "Columns", "Judgement", "Places", "judge_few_rows", "judge_rows", "take_in"),
         "inspection.kernels.side_by_side": ("fit_compiled_beside",),
         "inspection.kernels.thinning": ("strides",),
@@ -62,6 +62,7 @@ __all__ = [
     "PoseFit",
     "Room",
     "SampleTables",
+    "Turned",
     "compile_projection",
     "compiled_code_folder",
     "fit_compiled_beside",
@@ -69,8 +70,8 @@ __all__ = [
     "judge_rows",
     "project",
     "project_on_samples",
+    "project_outward",
     "strides",
     "take_in",
-    "turn_outward",
     "while_compiling",
 ]

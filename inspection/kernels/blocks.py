@@ -17,12 +17,11 @@ from inspection.kernels.compiling import (
     claim_chunk,
     code_of,
     inner_kernel,
-    kernel,
     stack_integers,
     stack_reals,
     type_of,
 )
-from inspection.kernels.feet import Feet, empty_feet, flatten, keep_closer, share_out, store_foot
+from inspection.kernels.feet import empty_feet, keep_closer, store_foot
 from inspection.kernels.lanes import improve, load_pieces, locate, measure, solve, start_in_middle, store_block
 from inspection.kernels.layout import (
     BLOCK,
@@ -114,18 +113,6 @@ class CurveTables(Protocol):
         ...
 
 
-def project(points_mm: Array, grid: CurveTables, threads: int | None = None) -> Feet:
-    """Globally closest points of the curve of `grid` to points (m, 2). Points that are not finite give NaN.
-
-    threads : None chooses by the number of points; the result is the same.
-    """
-    points = flatten(points_mm)
-    feet = empty_feet(len(points) // 2)
-    search = search_code()
-    share_out(lambda claimed: project_points(points, grid.reals, grid.integers, search, feet, claimed), len(feet.vertex), threads)
-    return feet
-
-
 @cache
 def search_code() -> int:
     """Where the code of the search along the whole curve is."""
@@ -143,7 +130,7 @@ def projection_code() -> int:
     return code_of(project_points, *PROJECTION)
 
 
-@kernel
+@inner_kernel
 def project_points(points: Any, reals: Any, integers: Any, search: int, feet: Any, claimed: Any) -> None:
     """Project the flat points (2 m,), chunk by chunk as they are claimed, and write the results into feet.
 

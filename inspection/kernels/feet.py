@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from inspection.kernels.compiling import claim_chunk, inner_kernel, kernel
+from inspection.kernels.compiling import inner_kernel
 from inspection.kernels.layout import (
     CHUNK,
     FOOT_CURVATURE,
@@ -20,8 +20,6 @@ from inspection.kernels.layout import (
     FOOT_VERTEX,
     FOOT_X,
     FOOT_Y,
-    INSIDE,
-    OPEN_END,
 )
 
 Array = NDArray[np.float64]
@@ -80,34 +78,18 @@ def share_out(work: Callable[[NDArray[np.int64]], None], m: int, threads: int | 
             help_given.result()
 
 
-def turn_outward(feet: Feet, outward: float, tip_radius_mm: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_], bool]:
-    """Make distances and gradients positive where outward is, and take the tip radius off, in the arrays of the feet.
-
-    Gives whether each foot (m,) is an open end, whether it is a vertex, and whether every distance is a number.
-    """
-    m = len(feet.vertex)
-    beyond_end, at_vertex, strange = np.empty(m, dtype=np.bool_), np.empty(m, dtype=np.bool_), np.zeros(1, dtype=np.int64)
-    signed = (feet.distance_mm, feet.gradient, feet.vertex, outward, tip_radius_mm, beyond_end, at_vertex, strange)
-    share_out(lambda claimed: _turn_outward(*signed, claimed), m, None)
-    return beyond_end, at_vertex, strange[0] == 0
-
-
-@kernel
-def _turn_outward(
-    distance: Any, gradient: Any, vertex: Any, outward: float, tip: float, beyond_end: Any, at_vertex: Any, strange: Any, claimed: Any
-) -> None:
-    m = len(distance)
-    first = claim_chunk(claimed)
-    while first < m:
-        for i in range(first, min(first + CHUNK, m)):
-            distance[i] = outward * distance[i] - tip
-            gradient[i, 0] *= outward
-            gradient[i, 1] *= outward
-            beyond_end[i] = vertex[i] == OPEN_END
-            at_vertex[i] = vertex[i] != INSIDE
-            if np.isnan(distance[i]):
-                strange[0] = 1
-        first = claim_chunk(claimed)
+@inner_kernel
+def feet_between(feet: Any, begin: int, end: int) -> Any:
+    """The feet from one row to before another, in the memory of all."""
+    return Feet(
+        feet.parameter[begin:end],
+        feet.foot_mm[begin:end],
+        feet.distance_mm[begin:end],
+        feet.gradient[begin:end],
+        feet.curvature[begin:end],
+        feet.station_mm[begin:end],
+        feet.vertex[begin:end],
+    )
 
 
 @inner_kernel

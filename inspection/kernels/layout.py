@@ -58,6 +58,7 @@ FOOT_U, FOOT_X, FOOT_Y, FOOT_DISTANCE, FOOT_GRADIENT_X, FOOT_GRADIENT_Y, FOOT_CU
 
 BLOCK = 128  # points worked on together: their intermediate values stay in the first-level cache
 CHUNK = 8 * BLOCK  # points that a thread claims at a time
+AT_ONCE = 4 * CHUNK  # points that a caller has projected together: their feet stay in the cache
 QUEUE = BLOCK * (MOST_BRANCHES + 1)  # a block is taken while fewer than a block's items wait
 ITEM_POINT, ITEM_PIECE, ITEM_TRIES, ITEM_WIDTH = range(4)  # an item of the queue
 # Reals, BLOCK of each: the columns of the piece (PIECE_WIDTH of them), then these, then where each item of the queue goes on, then a foot.

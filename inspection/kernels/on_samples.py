@@ -6,7 +6,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from inspection.kernels.blocks import FEET, CurveTables, call_projection, project_points, projection_code, search_code
+from inspection.kernels.blocks import FEET, call_projection, projection_code, search_code
 from inspection.kernels.compiling import (
     INTEGER,
     INTEGER_ARRAY,
@@ -18,10 +18,9 @@ from inspection.kernels.compiling import (
     code_of,
     inlined_kernel,
     inner_kernel,
-    kernel,
     tuple_of,
 )
-from inspection.kernels.feet import Feet, empty_feet, flatten, share_out, store_foot
+from inspection.kernels.feet import store_foot
 from inspection.kernels.layout import (
     AT_OPEN_END,
     CHORD,
@@ -97,20 +96,6 @@ NO_PROJECTION = (_NO_TABLES, (0, 0, 0))  # where no point is to be projected
 _SMALL_TURN = 1e-2  # rad; as samples lie densely most turns are smaller, and the next term of the series is below round-off
 
 
-def project_on_samples(points_mm: Array, grid: CurveTables, table: SampleTables, method: str, threads: int | None = None) -> Feet:
-    """Feet of points (m, 2) by a method that looks at samples only: circle, chord, pcp or veaw (see `methods`).
-
-    The grid merely says where to begin the search for the nearest sample. Points that are not finite give NaN.
-    """
-    points = flatten(points_mm)
-    feet = empty_feet(len(points) // 2)
-    samples = (*table.flat, SAMPLE_METHODS.index(method))
-    search = search_code()
-    share_out(lambda claimed: project_points(points, grid.reals, grid.integers, search, feet, claimed), len(feet.vertex), threads)
-    share_out(lambda claimed: project_points_on_samples(points, samples, feet, claimed), len(feet.vertex), threads)
-    return feet
-
-
 @cache
 def _on_samples_code() -> int:
     """Where the code of `project_points_on_samples` is."""
@@ -133,7 +118,7 @@ def project_by(projection: Any, points: Any, reals: Any, integers: Any, feet: An
         _call_on_samples(on_samples, (points, tables, feet, np.zeros(1, dtype=np.int64)))
 
 
-@kernel
+@inner_kernel
 def project_points_on_samples(points: Any, tables: Any, feet: Any, claimed: Any) -> None:
     """Project the points chunk by chunk as they are claimed. Feet hold the exact results and take the new ones in their place."""
     samples, links, boxes, starts, domain, method = tables

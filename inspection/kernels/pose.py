@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from inspection.kernels.blocks import CurveTables, search_code
 from inspection.kernels.compiling import inner_kernel, kernel
-from inspection.kernels.feet import Marks, Room, empty_feet, flatten, share_out
-from inspection.kernels.layout import COUNT, OPEN_END, SLOPE_TURN, SLOPE_X, SLOPE_Y, SQUARE, SQUARE_BEFORE, SUMS
+from inspection.kernels.feet import Marks, Room, empty_feet, feet_between, flatten, share_out
+from inspection.kernels.layout import AT_ONCE, COUNT, OPEN_END, SLOPE_TURN, SLOPE_X, SLOPE_Y, SQUARE, SQUARE_BEFORE, SUMS
 from inspection.kernels.normal_equations import fill_covariance, newton_step
 from inspection.kernels.on_samples import NO_PROJECTION, SampleTables, project_by, projection_of
-from inspection.kernels.pose_sums import AT_ONCE, add_up, centre_of, evaluate, first_feet, move_pose, place_points, span_of
+from inspection.kernels.pose_sums import add_up, centre_of, evaluate, move_pose, place_points, span_of
 
 Array = NDArray[np.float64]
 Pose = tuple[float, float, float]  # rotation about the origin in rad, then shift in mm (x, y)
@@ -368,7 +368,7 @@ def _look_at_distances(problem: Any, projection: Any, pose: Any, moved: Any, tak
     for begin in range(0, m, len(feet.vertex)):
         stop = min(begin + len(feet.vertex), m)
         row = place_points(points, left_out, row, stop - begin, pose, moved)
-        project_by(projection, moved[: 2 * (stop - begin)], reals, integers, first_feet(feet, stop - begin))
+        project_by(projection, moved[: 2 * (stop - begin)], reals, integers, feet_between(feet, _FIRST_ROW, stop - begin))
         for j in range(stop - begin):
             off[begin + j] = abs(outward * feet.distance_mm[j] - tip)
             takes_part[begin + j] = feet.vertex[j] != OPEN_END

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inspection.kernels.compiling import array_at, claim_chunk, inlined_kernel, inner_kernel, kernel, stack_reals
-from inspection.kernels.feet import Feet
+from inspection.kernels.feet import Feet, feet_between
 from inspection.kernels.layout import (
+    AT_ONCE,
     BENDING_TT,
     BENDING_XT,
     BENDING_XX,
@@ -37,7 +38,6 @@ from inspection.kernels.on_samples import project_by
 
 Array = NDArray[np.float64]
 
-AT_ONCE = 32 * BLOCK  # points projected together: their feet stay in the cache
 _LEAST_REACH_MM = 1e-9
 _FIRST_ROW: Any = np.int64(0)  # no literal: to the compiler that has a type of its own, and what it is given to is compiled once more
 
@@ -91,20 +91,6 @@ def place_points(points: Any, left_out: Any, row: int, count: int, pose: Any, mo
 
 
 @inner_kernel
-def first_feet(feet: Any, count: int) -> Any:
-    """The memory for the first feet of a chunk."""
-    return Feet(
-        feet.parameter[:count],
-        feet.foot_mm[:count],
-        feet.distance_mm[:count],
-        feet.gradient[:count],
-        feet.curvature[:count],
-        feet.station_mm[:count],
-        feet.vertex[:count],
-    )
-
-
-@inner_kernel
 def evaluate(
     problem: Any, projection: Any, pose: Any, span: Any, moved: Any, before: Any, takes_part: Any, feet: Any, known: bool, sums: Any
 ) -> None:
@@ -124,7 +110,7 @@ def evaluate(
         stop = min(begin + len(feet.vertex), m)
         if not known or m > len(feet.vertex):
             row = place_points(points, left_out, row, stop - begin, pose, moved)
-            project_by(projection, moved[: 2 * (stop - begin)], reals, integers, first_feet(feet, stop - begin))
+            project_by(projection, moved[: 2 * (stop - begin)], reals, integers, feet_between(feet, _FIRST_ROW, stop - begin))
         _add_points(lanes, moved, feet, weights[begin:stop], before[begin:stop], takes_part[begin:stop], outward, tip, x0, y0)
     _fold(lanes, sums)
 
@@ -149,7 +135,7 @@ def add_up(problem: Any, projection: Any, pose: Any, span: Any, marks: Any, firs
     while chunk < len(first_rows):
         begin, stop = chunk * AT_ONCE, min((chunk + 1) * AT_ONCE, m)
         place_points(points, left_out, first_rows[chunk], stop - begin, pose, moved)
-        project_by(projection, moved[: 2 * (stop - begin)], reals, integers, first_feet(feet, stop - begin))
+        project_by(projection, moved[: 2 * (stop - begin)], reals, integers, feet_between(feet, _FIRST_ROW, stop - begin))
         if len(off) > 0:
             _weigh(feet, outward, tip, limit, off[begin:stop], weights[begin:stop])
         for i in range(SUMS * BLOCK):
