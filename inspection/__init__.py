@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from inspection.characteristics.placement import displacement, twist_by_chord, twist_by_fit
     from inspection.characteristics.section_value import ComparedValue, SectionValue, compare_values
     from inspection.characteristics.stack import StackedSections, StackingAxis, bow, fit_stacking_axis, relative_twist, taper
-    from inspection.characteristics.thickness import ThicknessMethod, edge_thickness, maximum_thickness
+    from inspection.characteristics.thickness import EdgeThicknessMethod, ThicknessMethod, edge_thickness, maximum_thickness
     from inspection.coarse import register_coarse
     from inspection.compensation import Compensation
     from inspection.conclusion import Missing, Reason, reasons_of_abort
@@ -85,7 +85,7 @@ else:
         "inspection.characteristics.placement": ("displacement", "twist_by_chord", "twist_by_fit"),
         "inspection.characteristics.section_value": ("ComparedValue", "SectionValue", "compare_values"),
         "inspection.characteristics.stack": ("StackedSections", "StackingAxis", "bow", "fit_stacking_axis", "relative_twist", "taper"),
-        "inspection.characteristics.thickness": ("ThicknessMethod", "edge_thickness", "maximum_thickness"),
+        "inspection.characteristics.thickness": ("EdgeThicknessMethod", "ThicknessMethod", "edge_thickness", "maximum_thickness"),
         "inspection.coarse": ("register_coarse",),
         "inspection.compensation": ("Compensation",),
         "inspection.conclusion": ("Missing", "Reason", "reasons_of_abort"),
@@ -179,6 +179,7 @@ __all__ = [
     "DeviationUncertainty",
     "Deviations",
     "EdgeRadiusMethod",
+    "EdgeThicknessMethod",
     "FeatureName",
     "Features",
     "FilterOrder",

@@ -13,7 +13,7 @@ from inspection.characteristics.edge_radius import edge_radius
 from inspection.characteristics.inscribed import CamberLine, find_camber_line
 from inspection.characteristics.outline import AirfoilSection, Edge
 from inspection.characteristics.section_value import ComparedValue, SectionValue, compare_values
-from inspection.characteristics.thickness import ThicknessMethod, edge_thickness, maximum_thickness
+from inspection.characteristics.thickness import EdgeThicknessMethod, ThicknessMethod, edge_thickness, maximum_thickness
 from inspection.errors import InspectionError
 
 
@@ -116,5 +116,5 @@ def _characteristics(
         yield f"{edge} edge radius (curvature)", partial(edge_radius, section, edge, "curvature")
     for edge, window in product(edges, windows_deg):
         yield f"{edge} edge radius (circle)", partial(edge_radius, section, edge, "circle", window)
-    for edge, offset in product(edges, offsets_mm):
-        yield f"{edge} edge thickness (tip-arc)", partial(edge_thickness, section, camber, edge, offset)
+    for edge, offset, edge_method in product(edges, offsets_mm, get_args(EdgeThicknessMethod)):
+        yield f"{edge} edge thickness ({edge_method})", partial(edge_thickness, section, camber, edge, offset, edge_method)

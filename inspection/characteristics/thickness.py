@@ -2,11 +2,19 @@
 
 inscribed   diameter of the largest circle inside the section; it touches both sides at places that face each other square
 two-point   largest distance of both sides along a line square to the camber line: a calliper that is turned with the camber
-tip-arc     edge thickness: a circle about the edge point with the stated offset as radius meets the camber line; the thickness is
-            measured through that place, square to the camber line (TIPARC with NORMAL of PC-DMIS Blade)
+
+The thickness of an edge is measured through a place on the camber line at the stated offset, which the first part of its method says:
+
+tip-arc     the place is on a circle about the edge point whose radius is the offset
+offset-flat it is on a line parallel to the outline at the edge point, the offset away from it
+
+The distance of both sides is taken square to the camber line, or with "-square" parallel to the flat that a blunt edge ends in. The edge
+point is where the camber line leaves the section. The names follow PC-DMIS Blade: TIPARC and OFFSETFLAT, with NORMAL and SQUARE, which
+it has for square ends only.
 """
 
-from typing import Literal
+from collections.abc import Callable
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +28,7 @@ from inspection.errors import InspectionError
 
 Array = NDArray[np.float64]
 ThicknessMethod = Literal["inscribed", "two-point"]
+EdgeThicknessMethod = Literal["tip-arc", "tip-arc-square", "offset-flat", "offset-flat-square"]
 
 _CONTACTS = ("contact on the upper side", "contact on the lower side")
 
@@ -84,22 +93,36 @@ def _crossings(section: AirfoilSection, circles: InscribedCircles) -> tuple[Arra
     return found[0], found[1]
 
 
-def edge_thickness(section: AirfoilSection, camber: CamberLine, edge: Edge, offset_mm: float) -> SectionValue:
-    """The thickness at `offset_mm` from an edge point, by the method tip-arc.
+def edge_thickness(
+    section: AirfoilSection, camber: CamberLine, edge: Edge, offset_mm: float, method: EdgeThicknessMethod = "tip-arc"
+) -> SectionValue:
+    """The thickness at `offset_mm` from an edge point, by a method of those above.
 
-    The edge point is where the camber line leaves the section. The places are both contacts, then the place on the camber line.
-    Raises InspectionError where the offset reaches no camber line, or where the line across meets no side.
+    The places are both contacts, then the place on the camber line. Raises InspectionError where the offset reaches no camber line,
+    where the line across meets no side, and for a method that asks for a flat, or for the outline at the edge point, where there is none.
     """
     if not offset_mm > 0:
         raise ValueError(f"the offset must be a positive length, not {offset_mm:g} mm")
-    centre, along = _meet_camber_line(section, camber, edge, offset_mm)
+    if method not in get_args(EdgeThicknessMethod):
+        raise ValueError(f"the method must be one of {', '.join(get_args(EdgeThicknessMethod))}, not {method!r}")
+    tip = camber.nose_mm if edge == "leading" else camber.tail_mm
+    if method.endswith("-square") and (edge == "leading" or section.trailing != "blunt"):
+        kind = "round" if edge == "leading" else section.trailing
+        raise InspectionError(f"the {edge} edge is {kind}: {method} needs one that ends in a flat; choose {method.removesuffix('-square')}")
+    inward = None if method == "tip-arc" else _inward_at_edge(section, edge, tip)
+
+    def away(places: Array) -> Array:
+        return np.asarray(np.hypot(*(places - tip).T) if inward is None or method == "tip-arc-square" else (places - tip) @ inward)
+
+    centre, along = _meet_camber_line(section, camber, edge, offset_mm, away)
+    square_to = along if inward is None or method == "offset-flat" else inward
     half = section.nose_sample
-    one = _cross_side(section, centre, along, slice(0, half + 1))
-    other = _cross_side(section, centre, along, slice(half, None))
-    continued = camber.continued_mm[0 if edge == "leading" else 1] > offset_mm
+    one = _cross_side(section, centre, square_to, slice(0, half + 1))
+    other = _cross_side(section, centre, square_to, slice(half, None))
+    continued = camber.continued_mm[0 if edge == "leading" else 1] > float(np.hypot(*(centre - tip)))
     return SectionValue(
         f"{edge} edge thickness",
-        "tip-arc",
+        method,
         float(np.hypot(*(one - other))),
         "mm",
         np.vstack([*_upper_then_lower(section, one, other), centre]),
@@ -109,22 +132,45 @@ def edge_thickness(section: AirfoilSection, camber: CamberLine, edge: Edge, offs
     )
 
 
-def _meet_camber_line(section: AirfoilSection, camber: CamberLine, edge: Edge, offset_mm: float) -> tuple[Array, Array]:
-    """The place (2,) on the camber line at that distance from the edge point, and the direction (2,) of the line there."""
+def _inward_at_edge(section: AirfoilSection, edge: Edge, tip: Array) -> Array:
+    """The unit normal (2,) into the section of the outline at an edge point: of the curve at a round edge, of the flat at a blunt one."""
+    if edge == "trailing" and section.trailing in ("open", "sharp"):
+        raise InspectionError(f"the trailing edge is {section.trailing}: the outline has no direction at its edge point; choose tip-arc")
+    if edge == "trailing" and section.trailing == "blunt":
+        flat = np.subtract(*section.ends_mm())
+    else:
+        u = (
+            section.parameter
+            if edge == "leading"
+            else np.concatenate([section.parameter, section.parameter + section.last - section.first])
+        )
+        nearest = int(np.argmin(np.hypot(*(section.point(u) - tip).T)))
+        low, high = u[max(nearest - 1, 0)], u[min(nearest + 1, len(u) - 1)]
+        at = find_maximum(lambda v: -np.hypot(*(section.point(v) - tip).T), float(low), float(high))
+        flat = section.frame(np.array([at]))[1][0]
+    across = np.array([-flat[1], flat[0]]) / np.hypot(*flat)
+    return np.asarray(across if (section.points_mm.mean(axis=0) - tip) @ across > 0 else -across)
+
+
+def _meet_camber_line(
+    section: AirfoilSection, camber: CamberLine, edge: Edge, offset_mm: float, away: Callable[[Array], Array]
+) -> tuple[Array, Array]:
+    """The first place (2,) on the camber line that is the offset away from the edge point, and the direction (2,) of the line there."""
     leading = edge == "leading"
     tip = camber.nose_mm if leading else camber.tail_mm
     along = camber.nose_along if leading else camber.tail_along
     order = slice(None) if leading else slice(None, None, -1)
     u, centres = camber.circles.u[order], camber.circles.centre_mm[order]
-    distance = np.hypot(*(centres - tip).T)
+    distance = away(centres)
     if offset_mm <= distance[0]:
-        return tip + offset_mm * (along if leading else -along), along
+        inward = along if leading else -along
+        return tip + offset_mm / float(away((tip + inward)[None, :])[0]) * inward, along
     beyond = np.flatnonzero(distance >= offset_mm)
     if not beyond.size:
         raise InspectionError(f"the {edge} edge thickness at {offset_mm:g} mm lies beyond the other edge of the section")
 
     def excess(at: float) -> float:
-        return float(np.hypot(*(inscribe_circles(section, np.array([at])).centre_mm[0] - tip))) - offset_mm
+        return float(away(inscribe_circles(section, np.array([at])).centre_mm)[0]) - offset_mm
 
     circle = inscribe_circles(section, np.array([brentq(excess, u[beyond[0] - 1], u[beyond[0]], xtol=1e-14)]))
     return circle.centre_mm[0], circle.along()[0]
