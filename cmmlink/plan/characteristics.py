@@ -15,6 +15,7 @@ from inspection import (
     ChordAngleMethod,
     ChordMethod,
     EdgeRadiusMethod,
+    EdgeThicknessMethod,
     FeatureName,
     FilterOrder,
     FreedomName,
@@ -288,10 +289,14 @@ class Thickness(_OfOutline, _InMm):
 
 
 class EdgeThickness(_OfOutline, _InMm):
-    """The thickness at a stated way in from an edge, by the method tip-arc."""
+    """The thickness at a stated way in from an edge, square to the camber line or, for a blunt edge, along its flat."""
 
     type: Literal["edge-thickness"] = Field(description="the thickness at a stated way in from an edge")
-    method: Literal["tip-arc"] = Field(default="tip-arc", description="where a circle about the edge point meets the camber line")
+    method: EdgeThicknessMethod = Field(
+        default="tip-arc",
+        description="where an arc about the edge point meets the camber line, or (offset-flat) a line parallel to the outline there; "
+        "square to the camber line, or (-square) along the flat of a blunt edge",
+    )
     edge: Literal["leading", "trailing"] = Field(description="which edge")
     offset_mm: Positive = Field(description="how far in from the edge point")
 

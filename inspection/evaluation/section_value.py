@@ -28,7 +28,7 @@ from inspection.characteristics.inscribed import CamberLine, find_camber_line
 from inspection.characteristics.outline import AirfoilSection
 from inspection.characteristics.placement import displacement, twist_by_fit
 from inspection.characteristics.section_value import SectionValue, angle_within_half_a_turn, no_places
-from inspection.characteristics.thickness import ThicknessMethod, edge_thickness, maximum_thickness
+from inspection.characteristics.thickness import EdgeThicknessMethod, ThicknessMethod, edge_thickness, maximum_thickness
 from inspection.conclusion import Reason
 from inspection.errors import InspectionError
 from inspection.evaluation.basis import Basis, filter_deviations
@@ -47,7 +47,7 @@ METHODS_OF_SECTIONS: Mapping[SectionKind, tuple[str, ...]] = {
     "chord": get_args(ChordMethod),
     "chord-angle": get_args(ChordAngleMethod),
     "thickness": get_args(ThicknessMethod),
-    "edge-thickness": ("tip-arc",),
+    "edge-thickness": get_args(EdgeThicknessMethod),
     "edge-radius": get_args(EdgeRadiusMethod),
     "camber": ("inscribed",),
     "twist": ("best-fit", *get_args(ChordAngleMethod)),
@@ -79,7 +79,9 @@ _MEASURES: Mapping[str, Callable[[Outline, SectionCharacteristic], SectionValue]
     "chord": lambda of, asked: chord(of.section, of.camber, cast(ChordMethod, asked.method)),
     "chord-angle": lambda of, asked: chord_angle(of.section, of.camber, cast(ChordAngleMethod, asked.method)),
     "thickness": lambda of, asked: maximum_thickness(of.section, of.camber, cast(ThicknessMethod, asked.method)),
-    "edge-thickness": lambda of, asked: edge_thickness(of.section, of.camber, asked.edge, asked.offset_mm),
+    "edge-thickness": lambda of, asked: edge_thickness(
+        of.section, of.camber, asked.edge, asked.offset_mm, cast(EdgeThicknessMethod, asked.method)
+    ),
     "edge-radius": lambda of, asked: edge_radius(of.section, asked.edge, cast(EdgeRadiusMethod, asked.method), asked.window_deg),
     "camber": lambda of, asked: maximum_camber(of.section, of.camber),
 }
