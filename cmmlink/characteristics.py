@@ -5,13 +5,15 @@ where its fit is limited, the points have the envelope of its zone at a free fit
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from cmmlink.plan import AskedCharacteristic, AskedFilter, AskedProfile, CtPlan, Datum, Place, Plan
+from cmmlink.plan import PROFILE, AskedCharacteristic, AskedFilter, AskedProfile, CtPlan, Datum, Place, Plan
 from inspection import (
     Characteristic,
+    CharacteristicResult,
     Features,
     FitName,
     FreedomName,
@@ -33,8 +35,6 @@ from inspection import (
     with_nominal,
     zone_words,
 )
-
-PROFILE = "profile"
 
 
 class Base(NamedTuple):
@@ -68,6 +68,11 @@ def notes_on_zone(plan: Plan | CtPlan) -> tuple[str, ...]:
         return ()
     name = plan.first_profile.name
     return (f"the points are shown against the envelope of {name} at a free fit; for the verdict {name} itself counts",)
+
+
+def is_short_form(found: Sequence[CharacteristicResult]) -> bool:
+    """Whether a result has no more than the profile that a tolerance stands for, of which everything else tells already."""
+    return [one.name for one in found] == [PROFILE] and found[0].certificate is None
 
 
 class Builder:

@@ -3,8 +3,10 @@
 import math
 from typing import TYPE_CHECKING, Any
 
+from inspection import ZoneCertificate
+
 if TYPE_CHECKING:
-    from inspection import CharacteristicResult, RigidTransform, WorstPlace, ZoneCertificate
+    from inspection import CharacteristicResult, ConsumptionCertificate, RigidTransform, WorstPlace
 
 
 def characteristic_json(found: "CharacteristicResult") -> dict[str, Any]:
@@ -36,29 +38,36 @@ def characteristic_json(found: "CharacteristicResult") -> dict[str, Any]:
         "largest_gap_mm": _number(found.gap_mm),
         "places": [{"name": name, "x_mm": x, "y_mm": y} for name, x, y in found.places_mm],
         "notes": list(found.notes),
-        "certificate": None if found.certificate is None else certificate_json(found.certificate),
+        "certificate": certificate_json(found.certificate),
     }
 
 
-def certificate_json(proof: "ZoneCertificate") -> dict[str, Any]:
-    """What proves a minimum zone; the points have the numbers of their rows in deviations.csv."""
-    held = (proof.active, proof.active_place_mm, proof.active_deviation_mm, proof.active_station_mm, proof.multipliers)
-    columns = [array.tolist() for array in held]
+def certificate_json(proof: "ZoneCertificate | ConsumptionCertificate | None") -> dict[str, Any] | None:
+    """What proves a minimum zone or a least consumption; the points have the numbers of their rows in deviations.csv."""
+    if proof is None:
+        return None
+    of_zone = isinstance(proof, ZoneCertificate)
+    fit = proof if isinstance(proof, ZoneCertificate) else proof.fit
+    off = proof.active_deviation_mm.tolist() if isinstance(proof, ZoneCertificate) else [None] * len(fit.active)
+    columns = (fit.active.tolist(), proof.active_place_mm.tolist(), off, fit.active_station_mm.tolist(), fit.multipliers.tolist())
+    held = zip(*columns, strict=True)
+    seen = zip(proof.witnesses.tolist(), proof.witness_place_mm.tolist(), strict=True)
     return {
-        "zone_mm": proof.zone_mm,
-        "middle_mm": proof.middle_mm,
-        "pose": pose_json(proof.nominal_from_section),
+        "kind": "minimum-zone" if of_zone else "consumption",
+        "zone_mm": proof.zone_mm if isinstance(proof, ZoneCertificate) else None,
+        "middle_mm": proof.middle_mm if isinstance(proof, ZoneCertificate) else None,
+        "consumption": None if isinstance(proof, ZoneCertificate) else proof.fit.consumption,
+        "bound": proof.zone_mm / 2 - proof.gap_mm if isinstance(proof, ZoneCertificate) else proof.bound,
+        "gap_mm": proof.gap_mm if isinstance(proof, ZoneCertificate) else None,
+        "tip_radius_mm": proof.tip_radius_mm if isinstance(proof, ZoneCertificate) else None,
+        "pose": pose_json(fit.nominal_from_section),
         "active": [
             {"index": row, "x_mm": x, "y_mm": y, "deviation_mm": e, "station_mm": s, "multiplier": share}
-            for row, (x, y), e, s, share in zip(*columns, strict=True)
+            for row, (x, y), e, s, share in held
         ],
-        "imbalance": _number(proof.imbalance),
-        "gap_mm": proof.gap_mm,
+        "imbalance": _number(proof.imbalance) if isinstance(proof, ZoneCertificate) else None,
         "proven": proof.proven,
-        "witnesses": [
-            {"index": row, "x_mm": x, "y_mm": y}
-            for row, (x, y) in zip(proof.witnesses.tolist(), proof.witness_place_mm.tolist(), strict=True)
-        ],
+        "witnesses": [{"index": row, "x_mm": x, "y_mm": y} for row, (x, y) in seen],
         "boxes": proof.boxes,
         "finest_mm": _number(proof.finest_mm),
         "words": proof.words,

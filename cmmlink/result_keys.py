@@ -101,21 +101,25 @@ class Witness(_Json):
 class Holding(Witness):
     """A measured point that holds a minimum zone."""
 
-    deviation_mm: float = Field(description="its deviation from the middle of the zone: half the zone, with sign")
+    deviation_mm: float | None = Field(description="its deviation from the middle of a minimum zone: half the zone, with sign")
     station_mm: float = Field(description="the arc length of its foot point")
     multiplier: float = Field(description="its share in the balance of gradients; they are positive and add up to 1")
 
 
 class Certificate(_Json):
-    """What proves a minimum zone over every placement of the part."""
+    """What proves a minimum zone, or a least consumption of a zone that varies, over every placement of the part."""
 
-    zone_mm: float = Field(description="the width of the zone")
-    middle_mm: float = Field(description="the deviation in its middle")
+    kind: Literal["minimum-zone", "consumption"] = Field(description="what is proven")
+    zone_mm: float | None = Field(description="the width of the minimum zone")
+    middle_mm: float | None = Field(description="the deviation in its middle")
+    consumption: float | None = Field(description="of a zone that varies: the largest share of it that the points consume")
+    bound: float = Field(description="the proof is of this: half a zone in mm, or a share of the zone")
+    gap_mm: float | None = Field(description="by how much that is less than half the minimum zone")
+    tip_radius_mm: float | None = Field(description="the points are centres of a ball of this radius")
     pose: Pose = Field(description="where the part lies in it")
     active: list[Holding] = Field(description="the points that hold it: no small motion makes it smaller")
     imbalance: float | None = Field(description="what is left of the sum of the points' gradients, by multiplier and sign; 0 is a proof")
-    gap_mm: float = Field(description="the proof is of half the zone less this")
-    proven: bool = Field(description="whether no rigid motion brings the witnesses into the zone made narrower by the gap to either side")
+    proven: bool = Field(description="whether no rigid motion brings the witnesses within the bound")
     witnesses: list[Witness] = Field(description="the points that the proof over every placement needs")
     boxes: int = Field(description="the boxes of motions that the proof looked at")
     finest_mm: float | None = Field(description="the least by which one of them moves the point that refutes it")
@@ -429,3 +433,19 @@ class Verified(_Json):
     chain_sha256: str = Field(description="the hash of the last sound record")
     first: Alteration | None = Field(description="the first record that was altered")
     against: Against | None = Field(default=None, description="with `--against`: whether the result file and the records agree")
+
+
+class ZoneVerified(_Json):
+    """The check of one minimum zone."""
+
+    name: str = Field(description="the name of the characteristic")
+    verified: bool = Field(description="whether everything that was stated is so")
+    problem: str = Field(description="what is not, empty where all is")
+    boxes: int = Field(description="the boxes of motions that the check looked at")
+
+
+class ZonesVerified(_Json):
+    """The answer of `verify-zone`."""
+
+    verified: bool = Field(description="whether all zones of the file were verified")
+    zones: list[ZoneVerified] = Field(description="every zone of the file")

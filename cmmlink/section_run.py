@@ -24,7 +24,7 @@ from cmmlink.record import Recorder, RunInputs, Store
 from cmmlink.words import VERDICT_WORDS
 from drivers import MeshError, Rejected, ScanClosed, ScanOpened, ScanSource
 from drivers.surface import Contour, ContourSource, SurfaceSection, add_points_between
-from inspection import NominalProfile, Reason, RegistrationError
+from inspection import Characteristic, NominalProfile, Reason, RegistrationError
 
 _REFUSED = "not registered"
 
@@ -122,6 +122,7 @@ def choose_outline(
     outline: Outline,
     plan: Plan,
     profile: NominalProfile,
+    asked: Sequence[Characteristic],
     spacing_mm: float,
     surface: str,
     *,
@@ -139,7 +140,9 @@ def choose_outline(
     if len(candidates) == 1:
         return Chosen(candidates[0], filled[0])
     started = RunStarted(plan.part.name, "", "", surface, simulated=False)
-    judge = partial(measure_section, plan=plan, profile=profile, started=started, recorder=None, doubt=None, clock=clock, stop=stop)
+    judge = partial(
+        measure_section, plan=plan, profile=profile, asked=asked, started=started, recorder=None, doubt=None, clock=clock, stop=stop
+    )
     runs = [judge(ContourSource(judged, surface)) for judged in filled]
     order = sorted(range(len(runs)), key=lambda k: runs[k].result is None)  # those that fit first; the most alike before the others
     first, *others = order
@@ -173,6 +176,7 @@ def measure_section(
     source: ScanSource,
     plan: Plan,
     profile: NominalProfile,
+    asked: Sequence[Characteristic],
     started: RunStarted,
     recorder: Recorder | None,
     *,
@@ -182,9 +186,11 @@ def measure_section(
 ) -> RunOutcome:
     """Send the outline of one section through the pipeline. With a doubt about the outline no verdict is proven.
 
+    asked : the characteristics of the plan for this profile
+
     Raises MeshError where the outline cannot be read, which is no fault of the outline: the system has no thread to give.
     """
-    live = inspection_of(plan, profile, provisional=False)
+    live = inspection_of(plan, profile, provisional=False, characteristics=asked)
     sinks = [recorder] if recorder else []
     watch = recorder.check if recorder else lambda: None
     run = run_inspection(source, live, sinks, started, buffer_points=plan.buffer_points, clock=clock, stop=stop, watch=watch, doubt=doubt)

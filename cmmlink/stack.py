@@ -15,9 +15,10 @@ from typing import Any
 
 import numpy as np
 
+from cmmlink.characteristics import notes_on_zone
 from cmmlink.errors import PlanError
 from cmmlink.events import Ending, RunStarted
-from cmmlink.from_plan import discretize_file, load_from, run_started
+from cmmlink.from_plan import asked_of, discretize_file, load_from, run_started
 from cmmlink.outline import outline_of
 from cmmlink.pipeline import RunOutcome
 from cmmlink.plan import CtPlan, Discretisation
@@ -48,7 +49,7 @@ from drivers.surface import (
     read_obj,
     read_stl,
 )
-from inspection import NominalProfile, Verdict
+from inspection import Characteristic, NominalProfile, Verdict
 
 _log = logging.getLogger(__name__)
 
@@ -183,7 +184,7 @@ def inspect_stack(
             record = StackRecord.of(store, plan, mesh.triangles, len(heights), began=began, clock=clock, now=now)
         on_start(len(heights))
         read_in = [f"{plan.mesh.file.name}: read in {plan.mesh.unit}, as asked"] if plan.mesh.unit else []
-        notes = [*read_in, *mesh.warnings, *profiles.notes]
+        notes = [*read_in, *mesh.warnings, *profiles.notes, *notes_on_zone(plan)]
         sections: list[SectionOutcome] = []
         for cut in _slices(plan, mesh, heights, open3d, notes, profiles.shortest_mm):
             stack = _Stack(plan, profiles, tuple(notes))
@@ -259,6 +260,7 @@ class _Profiles:
         self._plan = plan
         self._own = {at.height_mm: at.file for at in plan.sections.nominal_at}
         self._profiles: dict[Path, NominalProfile] = {}
+        self._asked: dict[Path, tuple[Characteristic, ...]] = {}
         self.notes: list[str] = []
         for path in (plan.nominal.file, *self._own.values()):
             self._load(path)
@@ -273,11 +275,16 @@ class _Profiles:
         path = near[0] if near else self._plan.nominal.file
         return path, self._profiles[path]
 
+    def asked(self, path: Path) -> tuple[Characteristic, ...]:
+        """The characteristics of the plan for the nominal in a file."""
+        return self._asked[path]
+
     def _load(self, path: Path) -> None:
         nominal = self._plan.nominal
         file = load_from(nominal, path)
         self.notes += [f"{path.name}: {note}" for note in file.notes]
         self._profiles[path] = discretize_file(file, path, nominal, Discretisation())
+        self._asked[path] = asked_of(self._plan, self._profiles[path])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -333,9 +340,9 @@ def _inspect(
 ) -> SectionOutcome:
     """Send one section through the pipeline. An outline that cannot be this profile is refused before anything is fitted."""
     plan, (path, profile) = stack.plan, stack.profiles.at(cut.asked_mm)
-    outline = outline_of(cut, profile)
+    outline, asked = outline_of(cut, profile), stack.profiles.asked(path)
     section, surface = plan_of_section(plan, cut, path), plan.mesh.file.name
-    chosen = choose_outline(outline, section, profile, profile.length_mm / _LEAST_POINTS, surface, clock=clock, stop=stop)
+    chosen = choose_outline(outline, section, profile, asked, profile.length_mm / _LEAST_POINTS, surface, clock=clock, stop=stop)
     warnings = [*cut.warnings, *outline.notes, *_beside(cut, chosen.contours)]
     if count_points(chosen.judged) > count_points(chosen.contours):
         spacing_mm = profile.length_mm / _LEAST_POINTS
@@ -346,7 +353,7 @@ def _inspect(
             run = refuse_section(count_points(chosen.judged), outline.refusal, started, recorder, clock())
         else:
             source = ContourSource(chosen.judged, surface)
-            run = measure_section(source, section, profile, started, recorder, doubt=chosen.doubt, clock=clock, stop=stop)
+            run = measure_section(source, section, profile, asked, started, recorder, doubt=chosen.doubt, clock=clock, stop=stop)
     if run.refusal is not None:
         warnings.append(str(run.refusal))
     return SectionOutcome(cut, chosen.judged, path, profile, started, run, tuple(warnings), recorder.evidence if recorder else None)

@@ -29,6 +29,7 @@ from cmmlink.result_keys import (
     StackInspected,
     Understood,
     Verified,
+    ZonesVerified,
 )
 from drivers.codecs import decoders
 from drivers.codecs.register_map import PATTERNS, POINTS_FIELDS, POP_FIELDS, STATUS_FIELDS, RegisterMap
@@ -117,6 +118,7 @@ OBJECTS: tuple[tuple[str, type[BaseModel], type[BaseModel] | None], ...] = (
     ("`show`, and `run.json` of `export`", Shown, None),
     ("`export`", Exported, None),
     ("`verify`", Verified, None),
+    ("`verify-zone`", ZonesVerified, None),
 )
 
 TABLES: tuple[tuple[str, Mapping[str, str]], ...] = (

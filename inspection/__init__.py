@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from inspection.coarse import register_coarse
     from inspection.compensation import Compensation
     from inspection.conclusion import Missing, Reason, reasons_of_abort
-    from inspection.consumption import ConsumptionFit, fit_least_consumption
-    from inspection.consumption_proof import ConsumptionCertificate, certify_consumption
+    from inspection.consumption import fit_least_consumption
+    from inspection.consumption_proof import certify_consumption
     from inspection.curve import NurbsCurve
     from inspection.curve_check import CurveCheck, Hollow, check_curve
     from inspection.errors import InspectionError, NominalError, NotMeasured, RegistrationError
@@ -67,7 +67,7 @@ if TYPE_CHECKING:
     from inspection.tolerance import DecisionRule, ToleranceZone
     from inspection.uncertainty import DeviationUncertainty, UncertaintyBudget, deviation_uncertainty, largest_by_noise_mm
     from inspection.verdict import NOT_JUDGED, Rejection, Verdict
-    from inspection.zone_certificate import ZoneCertificate
+    from inspection.zone_certificate import ConsumptionCertificate, ConsumptionFit, ZoneCertificate
     from inspection.zones import Transition, VaryingZone
 else:
     from inspection.front_door import load_on_use
@@ -89,8 +89,8 @@ else:
         "inspection.coarse": ("register_coarse",),
         "inspection.compensation": ("Compensation",),
         "inspection.conclusion": ("Missing", "Reason", "reasons_of_abort"),
-        "inspection.consumption": ("ConsumptionFit", "fit_least_consumption"),
-        "inspection.consumption_proof": ("ConsumptionCertificate", "certify_consumption"),
+        "inspection.consumption": ("fit_least_consumption",),
+        "inspection.consumption_proof": ("certify_consumption",),
         "inspection.curve": ("NurbsCurve",),
         "inspection.curve_check": ("CurveCheck", "Hollow", "check_curve"),
         "inspection.errors": ("InspectionError", "NominalError", "NotMeasured", "RegistrationError"),
@@ -147,7 +147,7 @@ else:
             "Outline",
             "with_nominal",
         ),
-        "inspection.zone_certificate": ("ZoneCertificate",),
+        "inspection.zone_certificate": ("ConsumptionCertificate", "ConsumptionFit", "ZoneCertificate"),
         "inspection.zones": ("Transition", "VaryingZone"),
     }
 

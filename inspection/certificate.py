@@ -104,4 +104,5 @@ def _certificate(
         witness_place_mm=points[witnesses],
         boxes=proof.boxes,
         finest_mm=proof.finest_mm,
+        tip_radius_mm=tip_radius_mm,
     )

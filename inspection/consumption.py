@@ -5,7 +5,6 @@ another one. Stations move with the pose, and the limits with them, so their slo
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,33 +18,12 @@ from inspection.nominal import NominalProfile
 from inspection.registration import Registration
 from inspection.rigid import RigidTransform
 from inspection.signed_deviations import Deviations, deviations
+from inspection.zone_certificate import ConsumptionFit
 from inspection.zones import VaryingZone
 
 Array = NDArray[np.float64]
 
 _LEAST = 1e-3  # of 1 - curvature times distance: nearer to the centre of curvature a station is not determined
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ConsumptionFit:
-    """The pose that consumes least, and why no other nearby consumes less.
-
-    nominal_from_section : pose of the fit
-    consumption          : largest share of the zone consumed; above 1 no pose nearby brings every point into the zone
-    active               : (a,) indices of the points that hold it
-    active_station_mm    : (a,) where they are on the profile
-    multipliers          : (a,) of those points, positive, with the sum 1
-    programs             : linear programs solved
-    converged            : the last step moved no point by more than 1e-10 mm
-    """
-
-    nominal_from_section: RigidTransform
-    consumption: float
-    active: NDArray[np.int64]
-    active_station_mm: Array
-    multipliers: Array
-    programs: int
-    converged: bool
 
 
 def fit_least_consumption(

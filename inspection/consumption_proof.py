@@ -6,68 +6,25 @@ consume more than a whole zone, widened by the uncertainty, under every placemen
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inspection.bands import VaryingBand
 from inspection.coarse import check_registrable
-from inspection.consumption import ConsumptionFit, fit_least_consumption
+from inspection.consumption import fit_least_consumption
 from inspection.nominal import NominalProfile
 from inspection.placements import PlacementProof, PlacementSearch
 from inspection.registration import Registration
 from inspection.rigid import RigidTransform
 from inspection.signed_deviations import deviations
+from inspection.zone_certificate import ConsumptionCertificate, ConsumptionFit
 from inspection.zones import VaryingZone
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 _MOST_FITS = 8  # each from a placement that consumes less than the one before
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ConsumptionCertificate:
-    """The least consumption of a zone by measured points, and what is proven of it.
-
-    fit              : the pose that consumes least, the points that hold it and their multipliers
-    active_place_mm  : (a, 2) where those points were measured, in section coordinates
-    bound            : the share of the zone that the proof is of
-    proven           : no rigid motion brings the witnesses into that share; False where the search ended before it knew, or where a
-                       pose consumes less than what was to be proven
-    witnesses        : (w,) indices of the points that the proof needs
-    witness_place_mm : (w, 2) where they were measured, in section coordinates
-    boxes            : of motions that were looked at
-    finest_mm        : the least by which a refuted box moves the point that refutes it
-    """
-
-    fit: ConsumptionFit
-    active_place_mm: Array
-    bound: float
-    proven: bool
-    witnesses: Rows
-    witness_place_mm: Array
-    boxes: int
-    finest_mm: float
-
-    @property
-    def words(self) -> str:
-        """The certificate in three lines, as a report prints it."""
-        pose = self.fit.nominal_from_section
-        x, y = pose.translation_mm.tolist()
-        each = zip(self.fit.active.tolist(), self.active_place_mm, self.fit.active_station_mm, self.fit.multipliers, strict=True)
-        held = " | ".join(f"{row + 1} ({at[0]:.6f}, {at[1]:.6f}) station {s:.6f} multiplier {share:.6f}" for row, at, s, share in each)
-        last = (
-            f"proof: no rigid motion brings {len(self.witnesses)} of the measured points into {self.bound:.9f} of the zone; "
-            f"{self.boxes:,} boxes of motions looked at, the finest {self.finest_mm:.1e} mm"
-            if self.proven
-            else f"no proof over every placement that more than {self.bound:.9f} of the zone is consumed ({self.boxes:,} boxes of motions)"
-        )
-        return (
-            f"least consumption {self.fit.consumption:.9f} of the zone, turned {np.degrees(pose.rotation_rad):.9f} deg, "
-            f"moved ({x:.9f}, {y:.9f}) mm\nheld by points {held}\n{last}"
-        )
 
 
 def certify_consumption(

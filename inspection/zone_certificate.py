@@ -1,4 +1,4 @@
-"""What proves a minimum zone: the points that hold it, how they balance, and what was found of every other placement."""
+"""What proves a minimum zone or a least consumption: the points that hold it, how they balance, and what is known of other placements."""
 
 from dataclasses import dataclass
 
@@ -33,6 +33,7 @@ class ZoneCertificate:
     witness_place_mm     : (w, 2) where they were measured, in section coordinates
     boxes                : of motions that were looked at
     finest_mm            : the least by which a refuted box moves the point that refutes it
+    tip_radius_mm        : the points are centres of a ball of this radius
     """
 
     nominal_from_section: RigidTransform
@@ -50,6 +51,7 @@ class ZoneCertificate:
     witness_place_mm: Array
     boxes: int
     finest_mm: float
+    tip_radius_mm: float
 
     @property
     def balanced(self) -> bool:
@@ -72,4 +74,69 @@ class ZoneCertificate:
         return (
             f"minimum zone {self.zone_mm:.6f} mm (half {half:.9f}) about {self.middle_mm:g} mm, "
             f"turned {turned:.9f} deg, moved ({x:.9f}, {y:.9f}) mm\nheld by points {held}\n{last}"
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ConsumptionFit:
+    """The pose that consumes least, and why no other nearby consumes less.
+
+    nominal_from_section : pose of the fit
+    consumption          : largest share of the zone consumed; above 1 no pose nearby brings every point into the zone
+    active               : (a,) indices of the points that hold it
+    active_station_mm    : (a,) where they are on the profile
+    multipliers          : (a,) of those points, positive, with the sum 1
+    programs             : linear programs solved
+    converged            : the last step moved no point by more than 1e-10 mm
+    """
+
+    nominal_from_section: RigidTransform
+    consumption: float
+    active: NDArray[np.int64]
+    active_station_mm: Array
+    multipliers: Array
+    programs: int
+    converged: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ConsumptionCertificate:
+    """The least consumption of a zone by measured points, and what is proven of it.
+
+    fit              : the pose that consumes least, the points that hold it and their multipliers
+    active_place_mm  : (a, 2) where those points were measured, in section coordinates
+    bound            : the share of the zone that the proof is of
+    proven           : no rigid motion brings the witnesses into that share; False where the search ended before it knew, or where a
+                       pose consumes less than what was to be proven
+    witnesses        : (w,) indices of the points that the proof needs
+    witness_place_mm : (w, 2) where they were measured, in section coordinates
+    boxes            : of motions that were looked at
+    finest_mm        : the least by which a refuted box moves the point that refutes it
+    """
+
+    fit: ConsumptionFit
+    active_place_mm: Array
+    bound: float
+    proven: bool
+    witnesses: Rows
+    witness_place_mm: Array
+    boxes: int
+    finest_mm: float
+
+    @property
+    def words(self) -> str:
+        """The certificate in three lines, as a report prints it."""
+        pose = self.fit.nominal_from_section
+        x, y = pose.translation_mm.tolist()
+        each = zip(self.fit.active.tolist(), self.active_place_mm, self.fit.active_station_mm, self.fit.multipliers, strict=True)
+        held = " | ".join(f"{row + 1} ({at[0]:.6f}, {at[1]:.6f}) station {s:.6f} multiplier {share:.6f}" for row, at, s, share in each)
+        last = (
+            f"proof: no rigid motion brings {len(self.witnesses)} of the measured points into {self.bound:.9f} of the zone; "
+            f"{self.boxes:,} boxes of motions looked at, the finest {self.finest_mm:.1e} mm"
+            if self.proven
+            else f"no proof over every placement that more than {self.bound:.9f} of the zone is consumed ({self.boxes:,} boxes of motions)"
+        )
+        return (
+            f"least consumption {self.fit.consumption:.9f} of the zone, turned {np.degrees(pose.rotation_rad):.9f} deg, "
+            f"moved ({x:.9f}, {y:.9f}) mm\nheld by points {held}\n{last}"
         )

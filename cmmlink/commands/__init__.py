@@ -16,6 +16,7 @@ import typer
 from cmmlink.commands.console import serve_console
 from cmmlink.commands.exit_codes import DEVICE_FAILED, NO_RECORD, STOPPED, UNUSABLE, fail, fail_as_asked
 from cmmlink.commands.measure import demo, inspect, run
+from cmmlink.commands.proofs import verify_zone
 from cmmlink.commands.records import export, replay, runs, show, verify
 from cmmlink.commands.setup import check, doctor, list_ports, nominal, prepare, simulate
 from cmmlink.commands.surfaces import ManyHeights, ct
@@ -49,6 +50,7 @@ app.command()(show)
 app.command()(export)
 app.command()(replay)
 app.command()(verify)
+app.command("verify-zone")(verify_zone)
 
 
 @app.callback(invoke_without_command=True)

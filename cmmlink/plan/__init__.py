@@ -5,6 +5,7 @@ TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer 
 if TYPE_CHECKING:
     from cmmlink.plan.characteristics import AskedCharacteristic, AskedFilter, AskedProfile, Place
     from cmmlink.plan.cutters import CutterName
+    from cmmlink.plan.deciding import PROFILE, Deciding
     from cmmlink.plan.own_maps import map_of
     from cmmlink.plan.scan import (
         Datum,
@@ -28,6 +29,7 @@ else:
     from cmmlink.front_door import load_on_use
 
     _PLACES = {
+        "cmmlink.plan.deciding": ("PROFILE", "Deciding"),
         "cmmlink.plan.own_maps": ("map_of",),
         "cmmlink.plan.scan": (
             "Datum",
@@ -55,12 +57,14 @@ else:
 
 
 __all__ = [
+    "PROFILE",
     "AskedCharacteristic",
     "AskedFilter",
     "AskedProfile",
     "CtPlan",
     "CutterName",
     "Datum",
+    "Deciding",
     "Device",
     "Discretisation",
     "FileDevice",

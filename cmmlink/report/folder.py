@@ -7,11 +7,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from cmmlink.characteristics import is_short_form
+from cmmlink.characteristics_csv import write_characteristics
 from cmmlink.deviations_csv import write_deviations
 from cmmlink.errors import PlanError
 from cmmlink.result_files import new_files
 from cmmlink.result_folder import fixed_part, make_room
 from cmmlink.run import FinishedRun
+from cmmlink.zone_file import zone_document
 from inspection import InspectionResult, NominalProfile
 
 
@@ -36,6 +39,8 @@ def write_results(
 ) -> list[str]:
     """Write result.json and, when points were judged, deviations.csv and profile.png. Returns their names; raises PlanError.
 
+    Of a plan with characteristics there is characteristics.csv as well, and zone.json where one of them is a minimum zone.
+
     What an earlier run left there is moved aside, into a folder of its own; the new files take its place together.
     """
     with _or_refuse(folder), new_files(folder, make_room) as files:
@@ -45,6 +50,10 @@ def write_results(
 
             ending = document.get("ending", "complete")
             write_deviations(result.blocks(), files("deviations.csv"), ending)
+            if not is_short_form(result.characteristics):
+                write_characteristics(result.characteristics, files("characteristics.csv"))
+            if (zones := zone_document(document, profile)) is not None:
+                files("zone.json").write_text(json.dumps(zones, indent=2) + "\n", encoding="utf-8")
             write_picture(result, profile, title, files("profile.png"), ending, _said_at_foot(document))
     return files.names
 

@@ -9,7 +9,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn
 from rich.table import Table
 
-from cmmlink.characteristics import PROFILE
+from cmmlink.characteristics import is_short_form
 from cmmlink.events import Counts, Ending
 from cmmlink.run_state import RunState
 from cmmlink.run_view import RunView
@@ -125,7 +125,7 @@ def _print_numbers(console: Console, result: InspectionResult) -> None:
         f"(x {worst.actual_mm[0, 0]:.3f}, y {worst.actual_mm[0, 1]:.3f})"
     )
     _print_stretches(console, result)
-    if [one.name for one in result.characteristics] != [PROFILE]:
+    if not is_short_form(result.characteristics):
         print_characteristics(console, result.characteristics)
     registration = result.registration
     pose = registration.nominal_from_section

@@ -15,7 +15,7 @@ from inspection.freedoms import Freedoms
 from inspection.methods import RuleName
 from inspection.rigid import RigidTransform
 from inspection.verdict import Verdict
-from inspection.zone_certificate import ZoneCertificate
+from inspection.zone_certificate import ConsumptionCertificate, ZoneCertificate
 from inspection.zones import VaryingZone
 
 CharacteristicFit = Literal["none", "datum", "best-fit", "minimum-zone", "tolerance"]
@@ -145,7 +145,7 @@ class CharacteristicResult:
     zone_words   : the tolerance in the notations of ISO 1101 and ASME Y14.5, or in words
     pose         : nominal from section, where it was judged; None where there was none
     coverage     : share of the region that was measured, and `gap_mm` the longest stretch of it without a point
-    certificate  : what proves a minimum zone; None for other fits
+    certificate  : what proves a minimum zone or a least consumption; None for other fits
     places_mm    : places of a number of the section, for a drawing, with their names
     notes        : what the method had to assume
     """
@@ -174,7 +174,7 @@ class CharacteristicResult:
     pose: RigidTransform | None = None
     coverage: float = float("nan")
     gap_mm: float = float("nan")
-    certificate: ZoneCertificate | None = None
+    certificate: ZoneCertificate | ConsumptionCertificate | None = None
     places_mm: tuple[tuple[str, float, float], ...] = ()
     notes: tuple[str, ...] = ()
 

@@ -11,14 +11,15 @@ from numpy.typing import NDArray
 
 from inspection.certificate import certify_minimum_zone
 from inspection.characteristics.characteristic import LineProfile
-from inspection.consumption import ConsumptionFit, fit_least_consumption
+from inspection.consumption import fit_least_consumption
+from inspection.consumption_proof import certify_consumption
 from inspection.evaluation.basis import Basis
 from inspection.freedoms import Freedoms
 from inspection.limited_fit import register_within
 from inspection.minimum_zone import MinimumZone, fit_minimum_zone
 from inspection.registration import Registration
 from inspection.rigid import RigidTransform
-from inspection.zone_certificate import ZoneCertificate
+from inspection.zone_certificate import ConsumptionCertificate, ConsumptionFit, ZoneCertificate
 from inspection.zones import VaryingZone
 
 Array = NDArray[np.float64]
@@ -26,6 +27,7 @@ Rows = NDArray[np.int64]
 
 _GAP_SHARE = 1e-3  # of the zone's width: by so much the proof of a minimum zone may fall short of it, and by 0.01 um at least
 _GAP_MM = 1e-5
+_GAP_CONSUMPTION = 0.01  # of the zone, for the proof of a least consumption
 _MOST_BOXES = 200_000
 _FEWEST_POINTS = 4  # of a fit: one more than there are freedoms
 
@@ -39,7 +41,7 @@ class Placed:
     is_known    : no fit could have put the part elsewhere: the pose is the datum, or was given
     is_free     : the fit could make every motion
     converged   : the fit settled
-    certificate : of a minimum zone over every placement; its rows are those of the run
+    certificate : of a minimum zone or a least consumption over every placement; its rows are those of the run
     """
 
     pose: RigidTransform
@@ -47,7 +49,7 @@ class Placed:
     is_known: bool = False
     is_free: bool = False
     converged: bool = True
-    certificate: ZoneCertificate | None = None
+    certificate: ZoneCertificate | ConsumptionCertificate | None = None
 
 
 def place(asked: LineProfile, basis: Basis, rows: Rows) -> Placed:
@@ -74,7 +76,9 @@ def place(asked: LineProfile, basis: Basis, rows: Rows) -> Placed:
         return Placed(registration.nominal_from_section.snap_to_grid(), words, start_known and not free, free, registration.converged)
     if asked.fit == "tolerance":
         least = consume_least(asked, basis, points, best.registration.nominal_from_section, None if free else start)
-        return Placed(least.nominal_from_section.snap_to_grid(), words, False, free, least.converged)
+        proof = _certify_consumption(asked, basis, points, least, rows) if free else None
+        fit = least if proof is None else proof.fit
+        return Placed(fit.nominal_from_section.snap_to_grid(), words, False, free, fit.converged, proof)
     if not free:
         zone = shrink_zone(asked, basis, points, start)
         return Placed(zone.nominal_from_section.snap_to_grid(), words, False, False, zone.converged)
@@ -125,6 +129,14 @@ def _certify(basis: Basis, points: Array, start: Registration, middle_mm: float,
     """The minimum zone of points (k, 2) near a start, and what is proven of every other placement."""
     gap_mm = max(_GAP_MM, _GAP_SHARE * float(width_mm))
     return certify_minimum_zone(points, basis.nominal, start, basis.terms.tip_radius_mm, middle_mm, gap_mm, _MOST_BOXES)
+
+
+def _certify_consumption(asked: LineProfile, basis: Basis, points: Array, least: ConsumptionFit, rows: Rows) -> ConsumptionCertificate:
+    """The least consumption of points (k, 2) near a fit, and what is proven of every other placement; its rows are those of the run."""
+    tip = basis.terms.tip_radius_mm
+    proof = certify_consumption(points, basis.nominal, asked.zone, least, tip, gap=_GAP_CONSUMPTION, most_boxes=_MOST_BOXES)
+    fit = replace(proof.fit, active=rows[proof.fit.active])
+    return replace(proof, fit=fit, witnesses=rows[proof.witnesses])
 
 
 def _in_run(certificate: ZoneCertificate, rows: Rows) -> ZoneCertificate:

@@ -1,0 +1,202 @@
+"""The check of a minimum zone by whoever doubts it: zone.json in, yes or no out, by code that shares nothing with what found the zone.
+
+What is checked needs a dense polygon of the nominal and the distance to it. First that the pose brings the points into the zone and that
+those which hold it balance, so that no small motion makes it smaller. Then that no rigid motion at all brings the witnesses into a zone
+narrower by the stated gap: a box of motions moves a point by at most a known length, so a point that is farther out than that refutes
+the whole box; a box that no point refutes is cut. The distance to the curve is known between two bounds, and only the kinder one counts.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+from scipy.spatial import cKDTree
+
+Array = NDArray[np.float64]
+
+_SAMPLES = 400_000
+_MOST_BOXES = 2_000_000
+_WAVE = 2048
+_SAME_MM = 2e-6  # deviations at the pose are those that were stated, to the rounding of the pose
+_BALANCED = 1e-4  # what may be left of the sum of unit gradients: the normals of a polygon are off by its steps
+
+
+@dataclass(frozen=True, slots=True)
+class ZoneCheck:
+    """What the check of one zone found. `problem` is empty where everything that was stated is so."""
+
+    name: str
+    half_mm: float
+    gap_mm: float
+    boxes: int
+    problem: str
+
+    @property
+    def words(self) -> str:
+        """The outcome in one line."""
+        if self.problem:
+            return f"{self.name}: NOT VERIFIED: {self.problem}"
+        bound = f"no rigid motion brings the witnesses within {self.half_mm - self.gap_mm:.6f} mm of its middle"
+        return f"{self.name}: verified: minimum zone {2 * self.half_mm:.6f} mm; {bound} ({self.boxes:,} boxes)"
+
+
+def check_zones(document: Mapping[str, Any]) -> tuple[ZoneCheck, ...]:
+    """Check every zone of a zone.json. Raises ValueError for a document that is none."""
+    try:
+        curve = _Polygon(document["nominal"])
+        return tuple(_check(zone, curve) for zone in document["zones"])
+    except (KeyError, TypeError, IndexError) as error:
+        raise ValueError(f"this is no zone.json: {error}") from None
+
+
+class _Polygon:
+    """The nominal as a dense polygon (n, 2), and how far it may be from the curve."""
+
+    def __init__(self, nominal: Mapping[str, Any]) -> None:
+        degree, knots = int(nominal["degree"]), np.array(nominal["knots"], dtype=np.float64)
+        points, weights = np.array(nominal["control_points_mm"], dtype=np.float64), np.array(nominal["weights"], dtype=np.float64)
+        spline = BSpline(knots, np.column_stack([points * weights[:, None], weights]), degree)
+        breaks = np.unique(knots[degree : len(knots) - degree])
+        each = max(2, _SAMPLES // (len(breaks) - 1))
+        u = np.unique(np.concatenate([np.linspace(a, b, each) for a, b in pairwise(breaks)]))
+        lifted = spline(u)
+        self.places = lifted[:, :2] / lifted[:, 2:]
+        self.closed = bool(nominal["closed"])
+        if self.closed:
+            self.places = self.places[:-1]
+        ahead = np.roll(self.places, -1, axis=0) - self.places
+        if not self.closed:
+            ahead[-1] = ahead[-2]
+        self.step = np.hypot(*ahead.T)
+        normal = np.column_stack([-ahead[:, 1], ahead[:, 0]]) / np.where(self.step > 0, self.step, 1.0)[:, None]
+        self.normal = normal if nominal["material"] == "right" else -normal
+        before = np.roll(self.normal, 1, axis=0)
+        if not self.closed:
+            before[0] = self.normal[0]
+        self.at_vertex = self.normal + before
+        turning = np.arccos(np.clip((self.normal * before).sum(axis=1), -1.0, 1.0))
+        smooth = np.where(turning < 0.1, turning, 0.0)  # what turns more at once is a corner, where the polygon is exact
+        self.reach = float(self.step.max()) / 2  # no place of the curve is farther from a vertex along the polygon
+        self.sag = float((self.step * smooth).max()) / 4  # an arc of this turning stands off its chord by an eighth of step times turning
+        self.tree = cKDTree(self.places)
+
+    def bounds(self, places: Array, moves: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Lowest and highest signed distance (k,) of places (k, 2), and where the sign may be either, as beyond an open end."""
+        distance, vertex = self.tree.query(places)
+        low = np.sqrt(np.maximum(distance**2 - self.reach**2, 0.0)) - self.sag
+        off = places - self.places[vertex]
+        sign = np.where((off * self.at_vertex[vertex]).sum(axis=1) >= 0, 1.0, -1.0)
+        either = np.asarray(distance <= 4 * self.reach)  # so near the curve the side is not told by a vertex
+        low = np.where(either, 0.0, np.maximum(low, 0.0))
+        high = distance + self.sag
+        if not self.closed:
+            ends = self.places[[0, -1]]
+            to_end = np.hypot(*(places[:, None, :] - ends).T).min(axis=0)
+            either = either | (to_end <= distance + 2 * moves + 2 * self.reach)
+        return np.where(sign > 0, low, -high), np.where(sign > 0, high, -low), either
+
+
+def _check(zone: Mapping[str, Any], curve: _Polygon) -> ZoneCheck:
+    """Check one zone."""
+    half, middle, gap, tip = zone["zone_mm"] / 2, zone["middle_mm"], zone["gap_mm"], zone["tip_radius_mm"]
+    active = np.array([[point["x_mm"], point["y_mm"]] for point in zone["active"]], dtype=np.float64)
+    witnesses = np.array([[point["x_mm"], point["y_mm"]] for point in zone["witnesses"]], dtype=np.float64)
+    found = ZoneCheck(str(zone["name"]), half, gap, 0, "")
+    problem = _problem_at_pose(zone, active, curve)
+    if problem or not zone["proven"]:
+        return ZoneCheck(found.name, half, gap, 0, problem or "what the file says is not proven over every placement")
+    boxes, refuted = _refute(witnesses, curve, half - gap, middle + tip)
+    problem = "" if refuted else f"after {boxes:,} boxes of motions it is not shown that every other placement needs a wider zone"
+    return ZoneCheck(found.name, half, gap, boxes, problem)
+
+
+def _problem_at_pose(zone: Mapping[str, Any], active: Array, curve: _Polygon) -> str:
+    """What is not as stated at the pose: the deviations of the points that hold the zone, or their balance."""
+    angle, shift = math.radians(zone["pose"]["rotation_deg"]), np.array(zone["pose"]["translation_mm"], dtype=np.float64)
+    c, s = math.cos(angle), math.sin(angle)
+    moved = active @ np.array([[c, s], [-s, c]]) + shift
+    distance, normal = _signed_distances(curve, moved)
+    off = distance - zone["tip_radius_mm"] - zone["middle_mm"]
+    stated = np.array([point["deviation_mm"] for point in zone["active"]])
+    if np.abs(off - stated).max(initial=0.0) > _SAME_MM or np.abs(np.abs(stated) - zone["zone_mm"] / 2).max(initial=0.0) > _SAME_MM:
+        return "the points that hold the zone are not at its limits"
+    share = np.array([point["multiplier"] for point in zone["active"]])
+    if not len(share) or share.min() <= 0 or abs(share.sum() - 1) > 1e-6:
+        return "the multipliers are not positive with the sum 1"
+    arms = moved - moved.mean(axis=0)
+    reach = float(np.hypot(*arms.T).max())
+    rates = np.column_stack([normal, (arms[:, 0] * normal[:, 1] - arms[:, 1] * normal[:, 0]) / reach])
+    left = float(np.linalg.norm((share * np.sign(stated)) @ rates))
+    return f"the points do not balance: {left:.1e} of a unit is left" if left > _BALANCED else ""
+
+
+def _signed_distances(curve: _Polygon, places: Array) -> tuple[Array, Array]:
+    """Signed distances (k,) of places (k, 2) to the polygon, out of material positive, and the directions (k, 2) in which they grow."""
+    _, vertex = curve.tree.query(places)
+    n, best, direction = len(curve.places), np.full(len(places), np.inf), np.zeros_like(places)
+    for first in (vertex - 1, vertex):
+        a, b = curve.places[first % n], curve.places[(first + 1) % n]
+        along = b - a
+        t = np.clip(((places - a) * along).sum(axis=1) / np.maximum((along * along).sum(axis=1), 1e-300), 0.0, 1.0)
+        off = places - (a + t[:, None] * along)
+        distance = np.hypot(*off.T)
+        nearer = distance < np.abs(best)
+        inner = (t > 0) & (t < 1)
+        normal = np.where(inner[:, None], curve.normal[first % n], curve.at_vertex[vertex])
+        sign = np.where((off * normal).sum(axis=1) >= 0, 1.0, -1.0)
+        best = np.where(nearer, sign * distance, best)
+        grown = np.where((distance > 1e-12)[:, None], sign[:, None] * off / np.maximum(distance, 1e-12)[:, None], normal)
+        direction = np.where(nearer[:, None], grown, direction)
+    return best, direction
+
+
+def _refute(points: Array, curve: _Polygon, half: float, middle: float) -> tuple[int, bool]:
+    """Refute every rigid motion that would bring points (w, 2) within `half` of `middle`. Gives the boxes, and whether all fell."""
+    arms = points - points[0]
+    lengths = np.hypot(*arms.T)
+    low, high = curve.places.min(axis=0), curve.places.max(axis=0)
+    side = float((high - low).max()) / 2 + half + abs(middle)
+    boxes = np.array([[*((low + high) / 2), 0.0, side, math.pi]])  # x, y, angle, half widths
+    looked_at = 0
+    while len(boxes):
+        wave, boxes = boxes[-_WAVE:], boxes[:-_WAVE]
+        looked_at += len(wave)
+        if looked_at > _MOST_BOXES:
+            return looked_at, False
+        left = wave
+        for arm, length in zip(arms, lengths, strict=True):
+            if not len(left):
+                break
+            left = left[~_is_out(left, arm, float(length), curve, half, middle)]
+        if len(left) and left[:, 3].max() < 1e-9 and left[:, 4].max() < 1e-12:
+            return looked_at, False
+        boxes = np.concatenate([boxes, *_cut(left, float(lengths.max()))])
+    return looked_at, True
+
+
+def _is_out(boxes: Array, arm: Array, length: float, curve: _Polygon, half: float, middle: float) -> NDArray[np.bool_]:
+    """Which boxes (k, 5) a point refutes, that lies at `arm` from the anchor: whatever motion of the box, it is out of the zone."""
+    c, s = np.cos(boxes[:, 2]), np.sin(boxes[:, 2])
+    places = boxes[:, :2] + np.column_stack([c * arm[0] - s * arm[1], s * arm[0] + c * arm[1]])
+    moves = math.sqrt(2) * boxes[:, 3] + 2 * np.sin(np.minimum(boxes[:, 4], math.pi) / 2) * length
+    low, high, either = curve.bounds(places, moves)
+    room = half + moves + 1e-9
+    above, below = low - middle > room, high - middle < -room
+    nearest = np.minimum(np.abs(low), np.abs(high))
+    both = (nearest - middle > room) & (-nearest - middle < -room)
+    return np.where(either, both, above | below)
+
+
+def _cut(boxes: Array, reach: float) -> list[Array]:
+    """Cut boxes (k, 5) in place, into four, or in angle, into two: whichever moves points more."""
+    in_place = math.sqrt(2) * boxes[:, 3] >= 0.7 * 2 * np.sin(boxes[:, 4] / 2) * reach
+    wide, long = boxes[in_place], boxes[~in_place]
+    step, turn, same = wide[:, 3] / 2, long[:, 4] / 2, np.zeros(len(wide))
+    quarters = [wide + np.column_stack([x * step, y * step, same, -step, same]) for x in (-1, 1) for y in (-1, 1)]
+    none = np.zeros(len(long))
+    return quarters + [long + np.column_stack([none, none, way * turn, none, -turn]) for way in (-1, 1)]
