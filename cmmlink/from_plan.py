@@ -11,7 +11,7 @@ from cmmlink.characteristics import Builder, base_of
 from cmmlink.errors import PlanError
 from cmmlink.events import RunStarted
 from cmmlink.nominal_files import NominalFile, load_nominal, material_side
-from cmmlink.plan import CtPlan, Discretisation, Nominal, Plan, place_of
+from cmmlink.plan import CtPlan, Discretisation, Nominal, Plan, Section, place_of
 from inspection import (
     Characteristic,
     FitName,
@@ -53,18 +53,40 @@ def name_place(plan_file: Path, key: str) -> Iterator[None]:
 def profile_of(plan: Plan) -> NominalProfile:
     """The nominal that a plan names, discretised as it says."""
     nominal = plan.nominal
-    return discretize_file(load_from(nominal, nominal.file), nominal.file, nominal, plan.discretisation)
+    return discretize_file(_load(plan), nominal.file, nominal, plan.discretisation)
 
 
-def load_from(nominal: Nominal, path: Path) -> NominalFile:
-    """The nominal in the file `path`, read as a plan says."""
-    return load_nominal(path, nominal.scale, nominal.closed, nominal.unit)
+def load_from(nominal: Nominal, path: Path, section: SectionPlane | None = None) -> NominalFile:
+    """The nominal in the file `path`, read as a plan says; `section` is the plane of the section, where one is asked for."""
+    return load_nominal(path, nominal.scale, nominal.closed, nominal.unit, layer=nominal.layer, curve=nominal.curve, section=section)
 
 
 def notes_on_nominal(plan: Plan) -> tuple[str, ...]:
     """What was assumed or mended when the nominal of a plan was read, each with the name of its file."""
-    nominal = plan.nominal
-    return tuple(f"{nominal.file.name}: {note}" for note in load_from(nominal, nominal.file).notes)
+    return tuple(f"{plan.nominal.file.name}: {note}" for note in _load(plan).notes)
+
+
+def with_section(plan: Plan) -> Plan:
+    """The plan with the section that its nominal brings: the plane of a curve in space, where the plan names none of its own."""
+    plane = None if _asks_for_section(plan) else _load(plan).plane
+    if plane is None:
+        return plan
+    vectors = {name: getattr(plane, name).tolist() for name in ("origin_mm", "normal", "x_axis")}
+    return plan.model_copy(update={"section": plan.section.model_copy(update={name: tuple(vector) for name, vector in vectors.items()})})
+
+
+def _load(plan: Plan) -> NominalFile:
+    return load_from(plan.nominal, plan.nominal.file, plane_of(plan.section) if _asks_for_section(plan) else None)
+
+
+def _asks_for_section(plan: Plan) -> bool:
+    """Whether a plan says in which plane its section lies."""
+    return bool(plan.section.model_fields_set & {"origin_mm", "normal", "x_axis"})
+
+
+def plane_of(section: Section) -> SectionPlane:
+    """The plane of a plan's section."""
+    return SectionPlane(np.array(section.origin_mm), np.array(section.x_axis), np.array(section.normal))
 
 
 def discretize_file(file: NominalFile, path: Path, nominal: Nominal, finely: Discretisation) -> NominalProfile:
@@ -99,7 +121,7 @@ def inspection_of(
         plan.zone,
         **_fitting(plan),
         tip_radius_mm=plan.probe.tip_radius_mm,
-        section=SectionPlane(np.array(section.origin_mm), np.array(section.x_axis), np.array(section.normal)),
+        section=plane_of(section),
         off_section_max_mm=section.off_plane_max_mm,
         characteristics=asked_of(plan, profile) if characteristics is None else characteristics,
         provisional=provisional,

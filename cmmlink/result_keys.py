@@ -274,6 +274,14 @@ class StackInspected(_Json):
     notes: list[str] = Field(description="what holds for all sections")
 
 
+class NominalPlane(_Json):
+    """The plane in space that the curve of a drawing lies in, spelt as a plan spells a section."""
+
+    origin_mm: list[float] = Field(description="a point of the plane, the origin of the curve's coordinates")
+    normal: list[float] = Field(description="the direction of its normal, of length 1")
+    x_axis: list[float] = Field(description="the direction of the curve's x axis, of length 1")
+
+
 class Understood(_Json):
     """The answer of `nominal`: what was understood of a file."""
 
@@ -286,6 +294,8 @@ class Understood(_Json):
     source_format: str = Field(description="the format that the file was read as")
     corners: int = Field(description="the number of its corners")
     material: Literal["left", "right"] | None = Field(description="the side of the material, where the curve shows it")
+    layers: list[str] = Field(description="the layers of a drawing that it is drawn on")
+    plane: NominalPlane | None = Field(description="the plane of a curve that a drawing has in space; null: it is drawn in x and y")
     notes: list[str] = Field(description="what was assumed or mended in reading the file")
 
 

@@ -16,7 +16,7 @@ from typing import Any
 from cmmlink.characteristics import notes_on_zone
 from cmmlink.devices import Connected
 from cmmlink.events import RunStarted, Sink
-from cmmlink.from_plan import inspection_of, notes_on_nominal, run_started
+from cmmlink.from_plan import inspection_of, notes_on_nominal, run_started, with_section
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan import FileDevice, Plan
 from cmmlink.record import PATIENCE_S, QUEUE_BYTES, Recorder, RecordReference, RunInputs, open_to_record
@@ -104,13 +104,14 @@ def carry_out(
     A device that fails does not raise: the outcome says so. Raises StoreError when the record cannot be kept, PlanError when
     the plan cannot be carried out, and whatever a sink raises.
     """
+    assumed, plan = notes_on_nominal(plan), with_section(plan)
     _log.info("nominal %s, %s, %s", plan.nominal.file, plan.zone, plan.registration)
     rehearse(profile, plan.registration.method, plan.registration.reject_outliers)
     scratch = scratch_in(records)
     _log.info("%s", words_of_room(scratch.folder))
     followed = bool(sinks) or not isinstance(plan.device, FileDevice)
     live = inspection_of(plan, profile, scratch, provisional=followed)
-    started = run_started(plan, device.device, device.simulated, (*notes_on_nominal(plan), *notes_on_zone(plan), *device.notes))
+    started = run_started(plan, device.device, device.simulated, (*assumed, *notes_on_zone(plan), *device.notes))
     on_ready()
     with ExitStack() as stack:
         recorder: Recorder | None = None

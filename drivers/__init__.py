@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from drivers.files.point_file import PointFile, PointFileSource, convert_to_mm, points_of, read_points
     from drivers.files.row_reading import shorten
     from drivers.files.stated_units import UnitName, mm_per
-    from drivers.files.text_table import Columns, count_of, numbers_of, parse_columns, read_text
+    from drivers.files.text_table import Columns, count_of, numbers_of, parse_columns, read_bytes, read_text
     from drivers.links.address import device_address
     from drivers.links.capture import Capture
     from drivers.maps import shipped_map, shipped_maps
@@ -46,7 +46,7 @@ else:
         "drivers.files.point_file": ("PointFile", "PointFileSource", "convert_to_mm", "points_of", "read_points"),
         "drivers.files.row_reading": ("shorten",),
         "drivers.files.stated_units": ("UnitName", "mm_per"),
-        "drivers.files.text_table": ("Columns", "count_of", "numbers_of", "parse_columns", "read_text"),
+        "drivers.files.text_table": ("Columns", "count_of", "numbers_of", "parse_columns", "read_bytes", "read_text"),
         "drivers.links.address": ("device_address",),
         "drivers.links.capture": ("Capture",),
         "drivers.maps": ("shipped_map", "shipped_maps"),
@@ -115,6 +115,7 @@ __all__ = [
     "numbers_of",
     "parse_columns",
     "points_of",
+    "read_bytes",
     "read_points",
     "read_text",
     "register_map",

@@ -53,6 +53,10 @@ Headless = Annotated[bool, typer.Option("--headless", help="No page, no live tab
 NoBrowser = Annotated[bool, typer.Option("--no-browser", help="Serve the page and print its address, but open no browser.")]
 Uncertainty = Annotated[float, typer.Option(metavar="U", help="Expanded uncertainty of a deviation, mm.")]
 NominalScale = Annotated[float, typer.Option(metavar="S", help="Units of the nominal file to mm (a chord, for airfoils).")]
+Layer = Annotated[str | None, typer.Option("--layer", metavar="NAME", help="Layer of a drawing that the nominal is drawn on.")]
+CurveNumber = Annotated[
+    int | None, typer.Option("--curve", min=1, metavar="N", help="Which curve of a drawing is the nominal, the longest being 1.")
+]
 Closed = Annotated[bool | None, typer.Option("--closed/--open", help="Close the nominal, or leave it open.")]
 
 Model = TypeVar("Model", bound="BaseModel")
@@ -98,5 +102,7 @@ def columns_from(text: str | None) -> dict[str, int] | None:
 
 def section_in(plane: PlaneName) -> dict[str, Any]:
     """The section of a plan that lies in a plane of the machine: the first axis becomes x, the second y."""
+    if plane == "xy":
+        return {}  # a nominal that lies in space brings its own
     normal = {"xy": (0.0, 0.0, 1.0), "xz": (0.0, -1.0, 0.0), "yz": (1.0, 0.0, 0.0)}[plane]
     return {"normal": normal, "x_axis": (0.0, 1.0, 0.0) if plane == "yz" else (1.0, 0.0, 0.0)}

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cmmlink.commands.exit_codes import UNUSABLE, fail
-from cmmlink.commands.options import Closed, Json, PlanFile, Records, records_folder
+from cmmlink.commands.options import Closed, CurveNumber, Json, Layer, PlanFile, Records, records_folder
 from cmmlink.commands.output import now, print_json
 from cmmlink.errors import PlanError
 from cmmlink.version import __version__
@@ -18,25 +18,28 @@ from drivers import LinkError, UnitName
 
 if TYPE_CHECKING:
     from cmmlink.nominal_files import NominalFile
+    from inspection import SectionPlane
 
 
 def nominal(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="The nominal profile: UIUC dat, points, or nurbs yaml.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The nominal profile: UIUC dat, points, nurbs yaml, or a drawing.")],
     scale: Annotated[float, typer.Option(metavar="S", help="Units of the file to mm.")] = 1.0,
     unit: Annotated[UnitName | None, typer.Option(help="Unit of the file, in place of --scale, above what the file states.")] = None,
     closed: Closed = None,
+    layer: Layer = None,
+    curve: CurveNumber = None,
     as_json: Json = False,
 ) -> int:
     """Show what was understood of a nominal file."""
     from cmmlink.nominal_files import load_nominal
 
-    understood = load_nominal(file, scale, closed, unit)
+    understood = load_nominal(file, scale, closed, unit, layer=layer, curve=curve)
     if as_json:
         print_json(_nominal_json(understood))
         return 0
-    curve = understood.curve
-    typer.echo(f"{file}: {understood.source_format}, degree {curve.degree}, {len(curve.control_points_mm)} control points")
-    typer.echo(f"{'closed' if curve.closed else 'open'}, length {curve.length_mm:.4f} mm, corners {len(curve.corners)}")
+    nurbs = understood.curve
+    typer.echo(f"{file}: {understood.source_format}, degree {nurbs.degree}, {len(nurbs.control_points_mm)} control points")
+    typer.echo(f"{'closed' if nurbs.closed else 'open'}, length {nurbs.length_mm:.4f} mm, corners {len(nurbs.corners)}")
     for note in understood.notes:
         typer.echo(f"  {note}")
     return 0
@@ -44,6 +47,9 @@ def nominal(
 
 def _nominal_json(understood: "NominalFile") -> dict[str, Any]:
     from cmmlink.nominal_files import material_side
+
+    def plane_json(plane: "SectionPlane") -> dict[str, list[float]]:
+        return {name: getattr(plane, name).tolist() for name in ("origin_mm", "normal", "x_axis")}
 
     curve = understood.curve
     assert curve.weights is not None
@@ -57,6 +63,8 @@ def _nominal_json(understood: "NominalFile") -> dict[str, Any]:
         "source_format": understood.source_format,
         "corners": len(curve.corners),
         "material": material_side(curve),
+        "layers": list(understood.layers),
+        "plane": None if understood.plane is None else plane_json(understood.plane),
         "notes": list(understood.notes),
     }
 

@@ -5,7 +5,8 @@ file and nothing else:
 
     SUFFIXES : tuple[str, ...]                                                    lower case, with the dot
     def read(text: str, scale: float, closed: bool | None, unit: UnitName | None) -> NominalFile
-                                                                                  raises NominalError, naming the line
+    or, for what a CAD system writes, which may be no text and may hold many curves:
+    def draw(path: Path, section: SectionPlane | None) -> Drawing                 both raise NominalError, naming line or entity
 """
 
 import importlib
@@ -13,15 +14,19 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
-from typing import Literal, Protocol, cast
+from typing import TYPE_CHECKING, Literal, Protocol, cast, runtime_checkable
 
 import numpy as np
 
 from cmmlink.errors import YamlError
 from cmmlink.nominal_files.curve_words import notes_of, refuse_crossings
-from drivers import PointFileError, UnitName, mm_per, read_text
-from inspection import NominalError, NurbsCurve, check_curve
+from drivers import PointFileError, UnitName, mm_per, read_bytes, read_text
+from inspection import NominalError, NurbsCurve, SectionPlane, check_curve
 
+if TYPE_CHECKING:
+    from cmmlink.nominal_files.drawing import Drawing
+
+_START = 64  # bytes of a drawing that are looked at before it is read
 _ALMOST_CLOSED = 0.05  # of the length: the widest gap, as of a blunt trailing edge, at which a curve still has an inside
 
 
@@ -32,15 +37,19 @@ class NominalFile:
     curve         : in mm
     source_format : the name of the format, like "uiuc-selig"
     notes         : what was assumed or left out, for the reader of the file
+    layers        : the layers of a drawing that the curve is drawn on
+    plane         : the plane of a curve that a drawing has in space; None for one that is drawn in x and y
     """
 
     curve: NurbsCurve
     source_format: str
     notes: tuple[str, ...]
+    layers: tuple[str, ...] = ()
+    plane: SectionPlane | None = None
 
 
 class NominalFormat(Protocol):
-    """What a module of this package offers."""
+    """What a module of this package offers that reads text."""
 
     SUFFIXES: tuple[str, ...]
 
@@ -48,13 +57,34 @@ class NominalFormat(Protocol):
         """Understand the text of a file; `scale` is that of the `unit`, where one was given in words."""
 
 
-def load_nominal(path: Path, scale: float = 1.0, closed: bool | None = None, unit: UnitName | None = None) -> NominalFile:
+@runtime_checkable
+class DrawingFormat(Protocol):
+    """What a module of this package offers that reads what CAD systems write."""
+
+    SUFFIXES: tuple[str, ...]
+
+    def draw(self, path: Path, section: SectionPlane | None) -> "Drawing":
+        """The curves of a file; of a solid, those of its cut by the `section`."""
+
+
+def load_nominal(
+    path: Path,
+    scale: float = 1.0,
+    closed: bool | None = None,
+    unit: UnitName | None = None,
+    *,
+    layer: str | None = None,
+    curve: int | None = None,
+    section: SectionPlane | None = None,
+) -> NominalFile:
     """Read a nominal profile; the suffix of the file says its format.
 
     scale  : turns the file's unit into mm (the chord, for airfoils in chord units)
     unit   : the same in words, above whatever the file states; not beside a scale
     closed : True joins the end to the beginning, False keeps the curve open, None follows the file, which closes a blunt edge,
              and asks about a gap that may be either
+    layer, curve : which curve of a drawing is the nominal, by its layer and by its number, the longest being 1
+    section      : the plane of the section, if one was asked for: solids are cut there, and a curve in it has its coordinates
 
     The curve is checked: one that crosses itself is refused; where it changes its curvature, and its tightest hollow, are noted.
 
@@ -66,17 +96,38 @@ def load_nominal(path: Path, scale: float = 1.0, closed: bool | None = None, uni
         raise NominalError(f"unit {unit} and scale {scale:g} are both given; expected one of them")
     reader = _format_of(path)
     try:
-        text = read_text(path)
-    except PointFileError as error:
-        raise NominalError(str(error)) from None
-    try:
         with np.errstate(over="raise", divide="raise", invalid="raise"):
-            file = _checked(reader.read(text, mm_per(unit) if unit else scale, closed, unit))
+            if isinstance(reader, DrawingFormat):
+                return _checked(_drawn(reader, path, scale, closed, unit, layer, curve, section))
+            if layer is not None or curve is not None:
+                raise NominalError("holds one curve; expected no layer and no number of a curve: these choose among those of a drawing")
+            file = _checked(reader.read(read_text(path), mm_per(unit) if unit else scale, closed, unit))
         return replace(file, notes=(f"read in {unit}, as asked", *file.notes)) if unit else file
     except (PointFileError, YamlError, NominalError) as error:
-        raise NominalError(f"{path}: {error}") from None
+        raise NominalError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from None
     except FloatingPointError:
         raise NominalError(f"{path}: the numbers leave the range a curve can be computed in; expected a profile in mm") from None
+
+
+def _drawn(
+    reader: DrawingFormat,
+    path: Path,
+    scale: float,
+    closed: bool | None,
+    unit: UnitName | None,
+    layer: str | None,
+    curve: int | None,
+    section: SectionPlane | None,
+) -> NominalFile:
+    """The chosen curve of a drawing. A scale of 1 leaves the unit to the file."""
+    from cmmlink.nominal_files.drawing import Choice, nominal_of  # noqa: PLC0415 - only drawings need it
+
+    if not read_bytes(path, _START).strip():
+        raise NominalError("the file is empty")
+    drawing = reader.draw(path, section)
+    asked = mm_per(unit) if unit else None if scale == 1.0 else scale
+    found = nominal_of(drawing, Choice(layer, curve), asked, closed, section)
+    return NominalFile(found.curve, drawing.source_format, found.notes, found.layers, found.plane)
 
 
 def known_suffixes() -> list[str]:
@@ -107,7 +158,7 @@ def _checked(file: NominalFile) -> NominalFile:
     return replace(file, notes=(*file.notes, *notes_of(check)))
 
 
-def _formats() -> Iterator[NominalFormat]:
+def _formats() -> Iterator[NominalFormat | DrawingFormat]:
     """The modules of formats. Raises OSError where the folder cannot be read, which `pkgutil.iter_modules` takes for an empty one."""
     for name in sorted(file.name for file in resources.files(__name__).iterdir()):
         if name.endswith(".py") and name != "__init__.py":
@@ -116,7 +167,7 @@ def _formats() -> Iterator[NominalFormat]:
                 yield cast(NominalFormat, module)
 
 
-def _format_of(path: Path) -> NominalFormat:
+def _format_of(path: Path) -> NominalFormat | DrawingFormat:
     suffix = path.suffix.lower()
     for reader in _formats():
         if suffix in reader.SUFFIXES:

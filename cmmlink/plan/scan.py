@@ -72,8 +72,19 @@ class Part(Settings):
 class Nominal(Settings):
     """The nominal profile, and on which side of it the material lies."""
 
-    file: Path = Field(description="the file of the nominal profile: UIUC dat, points, or NURBS yaml")
-    scale: Positive = Field(default=1.0, description="how many mm a unit of the file is; for an airfoil in chord units, the chord in mm")
+    file: Path = Field(description="the file of the nominal profile: UIUC dat, points, NURBS yaml, or a drawing: DXF")
+    layer: Text | None = Field(
+        default=None, description="the layer of a drawing that the profile is drawn on; null: it is not chosen by its layer"
+    )
+    curve: int | None = Field(
+        default=None,
+        ge=1,
+        description="the number of the profile among the curves of a drawing, the longest being 1; null: the only closed one",
+    )
+    scale: Positive = Field(
+        default=1.0,
+        description="how many mm a unit of the file is; for an airfoil the chord in mm; 1 leaves the unit of a drawing to its file",
+    )
     unit: Unit = Field(default=None, description="the unit of the file in words, in place of scale: mm, um or inch")
     closed: bool | None = Field(default=None, description="whether the profile is closed; null: as the file shows; a blunt edge is closed")
     material: Material | None = Field(

@@ -7,7 +7,7 @@ from drivers.surface.contour_source import Contour, ContourSource, Gap, SurfaceS
 from drivers.surface.cut import Cutter, NumpyCutter, cut_surface, height_range_mm
 from drivers.surface.obj_file import read_obj
 from drivers.surface.open3d_process import Open3DMissing, Open3DProcess, Open3DStatus, mend_open3d, open3d_status
-from drivers.surface.section_axes import SectionAxes
+from drivers.surface.section_axes import SectionAxes, axes_of
 from drivers.surface.stl_file import SurfaceMesh, read_stl, surface_of
 
 __all__ = [
@@ -23,6 +23,7 @@ __all__ = [
     "SurfaceMesh",
     "SurfaceSection",
     "add_points_between",
+    "axes_of",
     "cut_surface",
     "height_range_mm",
     "mend_open3d",

@@ -12,8 +12,9 @@ from tests.cmmlink.recorded import Script, record, scan_arrivals
 
 ROOT = Path(__file__).resolve().parents[3]
 DEVICES, PAGE, PICTURES = {"pymodbus", "serial"}, {"starlette", "uvicorn", "websockets", "ssl", "asyncio"}, {"matplotlib"}
+CAD = {"ezdxf", "OCP"}
 MATHS, PLANS, SPEECH = {"numpy", "scipy", "numba", "llvmlite"}, {"yaml", "cmmlink.plan.scan"}, {"rich"}
-HEAVY = DEVICES | PAGE | PICTURES | MATHS | PLANS | SPEECH | {"simulators", "sqlite3"}
+HEAVY = DEVICES | PAGE | PICTURES | MATHS | PLANS | SPEECH | CAD | {"simulators", "sqlite3"}
 
 IN_ONE_PROCESS = """
 import contextlib, io, json, sys
@@ -59,6 +60,6 @@ def test_points_are_inspected_without_devices_page_and_pictures_and_pictures_dra
     inspect = ("inspect", points, "--nominal", nominal, *TOLERANCE, "--records", tmp_path)
     (judged, _, plain), (_, _, drawn) = loaded_by((*inspect, "--json"), (*inspect, "--out", tmp_path / "out"))
     assert judged == 0
-    assert plain & (DEVICES | PAGE | PICTURES | SPEECH | {"simulators"}) == set()
+    assert plain & (DEVICES | PAGE | PICTURES | SPEECH | CAD | {"simulators"}) == set()
     assert "matplotlib" in drawn
-    assert drawn & (DEVICES | PAGE | {"simulators"}) == set()
+    assert drawn & (DEVICES | PAGE | CAD | {"simulators"}) == set()
