@@ -50,6 +50,11 @@ def pose_of(datum: Datum | None) -> RigidTransform | None:
     return None if datum is None else RigidTransform(math.radians(datum.rotation_deg), np.array(datum.translation_mm))
 
 
+def known_pose(datum: RigidTransform | None, fit: FitName) -> RigidTransform | None:
+    """Where the points lie if that is known beforehand: by the datum, or because none is to be fitted."""
+    return RigidTransform.identity() if datum is None and fit == "none" else datum
+
+
 def base_of(plan: Plan | CtPlan) -> Base:
     """How the run of a plan judges its points as they arrive."""
     registration = plan.registration
@@ -101,9 +106,7 @@ class Builder:
 
     @property
     def _known_pose(self) -> RigidTransform | None:
-        registration = self._plan.registration
-        given = pose_of(registration.datum)
-        return RigidTransform.identity() if given is None and registration.fit == "none" else given
+        return known_pose(pose_of(self._plan.registration.datum), self._plan.registration.fit)
 
     def _line_profile(self, asked: AskedProfile) -> LineProfile:
         profile, zone = self._profile, asked.zone

@@ -2,12 +2,13 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TypedDict
 
 import numpy as np
 
-from cmmlink.characteristics import Builder, base_of
+from cmmlink.characteristics import Builder, base_of, known_pose, pose_of
 from cmmlink.errors import PlanError
 from cmmlink.events import RunStarted
 from cmmlink.nominal_files import NominalFile, load_nominal, material_side
@@ -22,8 +23,11 @@ from inspection import (
     Room,
     RuleName,
     SectionPlane,
+    StatedUncertainty,
+    ToleranceZone,
     WeightName,
     discretize,
+    uncertainty_along,
 )
 
 
@@ -31,6 +35,10 @@ def check_plan(plan: Plan, plan_file: Path) -> NominalProfile:
     """Build the profile of a plan and check the values that depend on it. Raises PlanError with file, line and key."""
     with name_place(plan_file, "nominal.file"):
         profile = profile_of(plan)
+    with name_place(plan_file, "temperature" if plan.temperature is not None else "uncertainty.temperature"):
+        check_fixed_place(plan)
+    with name_place(plan_file, "uncertainty"):
+        zone_of(plan, profile)
     builder = Builder(plan, profile)
     for number in range(len(plan.characteristics)):
         with name_place(plan_file, f"characteristics.{number}"):
@@ -89,6 +97,36 @@ def plane_of(section: Section) -> SectionPlane:
     return SectionPlane(np.array(section.origin_mm), np.array(section.x_axis), np.array(section.normal))
 
 
+def notes_on_temperature(plan: Plan | CtPlan) -> tuple[str, ...]:
+    """What was made of the temperature of the part."""
+    return (plan.warmth.words,) if plan.warmth is not None else ()
+
+
+def stated_by(plan: Plan | CtPlan) -> StatedUncertainty | None:
+    """The budget of the uncertainty that a plan states."""
+    return plan.uncertainty.stated(plan.warmth) if plan.uncertainty is not None else None
+
+
+def check_fixed_place(plan: Plan | CtPlan) -> None:
+    """Raise PlanError where the place that a warm part grows about matters, and is not stated."""
+    warm, registration = plan.warmth, plan.registration
+    is_known = known_pose(pose_of(registration.datum), registration.fit) is not None
+    if warm is not None and warm.growth and warm.fixed_mm is None and is_known:
+        raise PlanError("found no fixed_mm; the pose is known, so that it matters which place stays where it is as the part grows: [x, y]")
+
+
+def zone_of(plan: Plan | CtPlan, profile: NominalProfile) -> ToleranceZone:
+    """The zone that judges the points of a plan as they arrive, with its U. Raises PlanError where U leaves nothing provable."""
+    stated, base = stated_by(plan), base_of(plan)
+    if stated is None:
+        return plan.zone
+    largest_mm = uncertainty_along(profile, stated, known_pose(base.datum, base.fit)).largest_mm
+    try:
+        return replace(plan.zone, uncertainty_mm=largest_mm)
+    except ValueError as error:
+        raise PlanError(f"uncertainty: {error}") from None
+
+
 def discretize_file(file: NominalFile, path: Path, nominal: Nominal, finely: Discretisation) -> NominalProfile:
     """Discretise a nominal that was read from `path`. The material lies inside a closed profile unless the plan says otherwise."""
     side = nominal.material or material_side(file.curve)
@@ -123,6 +161,8 @@ def inspection_of(
         tip_radius_mm=plan.probe.tip_radius_mm,
         section=plane_of(section),
         off_section_max_mm=section.off_plane_max_mm,
+        uncertainty=stated_by(plan),
+        compensation=plan.warmth.compensation if plan.warmth is not None else None,
         characteristics=asked_of(plan, profile) if characteristics is None else characteristics,
         provisional=provisional,
         room=room,

@@ -12,7 +12,7 @@ from pathlib import Path
 
 PLACEHOLDERS = ("part", "serial", "run")
 _PLACEHOLDER = re.compile(r"\{(\w*)\}")
-_OF_A_RUN = ("result.json", "deviations.csv", "profile.png", "sections.csv", "stack.png")
+_OF_A_RUN = ("result.json", "deviations.csv", "uncertainty.csv", "profile.png", "sections.csv", "stack.png")
 _SECTIONS = "section-*_*mm"
 _LONGEST_NAME = 80
 _RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)  # names of devices on Windows

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from cmmlink.characteristics_json import characteristic_json
 from cmmlink.events import Counts, RunStarted
+from cmmlink.uncertainty_tables import uncertainty_json
 from inspection import Verdict
 
 if TYPE_CHECKING:
@@ -57,6 +58,7 @@ def result_json(result: "InspectionResult | None", counts: Counts) -> dict[str, 
             "decision_rule": result.zone.decision_rule,
         },
         "characteristics": [characteristic_json(found) for found in result.characteristics],
+        "uncertainty": uncertainty_json(result),
         **tail,
     }
 
@@ -127,6 +129,7 @@ _NOTHING: Mapping[str, Any] = {
     "complete": False,
     "tolerance": None,
     "characteristics": [],
+    "uncertainty": None,
 }
 
 

@@ -59,6 +59,42 @@ class Zone(_Json):
     decision_rule: str = Field(description="how the uncertainty counts, in words; simple acceptance where none was stated")
 
 
+class BudgetLine(_Json):
+    """One line of the budget of the uncertainty, by the GUM, at the station where U is largest."""
+
+    name: str = Field(description="what contributes: repeatability, device, tip radius, temperature or expansion")
+    value: float = Field(description="what the plan states of it; of the device its maximum permissible error over the size of the part")
+    unit: str = Field(description="the unit of that value")
+    distribution: str = Field(description="normal or rectangular")
+    evaluated: str = Field(description="the type of its evaluation, A or B")
+    standard: float = Field(description="its standard uncertainty, in the unit of the value")
+    sensitivity: float = Field(description="mm of the deviation for a unit of it")
+    contributed_mm: float = Field(description="what it contributes: the standard uncertainty times the sensitivity")
+    share: float = Field(description="its share of u^2, from 0 to 1")
+
+
+class UncertaintyAt(_Json):
+    """The expanded uncertainty at one place of the profile."""
+
+    station_mm: float = Field(description="where, as arc length from the start of the nominal")
+    expanded_mm: float = Field(description="U of a deviation there")
+
+
+class Uncertainty(_Json):
+    """How uncertain the deviations are, where the plan states a budget."""
+
+    basis: str = Field(description="what the deviations are counted from: the known pose, any placement of the part, or the best fit")
+    coverage_factor: float = Field(description="k of U = k u; 2 covers about 95 %")
+    largest_mm: float = Field(description="the largest U along the profile")
+    station_mm: float = Field(description="the station where it is")
+    standard_mm: float = Field(description="the combined standard uncertainty u there")
+    growth_left_mm: float = Field(description="growth there that is known and was not compensated; it is added to k u in full")
+    used_mm: float = Field(description="the U that judged the points; no station has a larger one")
+    largest_by_noise_mm: float = Field(description="how much the stated repeatability raises the largest |deviation| on average")
+    budget: list[BudgetLine] = Field(description="what contributes, at the station where U is largest")
+    stations: list[UncertaintyAt] = Field(description="U along the profile, at no more than 200 stations: each the largest of its stretch")
+
+
 class LargestGap(_Json):
     """The longest stretch of the profile without a judged point."""
 
@@ -189,6 +225,10 @@ class Inspected(_Json):
     complete: bool = Field(description="whether the scan came to its end")
     tolerance: Zone | None = Field(description="the tolerance that was applied")
     characteristics: list[Characterised] = Field(description="every characteristic of the plan, in its order")
+    uncertainty: Uncertainty | None = Field(
+        default=None,
+        description="how uncertain the deviations are; null where the plan states no budget",
+    )
     rejected_by_reason: dict[str, int] = Field(description="the number of rejected points for each reason that occurred")
     damaged_bytes: int = Field(description="the bytes on the wire that were no valid frame")
 

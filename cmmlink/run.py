@@ -16,7 +16,7 @@ from typing import Any
 from cmmlink.characteristics import notes_on_zone
 from cmmlink.devices import Connected
 from cmmlink.events import RunStarted, Sink
-from cmmlink.from_plan import inspection_of, notes_on_nominal, run_started, with_section
+from cmmlink.from_plan import inspection_of, notes_on_nominal, notes_on_temperature, run_started, with_section, zone_of
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan import FileDevice, Plan
 from cmmlink.record import PATIENCE_S, QUEUE_BYTES, Recorder, RecordReference, RunInputs, open_to_record
@@ -104,8 +104,8 @@ def carry_out(
     A device that fails does not raise: the outcome says so. Raises StoreError when the record cannot be kept, PlanError when
     the plan cannot be carried out, and whatever a sink raises.
     """
-    assumed, plan = notes_on_nominal(plan), with_section(plan)
-    _log.info("nominal %s, %s, %s", plan.nominal.file, plan.zone, plan.registration)
+    assumed, plan = (*notes_on_nominal(plan), *notes_on_temperature(plan)), with_section(plan)
+    _log.info("nominal %s, %s, %s", plan.nominal.file, zone_of(plan, profile), plan.registration)
     rehearse(profile, plan.registration.method, plan.registration.reject_outliers)
     scratch = scratch_in(records)
     _log.info("%s", words_of_room(scratch.folder))

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from cmmlink.endings import Ended, count_words, reasons_of
 from cmmlink.events import Arrived, Counts, Event, Judged, ProvenOut, RunStarted
 from cmmlink.extremes import DEVIATION, FOOT_X, NORMAL_X, STATION, VERDICT, ChangedBins, Extremes, PointsVersion
+from cmmlink.from_plan import zone_of
 from cmmlink.plan import Plan
 from cmmlink.result_json import density_notes, density_of, number, result_json
 from cmmlink.run_state import LinkPhase, Phase, RegistrationState, RunKind, RunState, VerdictState, WorstPoint, ZoneLimits
@@ -48,7 +49,7 @@ class RunContext:
     def of(cls, plan: Plan, profile: NominalProfile, began: datetime, number: str, plan_name: str, kind: RunKind = "run") -> "RunContext":
         """What a plan says of a run that begins, or began, at a time of day."""
         coverage_min = plan.registration.coverage_min
-        return cls(number, plan_name, profile, plan.zone, coverage_min, plan.buffer_points, began, kind)
+        return cls(number, plan_name, profile, zone_of(plan, profile), coverage_min, plan.buffer_points, began, kind)
 
 
 class _Received(NamedTuple):
@@ -297,7 +298,7 @@ class RunView:
             worst=_worst_point(self._extremes.worst),
             verdict=self._verdict(),
             length_mm=context.profile.length_mm,
-            zone=ZoneLimits(zone.lower_mm, zone.upper_mm, zone.uncertainty_mm, zone.decision_rule),
+            zone=ZoneLimits(zone.lower_mm, zone.upper_mm, zone.guard_mm, zone.decision_rule),
         )
 
     def _registration(self) -> RegistrationState:

@@ -18,7 +18,7 @@ import numpy as np
 from cmmlink.characteristics import notes_on_zone
 from cmmlink.errors import PlanError
 from cmmlink.events import Ending, RunStarted
-from cmmlink.from_plan import asked_of, discretize_file, load_from, run_started
+from cmmlink.from_plan import asked_of, check_fixed_place, discretize_file, load_from, notes_on_temperature, run_started, zone_of
 from cmmlink.outline import outline_of
 from cmmlink.pipeline import RunOutcome
 from cmmlink.plan import CtPlan, Discretisation
@@ -172,6 +172,7 @@ def inspect_stack(
     Raises PlanError, NominalError and MeshError for what cannot be used, RegistrationError when no section fits its nominal,
     StoreError when the record cannot be kept.
     """
+    check_fixed_place(plan)
     began, profiles = now(), _Profiles(plan)
     with ExitStack() as opened:
         open3d = _Open3D(opened)
@@ -184,7 +185,7 @@ def inspect_stack(
             record = StackRecord.of(store, plan, mesh.triangles, len(heights), began=began, clock=clock, now=now)
         on_start(len(heights))
         read_in = [f"{plan.mesh.file.name}: read in {plan.mesh.unit}, as asked"] if plan.mesh.unit else []
-        notes = [*read_in, *mesh.warnings, *profiles.notes, *notes_on_zone(plan)]
+        notes = [*read_in, *mesh.warnings, *profiles.notes, *notes_on_temperature(plan), *notes_on_zone(plan)]
         sections: list[SectionOutcome] = []
         for cut in _slices(plan, mesh, heights, open3d, notes, profiles.shortest_mm):
             stack = _Stack(plan, profiles, tuple(notes))
@@ -285,6 +286,7 @@ class _Profiles:
         self.notes += [f"{path.name}: {note}" for note in file.notes]
         self._profiles[path] = discretize_file(file, path, nominal, Discretisation())
         self._asked[path] = asked_of(self._plan, self._profiles[path])
+        zone_of(self._plan, self._profiles[path])  # with a U that leaves nothing provable, no section need be cut
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,7 +12,7 @@ import cmmlink
 import drivers
 import inspection
 import simulators
-from cmmlink import deviations_csv
+from cmmlink import deviations_csv, uncertainty_tables
 from cmmlink.plan.reference import Group, groups_of, table
 from cmmlink.plan.scan import Plan
 from cmmlink.plan.surface import CtPlan
@@ -126,6 +126,7 @@ TABLES: tuple[tuple[str, Mapping[str, str]], ...] = (
         "`deviations.csv`: a line for every received point (`ending` only of a run that did not come to its end)",
         deviations_csv.EARLY_COLUMNS,
     ),
+    ("`uncertainty.csv`, where the plan states a budget: a line for every place along the profile", uncertainty_tables.COLUMNS),
     ("`sections.csv` of `ct`: a line for every section", stack_folder.SECTION_COLUMNS),
     ("`contours.csv` of a section: a line for every contour point", stack_folder.CONTOUR_COLUMNS),
     ("`points.csv` and `points.npy` of `export`: a line for every point", export.POINT_COLUMNS),

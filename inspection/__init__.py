@@ -65,7 +65,7 @@ if TYPE_CHECKING:
     from inspection.signed_deviations import Deviations, deviations, profile_error_mm
     from inspection.telling_points import telling_rows
     from inspection.tolerance import DecisionRule, ToleranceZone
-    from inspection.uncertainty import DeviationUncertainty, UncertaintyBudget, deviation_uncertainty, largest_by_noise_mm
+    from inspection.uncertainty import DeviationUncertainty, PartName, UncertaintyBudget, deviation_uncertainty, largest_by_noise_mm
     from inspection.verdict import NOT_JUDGED, Rejection, Verdict
     from inspection.zone_certificate import ConsumptionCertificate, ConsumptionFit, ZoneCertificate
     from inspection.zones import Transition, VaryingZone
@@ -116,7 +116,7 @@ else:
         "inspection.signed_deviations": ("Deviations", "deviations", "profile_error_mm"),
         "inspection.telling_points": ("telling_rows",),
         "inspection.tolerance": ("DecisionRule", "ToleranceZone"),
-        "inspection.uncertainty": ("DeviationUncertainty", "UncertaintyBudget", "deviation_uncertainty", "largest_by_noise_mm"),
+        "inspection.uncertainty": ("DeviationUncertainty", "PartName", "UncertaintyBudget", "deviation_uncertainty", "largest_by_noise_mm"),
         "inspection.verdict": ("NOT_JUDGED", "Rejection", "Verdict"),
         "inspection.characteristics.characteristic": (
             "Characteristic",
@@ -207,6 +207,7 @@ __all__ = [
     "NotMeasured",
     "NurbsCurve",
     "Outline",
+    "PartName",
     "PlacementProof",
     "PlacementSearch",
     "Prefix",

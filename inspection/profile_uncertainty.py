@@ -29,6 +29,7 @@ from inspection.uncertainty import DeviationUncertainty, PartName, UncertaintyBu
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
+Basis = Literal["the known pose", "any placement of the part", "the best fit of the points"]
 
 _ALONG, _AROUND = 512, 256  # places that stand for the profile, all along it and, where it bends, to a full turn
 _MOST_STATIONS = 200  # of a table for people
@@ -84,9 +85,11 @@ class ProfileUncertainty:
     left_mm     : (n,) known growth that was not taken out of the points: it is added to U
     expanded_mm : (n,) U = k u, and that growth
     size_mm     : of the part: the longest distance over which the device's error counts
+    basis       : what the deviations are counted from, which decides what of the errors they hold
     """
 
     stated: StatedUncertainty
+    basis: Basis
     station_mm: Array
     standard_mm: Array
     parts_mm: dict[PartName, Array]
@@ -157,7 +160,7 @@ def uncertainty_along(nominal: NominalProfile, stated: StatedUncertainty, pose: 
     fit = places_on(station, at, nominal.outward * nominal.normal[rows], free)
     found = propagate(fit, fit, shares, free, stated.budget, fixed)
     found.parts_mm["repeatability"][:] = stated.budget.repeatability_mm
-    return _along(found, stated, nominal.size_mm)
+    return _along(found, stated, "any placement of the part" if pose is None else "the known pose", nominal.size_mm)
 
 
 def _samples_that_tell(nominal: NominalProfile) -> Rows:
@@ -174,10 +177,10 @@ def uncertainty_at_fit(
     """Uncertainty of the deviations of points (m, 2), given at their best fit, after which it depends on where and how dense they lie."""
     in_any_order = points_mm[np.lexsort(points_mm.T)]  # so that sums over them come out the same to the last bit
     found = deviation_uncertainty(in_any_order, nominal, stated.budget, tip_radius_mm=tip_radius_mm, weights=weights)
-    return _along(found, stated, float(np.hypot(*np.ptp(points_mm, axis=0))))
+    return _along(found, stated, "the best fit of the points", float(np.hypot(*np.ptp(points_mm, axis=0))))
 
 
-def _along(found: DeviationUncertainty, stated: StatedUncertainty, size_mm: float) -> ProfileUncertainty:
+def _along(found: DeviationUncertainty, stated: StatedUncertainty, basis: Basis, size_mm: float) -> ProfileUncertainty:
     """The same in the order of the stations, without places that have no deviation."""
     order = np.argsort(found.station_mm, kind="stable")
     order = order[np.isfinite(found.standard_mm[order])]
@@ -185,4 +188,4 @@ def _along(found: DeviationUncertainty, stated: StatedUncertainty, size_mm: floa
     standard = np.sqrt(sum((np.square(part) for part in parts.values()), np.zeros(len(order))))
     left = found.left_mm[order]
     expanded = stated.coverage_factor * standard + np.abs(left)
-    return ProfileUncertainty(stated, found.station_mm[order], standard, parts, found.lever_mm[order], left, expanded, size_mm)
+    return ProfileUncertainty(stated, basis, found.station_mm[order], standard, parts, found.lever_mm[order], left, expanded, size_mm)

@@ -147,11 +147,13 @@ def _section(plan: "CtPlan", outcome: "SectionOutcome", plan_name: str) -> "Sect
     from cmmlink.buffer import CAPACITY_POINTS
     from cmmlink.console.ct_import import Section
     from cmmlink.endings import Ended
+    from cmmlink.from_plan import zone_of
     from cmmlink.run_view import RunContext
 
     height_mm, run = outcome.slice.height_mm, outcome.run
     title = f"Section at height {height_mm:.3f} mm of {plan.mesh.file.name}"
-    context = RunContext(title, plan_name, outcome.profile, plan.zone, plan.registration.coverage_min, CAPACITY_POINTS, now(), "section")
+    zone, coverage_min = zone_of(plan, outcome.profile), plan.registration.coverage_min
+    context = RunContext(title, plan_name, outcome.profile, zone, coverage_min, CAPACITY_POINTS, now(), "section")
     ended = Ended(run.ending, str(run.refusal or ""), outcome.result_json(), run.result.blocks if run.result is not None else None)
     return Section(height_mm, context, outcome.started, ended, outcome.warnings)
 

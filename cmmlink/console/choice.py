@@ -8,7 +8,7 @@ from cmmlink.console.protocol import ChosenPlan
 from cmmlink.console.refused import without_folders
 from cmmlink.devices import words_of
 from cmmlink.errors import PlanError
-from cmmlink.from_plan import check_plan
+from cmmlink.from_plan import check_plan, zone_of
 from cmmlink.plan import FileDevice, Plan, load_plan
 from drivers import PointFileError
 from inspection import InspectionError, NominalProfile
@@ -57,8 +57,8 @@ def _refusal(name: str, text: str, problem: str, line: int | None) -> Choice:
 
 
 def _description(name: str, text: str, plan: Plan, profile: NominalProfile) -> ChosenPlan:
-    zone, registration = plan.zone, plan.registration
-    uncertainty = f", U {zone.uncertainty_mm:g} mm" if zone.uncertainty_mm else ""
+    zone, registration = zone_of(plan, profile), plan.registration
+    uncertainty = f", U {zone.uncertainty_mm:.4g} mm" if zone.uncertainty_mm else ""
     facts = [
         ("Part", plan.part.name),
         ("Tolerance", f"{zone.lower_mm:+g} to {zone.upper_mm:+g} mm{uncertainty}"),

@@ -1,6 +1,7 @@
 """What every plan says of how a part is judged: the tolerance, the characteristics, and what the verdict rests on."""
 
 from collections import Counter
+from dataclasses import replace
 from typing import Annotated
 
 import yaml
@@ -8,8 +9,9 @@ from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from cmmlink.plan.characteristics import AskedCharacteristic, AskedProfile
+from cmmlink.plan.uncertainty import DECISION_RULE, TEMPERATURE, UNCERTAINTY, Temperature, Uncertainty
 from cmmlink.plan.yaml_model import Positive, Settings
-from inspection import RuleName, ToleranceZone, WeightName
+from inspection import DecisionRule, RuleName, ToleranceZone, WeightName
 
 PROFILE = "profile"  # the characteristic that a tolerance is the short form of
 TOLERANCE = (
@@ -85,6 +87,9 @@ class Deciding(Settings):
         default=(), description="what is evaluated of a section, each with a verdict of its own; the part has the worst of them"
     )
     tolerance: Tolerance | None = Field(default=None, validate_default=True, description=TOLERANCE)
+    decision_rule: DecisionRule = Field(default="iso-14253-1", description=DECISION_RULE)
+    uncertainty: Uncertainty | None = Field(default=None, description=UNCERTAINTY)
+    temperature: Temperature | None = Field(default=None, description=TEMPERATURE)
 
     @field_validator("characteristics")
     @classmethod
@@ -106,6 +111,31 @@ class Deciding(Settings):
             raise ValueError(f"no tolerance beside a characteristic called {PROFILE}: that is what it is the short form of")
         return tolerance
 
+    @field_validator("uncertainty")
+    @classmethod
+    def _one_uncertainty(cls, uncertainty: Uncertainty | None, info: ValidationInfo) -> Uncertainty | None:
+        tolerance: Tolerance | None = info.data.get("tolerance")
+        if uncertainty is not None and tolerance is not None and tolerance.uncertainty_mm:
+            raise ValueError(f"either uncertainty or tolerance.uncertainty_mm, which is {tolerance.uncertainty_mm:g}: U has one source")
+        return uncertainty
+
+    @field_validator("temperature")
+    @classmethod
+    def _one_temperature(cls, temperature: Temperature | None, info: ValidationInfo) -> Temperature | None:
+        budget: Uncertainty | None = info.data.get("uncertainty")
+        if temperature is None or "uncertainty" not in info.data:
+            return temperature
+        if budget is not None and budget.temperature is not None:
+            raise ValueError("either temperature or uncertainty.temperature: the part has one")
+        if budget is None and (temperature.u_part_k or temperature.u_cte_per_k):
+            raise ValueError("no u_part_k and u_cte_per_k without a budget under uncertainty: they count in nothing else")
+        return temperature
+
+    @property
+    def warmth(self) -> Temperature | None:
+        """How warm the part was, wherever the plan says it."""
+        return self.temperature or (self.uncertainty.temperature if self.uncertainty else None)
+
     @property
     def first_profile(self) -> AskedProfile:
         """The line-profile whose zone judges the points as they arrive, in a plan without a tolerance."""
@@ -115,8 +145,13 @@ class Deciding(Settings):
 
     @property
     def zone(self) -> ToleranceZone:
-        """The zone that judges the points as they arrive: the tolerance, or the envelope of the first line-profile's zone."""
-        return self.tolerance.zone if self.tolerance else self.first_profile.envelope(self.first_profile.uncertainty_mm or 0.0)
+        """The zone that judges the points as they arrive: the tolerance, or the envelope of the first line-profile's zone.
+
+        Without the U of a budget, which depends on the nominal.
+        """
+        own_mm = 0.0 if self.uncertainty or self.tolerance else self.first_profile.uncertainty_mm or 0.0
+        zone = self.tolerance.zone if self.tolerance else self.first_profile.envelope(own_mm)
+        return replace(zone, rule=self.decision_rule)
 
     def effective_yaml(self) -> str:
         """Spell the plan with every default filled in and every path absolute; as a plan it means the same."""

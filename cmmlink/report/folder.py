@@ -14,6 +14,7 @@ from cmmlink.errors import PlanError
 from cmmlink.result_files import new_files
 from cmmlink.result_folder import fixed_part, make_room
 from cmmlink.run import FinishedRun
+from cmmlink.uncertainty_tables import write_uncertainty
 from cmmlink.zone_file import zone_document
 from inspection import InspectionResult, NominalProfile
 
@@ -40,6 +41,7 @@ def write_results(
     """Write result.json and, when points were judged, deviations.csv and profile.png. Returns their names; raises PlanError.
 
     Of a plan with characteristics there is characteristics.csv as well, and zone.json where one of them is a minimum zone.
+    Where a budget was stated, uncertainty.csv is written as well.
 
     What an earlier run left there is moved aside, into a folder of its own; the new files take its place together.
     """
@@ -54,6 +56,8 @@ def write_results(
                 write_characteristics(result.characteristics, files("characteristics.csv"))
             if (zones := zone_document(document, profile)) is not None:
                 files("zone.json").write_text(json.dumps(zones, indent=2) + "\n", encoding="utf-8")
+            if result.uncertainty is not None:
+                write_uncertainty(result.uncertainty, files("uncertainty.csv"))
             write_picture(result, profile, title, files("profile.png"), ending, _said_at_foot(document))
     return files.names
 

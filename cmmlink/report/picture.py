@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 # Everything has its place beforehand: to find places for labels of unknown size takes longer than to draw the picture.
 _PLACES = {"height_ratios": (3, 2), "left": 0.09, "right": 0.905, "bottom": 0.08, "top": 0.92, "hspace": 0.32}
-_NOMINAL, _BAND = "#3a3f45", "#dfe7ee"
+_NOMINAL, _BAND, _OPEN = "#3a3f45", "#dfe7ee", "#f3e3c2"
 _NEAR_AN_EDGE = 0.18  # of the width: half a label
 
 
@@ -87,6 +87,9 @@ def _draw_strip(axes: Axes, content: PictureContent) -> None:
         place, shift = ((1, limit), (4, 0)) if own else ((0, limit), (4, 1 if above else -1))
         along = "center" if own else "bottom" if above else "top"
         axes.annotate(words, place, shift, xycoords=("axes fraction", "data"), textcoords="offset points", va=along, fontsize=8)
+    for limit in (zone.lower_mm, zone.upper_mm) if len(content.u_mm) else ():  # what the U of each station leaves open
+        station, U = content.u_mm.T
+        axes.fill_between(station, limit - U, limit + U, color=_OPEN, lw=0)
     axes.axhline(0, color=_NOMINAL, lw=0.8)
     for look, shown in zip(LOOKS, content.shown, strict=True):
         axes.scatter(shown.station_mm, shown.deviation_mm, s=look.size, c=look.colour, marker=look.mark, lw=0)
@@ -112,9 +115,9 @@ def names_of_limits(zone: ToleranceZone) -> list[tuple[float, str]]:
     Between a limit and the line a U to each side nothing is proven, so both are drawn.
     """
     limits = [(zone.upper_mm, f"upper {zone.upper_mm:+g}"), (zone.lower_mm, f"lower {zone.lower_mm:+g}")]
-    if not zone.uncertainty_mm:
+    if not zone.guard_mm:
         return limits
-    around = [(limit + sign * zone.uncertainty_mm, "limit + U" if sign > 0 else "limit - U") for limit, _ in limits for sign in (1, -1)]
+    around = [(limit + sign * zone.guard_mm, "limit + U" if sign > 0 else "limit - U") for limit, _ in limits for sign in (1, -1)]
     return limits + around
 
 

@@ -73,6 +73,7 @@ class PictureContent:
     closed        : the nominal ends where it begins
     length_mm     : its length
     zone          : the tolerance zone
+    u_mm          : (k, 2) stations and the expanded uncertainty there, where a budget was stated; (0, 2) without one
     magnification : how many times as large deviations are drawn on the profile
     shown         : the points of each of `LOOKS`
     worst         : None where nothing was judged
@@ -84,6 +85,7 @@ class PictureContent:
     closed: bool
     length_mm: float
     zone: ToleranceZone
+    u_mm: Array
     magnification: float
     shown: tuple[Shown, ...]
     worst: Worst | None
@@ -103,17 +105,20 @@ def content_of(
     factor = magnification(result, nominal)
     telling = telling_rows(result.station_mm, result.deviation_mm, nominal.length_mm, _MOST_POINTS // 2)  # the others lie hidden
     basis = f"coverage {result.coverage:.1%}   fit {result.fit}   method {result.method}   out of tolerance {result.out_of_tolerance}"
+    along = _uncertainty_along(result)
+    shaded = "; shaded around the limits: the U of each station" if len(along) else ""
     return PictureContent(
         nominal.points_mm,
         nominal.outward * nominal.normal,
         nominal.curve.closed,
         nominal.length_mm,
         result.zone,
+        along,
         factor,
         _shown(result, telling, factor),
         _worst(result, factor),
         headline_on_picture(result, title, ending),
-        f"{basis}\n{result.zone.decision_rule}",
+        f"{basis}\n{result.zone.decision_rule}{shaded}",
         said,
     )
 
@@ -129,6 +134,14 @@ def magnification(result: "InspectionResult", nominal: "NominalProfile") -> floa
     wanted = _BAND_SHARE * float(np.hypot(*np.ptp(nominal.points_mm, axis=0))) / width
     power = 10.0 ** np.floor(np.log10(wanted))
     return float(max(step * power for step in (1, 2, 5) if step * power <= wanted))
+
+
+def _uncertainty_along(result: "InspectionResult") -> Array:
+    found = result.uncertainty
+    if found is None or not result.zone.guard_mm:
+        return np.empty((0, 2))
+    rows = found.telling_places()
+    return np.column_stack([found.station_mm[rows], found.expanded_mm[rows]])
 
 
 def _shown(result: "InspectionResult", telling: Rows, factor: float) -> tuple[Shown, ...]:

@@ -13,6 +13,7 @@ from cmmlink.characteristics import is_short_form
 from cmmlink.events import Counts, Ending
 from cmmlink.run_state import RunState
 from cmmlink.run_view import RunView
+from cmmlink.uncertainty_tables import uncertainty_lines
 from cmmlink.words import POSE_MOVES, VERDICT_WORDS, Shape, headline_of
 from inspection import CharacteristicResult, InspectionResult, Rejection, Verdict
 
@@ -115,6 +116,8 @@ def _print_numbers(console: Console, result: InspectionResult) -> None:
         f"deviation {result.min_deviation_mm:+.4f} .. {result.max_deviation_mm:+.4f} mm, zone {zone.lower_mm:+g} .. {zone.upper_mm:+g} mm"
     )
     console.print(f"decision rule: {zone.decision_rule}")
+    for line in uncertainty_lines(result):
+        console.print(line, markup=False)
     console.print(
         f"profile error {result.profile_error_mm:.4f} mm (2 x largest), zone error {result.zone_error_mm:.4f} mm (2 x farthest from the "
         f"zone's middle), rms {result.rms_mm:.4f} mm, {result.out_of_tolerance} points out"

@@ -29,7 +29,7 @@ PROMISED = {
     "stretches": list,
 }
 FURTHER = {"characteristics", "coverage", "largest_gap_mm", "largest_gap", "complete", "tolerance", "rejected_by_reason", "damaged_bytes"}
-FURTHER |= {"zone_error_mm", "best_fit_error_mm", "minimum_zone_mm", "reasons", "rule", "target_mm", "weights"}
+FURTHER |= {"zone_error_mm", "best_fit_error_mm", "minimum_zone_mm", "reasons", "rule", "target_mm", "weights", "uncertainty"}
 
 
 def test_the_summary_has_the_promised_keys_and_says_what_was_put_in(profile: NominalProfile) -> None:
