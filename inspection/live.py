@@ -177,16 +177,18 @@ class LiveInspection:
             raise ValueError(f"points must have shape (m, 2) or (m, 3), got {points.shape}")
         if self._compensation is not None:
             points = self._compensation.apply(points, self._plane)
-        rows, first = self._rows, self._rows.count
-        rows.take_in(points, self._plane, self._terms.off_section_max_mm)
+        rows, pose, first = self._rows, self._pose, self._rows.count
+        taken = (_of_one_type(points), self._plane, self._terms.off_section_max_mm)
+        if pose is not None and len(points) <= BLOCK - first % BLOCK:
+            rows.take_in_judged(*taken, pose, self._terms, self._reserve_mm)
+        else:
+            rows.take_in(*taken)
         if self._known_pose is not None or not self._provisional:
-            rows.count = first + len(points)
-            self._judge(first, rows.count)
+            self._judge_to(first + len(points))
             return self._update(first)
         changed_from = first
         for stop in range(first - first % BLOCK + BLOCK, first + len(points) + BLOCK, BLOCK):
-            begin, rows.count = rows.count, min(stop, first + len(points))
-            self._judge(begin, rows.count)
+            self._judge_to(min(stop, first + len(points)))
             if rows.count == stop and self._advance():
                 changed_from = 0
         return self._update(changed_from)
@@ -233,16 +235,28 @@ class LiveInspection:
 
     def _judge(self, first: int, stop: int) -> None:
         """Deviations and verdicts of rows first .. stop - 1 at the pose of this moment, if there is one."""
-        pose = self._track.pose if self._track is not None else self._known_pose
+        pose = self._pose
         if pose is not None:
             self._rows.judge(first, stop, pose, self._terms, self._reserve_mm)
 
+    def _judge_to(self, stop: int) -> None:
+        """Let the rows before `stop` count, and judge those of them that do not count yet."""
+        first = self._rows.count
+        if first < stop:
+            self._rows.count = stop
+            self._judge(first, stop)
+
     def _judge_anew(self) -> None:
         """The same of all rows so far; places are kept of the newest alone, so that no memory is taken."""
-        rows, pose = self._rows, self._track.pose if self._track is not None else self._known_pose
+        rows, pose = self._rows, self._pose
         if pose is not None:
             rows.settle(pose, self._terms, self._reserve_mm, rows.base)
             rows.judge(rows.base, rows.count, pose, self._terms, self._reserve_mm)
+
+    @property
+    def _pose(self) -> RigidTransform | None:
+        """Where the points lie at this moment, if that is known."""
+        return self._track.pose if self._track is not None else self._known_pose
 
     @property
     def _reserve_mm(self) -> float:
@@ -284,6 +298,12 @@ class LiveInspection:
             0.0 if self._known_pose is not None else float("nan"),
             self._track.registration if self._track is not None else None,
         )
+
+
+def _of_one_type(points: Array) -> Array:
+    """The points as they are, or a copy where the compiler would take them for another type and compile all anew in mid-scan."""
+    flags = points.flags
+    return points if flags.c_contiguous and flags.writeable else np.array(points, order="C")
 
 
 def rehearse(nominal: NominalProfile, method: Method = "exact", reject_outliers: bool = False) -> None:

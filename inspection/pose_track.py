@@ -98,10 +98,11 @@ class PoseTrack:
         Where nothing is measured yet, form error of a sixth of the zone's width is expected.
         """
         sums = self._sums
-        patches = max(sums.covered / _CORRELATION, 1.0)
-        form = max(sums.mean_square - sums.noise, 0.0) * patches / max(patches - 3.0, 0.5)
-        form = max(form, self._expected_form_mm**2 * (1 - sums.covered))
-        return sums.noise + form * sums.count / patches
+        covered, noise = sums.covered, sums.noise
+        patches = max(covered / _CORRELATION, 1.0)
+        form = max(sums.mean_square - noise, 0.0) * patches / max(patches - 3.0, 0.5)
+        form = max(form, self._expected_form_mm**2 * (1 - covered))
+        return noise + form * sums.count / patches
 
 
 def seek_pose(points: Cloud, terms: Terms) -> PoseTrack | None:

@@ -50,12 +50,14 @@ class RigidTransform:
 
     def inverse(self) -> "RigidTransform":
         """The motion that undoes this one."""
-        return RigidTransform(-self.rotation_rad, -rotate(self.translation_mm[None], -self.rotation_rad)[0])
+        x, y = _turn(self.translation_mm, -self.rotation_rad)
+        return RigidTransform(-self.rotation_rad, np.array([-x, -y]))
 
     def after(self, first: "RigidTransform") -> "RigidTransform":
         """The motion that makes `first` and then this one."""
         angle = self.rotation_rad + first.rotation_rad
-        return RigidTransform(float(np.arctan2(np.sin(angle), np.cos(angle))), self.apply(first.translation_mm[None])[0])
+        x, y = _turn(first.translation_mm, self.rotation_rad)
+        return RigidTransform(float(np.arctan2(np.sin(angle), np.cos(angle))), np.array([x, y]) + self.translation_mm)
 
 
 def rotate(vectors: Array, angle_rad: float) -> Array:
@@ -68,9 +70,16 @@ def rotate(vectors: Array, angle_rad: float) -> Array:
     return turned
 
 
+def _turn(vector: Array, angle_rad: float) -> tuple[float, float]:
+    """One vector (2,) turned as `rotate` turns many, to the last bit, in a fraction of the time."""
+    c, s = math.cos(angle_rad), math.sin(angle_rad)
+    x, y = vector.tolist()
+    return c * x - s * y, s * x + c * y
+
+
 def rotation_about(centre_mm: Array, angle_rad: float, shift_mm: Array) -> RigidTransform:
     """Rotation about a centre (2,), then a shift (2,)."""
-    return RigidTransform(angle_rad, centre_mm + shift_mm - rotate(centre_mm[None], angle_rad)[0])
+    return RigidTransform(angle_rad, centre_mm + shift_mm - np.array(_turn(centre_mm, angle_rad)))
 
 
 def best_motion(source_mm: Array, target_mm: Array) -> RigidTransform:

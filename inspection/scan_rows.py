@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from inspection.cloud import Cloud, row_blocks
 from inspection.judged_rows import JudgedRows
-from inspection.kernels import JUDGED_AS, TALLY, Places, Room, judge_few_rows, judge_rows, take_in
+from inspection.kernels import JUDGED_AS, NONE_TAKEN, TALLY, Judgement, Places, Room, Taken, judge_few_rows, judge_rows, take_in
 from inspection.rigid import RigidTransform
 from inspection.section import XY_PLANE, SectionPlane
 from inspection.signed_deviations import feet_on
@@ -70,12 +70,31 @@ class ScanRows:
 
     def take_in(self, points_mm: Array, plane: SectionPlane, off_section_max_mm: float) -> None:
         """Write points (m, 2) or (m, 3) behind the rows so far, as section points. They count once `count` is raised."""
+        first = self._make_room(points_mm, plane)
+        take_in(points_mm, plane.packed, off_section_max_mm, self.points, self._columns, self._places, self.base, first)
+
+    def take_in_judged(
+        self, points_mm: Array, plane: SectionPlane, off_section_max_mm: float, pose: RigidTransform, terms: Terms, reserve_mm: float
+    ) -> None:
+        """The same for points that all belong to the block being filled: they count and are judged at once, by one compiled call."""
+        if terms.method == "inversion":
+            self.take_in(points_mm, plane, off_section_max_mm)
+            self.judge(self.count, self._end, pose, terms, reserve_mm)
+        else:
+            first = self._make_room(points_mm, plane)
+            self._judged_to = self._end
+            taken = (points_mm, plane.packed, off_section_max_mm)
+            self._judge_few(first, self._end, self._places, self.base, pose, terms, reserve_mm, taken)
+        self.count = self._end
+
+    def _make_room(self, points_mm: Array, plane: SectionPlane) -> int:
+        """Make room for points behind the rows so far, enter their heights, and return the row of the first."""
         first, self._end, self.settled_at = self.count, self.count + len(points_mm), None
         self._reserve(self._end)
         self.plane = plane
         self._keep_places(first - first % BLOCK, first)
-        take_in(points_mm, plane.packed, off_section_max_mm, self.points, self._columns, self._places, self.base, first)
         self.height[first : self._end] = plane.heights(points_mm) if points_mm.shape[1] == 3 else 0.0
+        return first
 
     def judge(self, first: int, stop: int, pose: RigidTransform, terms: Terms, reserve_mm: float = 0.0) -> None:
         """Fill in rows first .. stop - 1 as they are with the points at this pose, and keep their places.
@@ -185,15 +204,28 @@ class ScanRows:
         return self.actual, self.foot, self.normal
 
     def _judge(self, first: int, stop: int, places: Places, base: int, pose: RigidTransform, terms: Terms, reserve_mm: float = 0.0) -> None:
-        place = (math.cos(pose.rotation_rad), math.sin(pose.rotation_rad), *pose.translation_mm.tolist())
-        outward, tip_mm, lower_mm, upper_mm, uncertainty_mm = terms.judgement
-        judgement = (outward, tip_mm, lower_mm, upper_mm, uncertainty_mm + reserve_mm)
-        rows = (self.points, self._columns, places, base, first, stop, place)
-        nominal, method = terms.nominal, terms.method
-        if stop - first <= BLOCK and method != "inversion":
-            judge_few_rows(*rows, nominal.grid, nominal.table_for(method), method, judgement)
+        if stop - first <= BLOCK and terms.method != "inversion":
+            self._judge_few(first, stop, places, base, pose, terms, reserve_mm)
         else:
-            judge_rows(*rows, partial(feet_on, nominal=nominal, method=method), judgement)
+            project = partial(feet_on, nominal=terms.nominal, method=terms.method)
+            rows = (self.points, self._columns, places, base, first, stop, _numbers_of(pose))
+            judge_rows(*rows, project, _with_reserve(terms.judgement, reserve_mm))
+
+    def _judge_few(
+        self,
+        first: int,
+        stop: int,
+        places: Places,
+        base: int,
+        pose: RigidTransform,
+        terms: Terms,
+        reserve_mm: float,
+        taken: Taken = NONE_TAKEN,
+    ) -> None:
+        rows = (self.points, self._columns, places, base, first, stop, _numbers_of(pose))
+        nominal, method = terms.nominal, terms.method
+        judgement = _with_reserve(terms.judgement, reserve_mm)
+        judge_few_rows(*rows, nominal.grid, nominal.table_for(method), method, judgement, taken)
 
     def _keep_places(self, base: int, held: int) -> None:
         """Hold the places of the rows from `base` on: of those up to `held` as they are known, of the others as not judged yet."""
@@ -228,6 +260,18 @@ class ScanRows:
             for rows in row_blocks(self.count):
                 new[rows] = old[rows]
         return new
+
+
+def _numbers_of(pose: RigidTransform) -> tuple[float, float, float, float]:
+    """Cosine and sine of the rotation, then the shift in mm."""
+    x, y = pose.translation_mm.tolist()
+    return math.cos(pose.rotation_rad), math.sin(pose.rotation_rad), x, y
+
+
+def _with_reserve(judgement: Judgement, reserve_mm: float) -> Judgement:
+    """The judgement, uncertain as well by how far a deviation may still move."""
+    outward, tip_mm, lower_mm, upper_mm, uncertainty_mm = judgement
+    return outward, tip_mm, lower_mm, upper_mm, uncertainty_mm + reserve_mm
 
 
 def _places(count: int) -> tuple[Array, Array, Array]:

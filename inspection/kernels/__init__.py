@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from inspection.kernels.on_samples import SampleTables
     from inspection.kernels.pose import NONE_LEFT_OUT, OutlierLimit, PoseEstimate, PoseFit
     from inspection.kernels.projection import Turned, project, project_on_samples, project_outward
-    from inspection.kernels.rows import JUDGED_AS, TALLY, Columns, Judgement, Places, judge_few_rows, judge_rows, take_in
+    from inspection.kernels.rows import JUDGED_AS, NONE_TAKEN, TALLY, Columns, Judgement, Places, Taken, judge_few_rows, judge_rows, take_in
     from inspection.kernels.side_by_side import fit_compiled_beside
     from inspection.kernels.thinning import strides
 else:
@@ -36,7 +36,18 @@ else:
         "inspection.kernels.on_samples": ("SampleTables",),
         "inspection.kernels.pose": ("NONE_LEFT_OUT", "OutlierLimit", "PoseEstimate", "PoseFit"),
         "inspection.kernels.projection": ("Turned", "project", "project_on_samples", "project_outward"),
-        "inspection.kernels.rows": ("JUDGED_AS", "TALLY", "Columns", "Judgement", "Places", "judge_few_rows", "judge_rows", "take_in"),
+        "inspection.kernels.rows": (
+            "JUDGED_AS",
+            "NONE_TAKEN",
+            "TALLY",
+            "Columns",
+            "Judgement",
+            "Places",
+            "Taken",
+            "judge_few_rows",
+            "judge_rows",
+            "take_in",
+        ),
         "inspection.kernels.side_by_side": ("fit_compiled_beside",),
         "inspection.kernels.thinning": ("strides",),
     }
@@ -48,6 +59,7 @@ __all__ = [
     "AT_ONCE",
     "JUDGED_AS",
     "NONE_LEFT_OUT",
+    "NONE_TAKEN",
     "SAMPLE_METHODS",
     "TALLY",
     "Columns",
@@ -62,6 +74,7 @@ __all__ = [
     "PoseFit",
     "Room",
     "SampleTables",
+    "Taken",
     "Turned",
     "compile_projection",
     "compiled_code_folder",

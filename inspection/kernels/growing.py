@@ -85,15 +85,16 @@ class GrowingSums:
     @property
     def covered(self) -> float:
         """Share of the length that holds points."""
-        return float(self._marks.mean())
+        return np.count_nonzero(self._marks) / len(self._marks)
 
     def spread_mm(self, places_mm: Array, normals: Array, scatter: float, station_mm: Array = _ANYWHERE) -> float:
         """Largest standard deviation of the pose's effect on a deviation at any place, for independent errors of that variance.
 
         station_mm : of the places; only those count whose 64th of the length holds points. (0,) for all
+
+        Hand over arrays that could be written to: others are of another type to the compiler.
         """
-        given = np.array(places_mm), np.array(normals), np.array(station_mm)  # copies are of one type
-        return float(_spread(*given, scatter, self._frame[0], self._sums, self._marks))
+        return float(_spread(places_mm, normals, station_mm, scatter, self._frame[0], self._sums, self._marks))
 
 
 @kernel

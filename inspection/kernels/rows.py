@@ -21,6 +21,7 @@ from inspection.kernels.layout import (
     OPEN_END,
     PLANE_NORMAL,
     PLANE_ORIGIN,
+    PLANE_WIDTH,
     PLANE_X_AXIS,
     PLANE_Y_AXIS,
     UNCERTAIN,
@@ -33,6 +34,10 @@ Codes = NDArray[np.int8]
 Columns = tuple[Array, Array, Codes, Codes, NDArray[np.int64]]  # plain tuples: a named one takes numba a microsecond a call
 Places = tuple[Array, Array, Array]
 Judgement = tuple[float, float, float, float, float]
+Taken = tuple[Array, Array, float]
+
+NONE_TAKEN: Taken = (np.empty((0, 2)), np.zeros(PLANE_WIDTH), np.inf)
+NONE_TAKEN[1].setflags(write=False)  # as the plane of a section is
 
 JUDGED_AS = 8  # place in the tally of the verdict 0; before it come the rejections
 TALLY = JUDGED_AS + NONCONFORM + 1
@@ -76,17 +81,23 @@ def judge_few_rows(
     table: SampleTables | None,
     method: str,
     judgement: Judgement,
+    taken: Taken = NONE_TAKEN,
 ) -> None:
-    """The same as `judge_rows`, by one compiled call in this thread: for a batch of a live scan three calls take longer than its points.
+    """The same as `judge_rows`, by one compiled call in this thread: for a batch of a live scan more calls take longer than its points.
 
     grid, table, method : the curve, and the samples where the method looks at those only
+    taken               : what is to be entered as these rows before, see `take_in`: points, plane, and how far off they may be
     """
     curve = (projection_of(table, method), grid.reals, grid.integers)
-    _judge_few(section_mm, columns, places, base, first, stop, pose, curve, judgement)
+    _judge_few(section_mm, columns, places, base, first, stop, pose, curve, judgement, taken)
 
 
 @kernel
-def _judge_few(section: Any, columns: Any, places: Any, base: int, first: int, stop: int, pose: Any, curve: Any, judgement: Any) -> None:
+def _judge_few(
+    section: Any, columns: Any, places: Any, base: int, first: int, stop: int, pose: Any, curve: Any, judgement: Any, taken: Any
+) -> None:
+    points, plane, off_section_max = taken
+    _take_in(points, plane, off_section_max, section, columns, places, base, first)
     projection, reals, integers = curve
     moved, feet = np.empty((stop - first, 2)), new_feet(stop - first)
     _place(section, columns[3], first, pose, moved)

@@ -1,5 +1,6 @@
 """Live inspection: the same points in any batches, honest counts, and what provisional means."""
 
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from inspection import (
     Verdict,
     deviations,
 )
+from inspection.kernels import rows
 from tests.inspection import profiles
 from tests.inspection.profiles import Array, curve_of, nominal_of
 from tests.inspection.scans import ZONE, inspect_in_batches, surface
@@ -158,3 +160,22 @@ def test_live_deviations_use_the_chosen_method() -> None:
     for method in ("chord", "pcp", "veaw", "circle"):
         live = LiveInspection(nominal_of("P3"), ZONE, fit="none", method=method)
         assert np.array_equal(live.add(points).deviation_mm, deviations(points, nominal_of("P3"), method).deviation_mm)
+
+
+def compiled() -> list[int]:
+    """For how many kinds of arguments the loops that every batch goes through are compiled."""
+    return [len(attrgetter("signatures")(loop)) for loop in (rows._judge_few, rows._take_in)]
+
+
+def test_arrays_of_any_make_are_taken_in_by_the_loops_that_are_compiled_already() -> None:
+    nominal = nominal_of("P3")
+    points = nominal.points_mm[:256].copy()
+    plain = LiveInspection(nominal, ZONE, datum=RigidTransform.identity())
+    plain.add(points[:8])
+    before, frozen = compiled(), points.copy()
+    frozen.setflags(write=False)
+    for made in (frozen, np.asfortranarray(points), np.column_stack([points, points])[:, :2], points.astype(np.float32), points[::-1]):
+        live = LiveInspection(nominal, ZONE, datum=RigidTransform.identity())
+        live.add(made[:8])
+        assert np.abs(live.add(made[8:200]).deviation_mm).max() < 1e-4
+    assert compiled() == before

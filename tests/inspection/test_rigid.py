@@ -5,7 +5,7 @@ import pytest
 
 from inspection import RigidTransform
 from inspection.kernels.rows import place_rows
-from inspection.rigid import best_motion, rotation_about
+from inspection.rigid import best_motion, rotate, rotation_about
 from tests.inspection import profiles
 
 
@@ -20,6 +20,16 @@ def test_motions_equal_complex_multiplication_and_compose() -> None:
     assert np.abs(then.after(first).apply(points) - np.column_stack([w.real, w.imag])).max() < 1e-12
     assert np.abs(first.inverse().apply(first.apply(points)) - points).max() < 1e-12
     assert np.array_equal(RigidTransform.identity().apply(points), points)
+
+
+def test_motions_of_one_place_are_those_of_many_to_the_last_bit() -> None:
+    rng = np.random.default_rng(4)
+    for angle in rng.uniform(-4, 4, 200):
+        centre, shift = rng.normal(0, 100, (2, 2))
+        motion, first = RigidTransform(angle, shift), RigidTransform(0.3, centre)
+        assert np.array_equal(motion.after(first).translation_mm, motion.apply(centre[None])[0])
+        assert np.array_equal(motion.inverse().translation_mm, -rotate(shift[None], -angle)[0])
+        assert np.array_equal(rotation_about(centre, angle, shift).translation_mm, centre + shift - rotate(centre[None], angle)[0])
 
 
 def test_best_motion_is_the_known_one_and_no_other_is_better() -> None:

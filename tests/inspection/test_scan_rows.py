@@ -3,8 +3,10 @@
 from unittest.mock import patch
 
 import numpy as np
+import pytest
 
 from inspection import NOT_JUDGED, Rejection, RigidTransform, SectionPlane, ToleranceZone, Verdict
+from inspection.methods import Method
 from inspection.scan_rows import ScanRows
 from inspection.terms import Terms
 from tests.inspection.profiles import Array, curve_of, even_in_arc_length, nominal_of, offset_points
@@ -123,3 +125,29 @@ def test_usable_rows_are_those_a_pose_may_still_bring_onto_the_profile() -> None
     with patch("inspection.cloud.ROWS_AT_ONCE", 4):
         pieces = [(usable.tolist(), are.tolist()) for usable, are in rows.usable_rows(marked)]
     assert pieces == [([0, 3], [True, False]), ([5], [True])]
+
+
+@pytest.mark.parametrize("method", ["exact", "pcp", "inversion"])
+@pytest.mark.parametrize("columns", [2, 3])
+def test_points_taken_in_and_judged_at_once_are_as_those_judged_afterwards(method: Method, columns: int) -> None:
+    pose = RigidTransform(0.002, np.array([0.03, -0.01]))
+    plane = SectionPlane(np.zeros(3), np.array([1.0, 0.001, 0.0]), np.array([0.0, 0.0, 1.0]))
+    points, rng = np.column_stack([scan_of(300), np.linspace(-0.3, 0.3, 300)])[:, :columns].copy(), np.random.default_rng(8)
+    points[[5, 130]] = np.nan
+    points[[70, 131]] += 300.0
+    asked = Terms(nominal_of("P3"), ToleranceZone(-0.05, 0.05), None, "none", method, 0.1, 0.2, 0.0, False)
+    once, twice, first = ScanRows(4), ScanRows(4), 0
+    while first < 300:
+        stop = min(first + int(rng.integers(0, 30)), first - first % 64 + 64, 300)
+        once.take_in_judged(points[first:stop], plane, 0.2, pose, asked, 0.003)
+        twice.take_in(points[first:stop], plane, 0.2)
+        twice.count = stop
+        twice.judge(first, stop, pose, asked, 0.003)
+        for name in PLACES:
+            assert np.array_equal(getattr(once, name)[: stop - once.base], getattr(twice, name)[: stop - twice.base], equal_nan=True), name
+        first = stop
+    for field in FIELDS:
+        assert np.array_equal(getattr(once, field)[:300], getattr(twice, field)[:300], equal_nan=True), field
+    assert once.rejected_by_reason == twice.rejected_by_reason
+    assert once.judged == twice.judged > 180
+    assert (once.count, once.times_anew) == (twice.count, twice.times_anew) == (300, 0)
