@@ -26,7 +26,7 @@ from inspection import NominalError, NurbsCurve, SectionPlane, check_curve
 if TYPE_CHECKING:
     from cmmlink.nominal_files.drawing import Drawing
 
-_START = 64  # bytes of a drawing that are looked at before it is read
+_START = 4096  # bytes of a drawing that are looked at before it is read
 _ALMOST_CLOSED = 0.05  # of the length: the widest gap, as of a blunt trailing edge, at which a curve still has an inside
 
 

@@ -11,7 +11,7 @@ from ezdxf.filemanagement import new as new_document
 from ezdxf.math import OCS
 
 from cmmlink.nominal_files import NominalFile, load_nominal
-from inspection import NominalError
+from inspection import NominalError, NurbsCurve
 from tests.cmmlink.nominal_files.wire import (
     CENTER,
     ELLIPSE_CENTER,
@@ -151,7 +151,8 @@ def test_blocks_are_placed_as_often_and_as_distorted_as_they_are_inserted(tmp_pa
     assert found.layers == ("PART",)
     turned = found.curve.control_points_mm - [5, 6]
     c, s = np.cos(np.pi / 6), np.sin(np.pi / 6)
-    back = type(found.curve)(found.curve.degree, turned @ np.array([[c, -s], [s, c]]), found.curve.knots, found.curve.weights, closed=True)
+    points = turned @ np.array([[c, -s], [s, c]])
+    back = NurbsCurve(found.curve.degree, points, found.curve.knots, found.curve.weights, closed=True)
     require_wire(back, 2.0)
     circle = document.blocks.new("circle")
     circle.add_circle((0, 0), 10)
