@@ -55,12 +55,18 @@ def register_within(
     tip_radius_mm: float = 0.0,
     target_mm: float = 0.0,
     weights: WeightName = "points",
+    shares: Array | None = None,
 ) -> LimitedFit:
-    """Least squares of section points (m, 2) over the free motions only, from the datum's pose `start`. The rest as `register_fine`."""
+    """Least squares of section points (m, 2) over the free motions only, from the datum's pose `start`. The rest as `register_fine`.
+
+    shares : how much of the profile each point (m,) stands for, where others than these points tell; it takes the place of `weights`
+    """
     points = check_registrable(points_mm)
     look = _Look(points, nominal, start, freedoms, method, tip_radius_mm, target_mm)
+    if shares is not None:
+        look.weights = shares
     amounts, steps, settled = _settle(look, np.zeros(len(freedoms)))
-    for _ in range(_WEIGHINGS if weights == "arc-length" else 0):
+    for _ in range(_WEIGHINGS if weights == "arc-length" and shares is None else 0):
         here = look(amounts)
         weigh_by_station(np.where(here.takes_part, here.station_mm, np.nan), look.weights, nominal)
         amounts, more, settled = _settle(look, amounts)

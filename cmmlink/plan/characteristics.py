@@ -158,22 +158,12 @@ class AskedProfile(_Named):
         default=None, ge=0, description="the expanded uncertainty U (95 %) of one deviation; null: that of tolerance, or 0"
     )
 
-    @field_validator("to")
-    @classmethod
-    def _both_ends(cls, to: Place | None, info: Any) -> Place | None:
-        if "from_" in info.data and (to is None) != (info.data["from_"] is None):
-            raise ValueError("both from and to, or neither")
-        return to
-
-    @field_validator("region")
-    @classmethod
-    def _one_region(cls, region: FeatureName | None, info: Any) -> FeatureName | None:
-        if region is not None and info.data.get("to") is not None:
-            raise ValueError("either region, or from and to")
-        return region
-
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
+        if (self.from_ is None) != (self.to is None):
+            raise ValueError("both from and to, or neither")
+        if self.region is not None and self.to is not None:
+            raise ValueError("either region, or from and to")
         if (self.within_mm is not None) != (self.region in ("LE", "TE")):
             raise ValueError("within_mm with region LE or TE, and with nothing else")
         if self.zone.stations_mm is not None and self.fit == "minimum-zone":

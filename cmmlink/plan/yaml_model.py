@@ -172,7 +172,7 @@ def _refuse(event: yaml.Event, problem: str) -> NoReturn:
 
 def _explain(error: ErrorDetails, document: _Document, model: type[BaseModel]) -> tuple[int, str]:
     """Line and message for one complaint of pydantic's."""
-    path, owner = _place(error["loc"], document, model)
+    path, owner, takes = _place(error["loc"], document, model)
     line = document.lines.get(path) or document.lines.get(path[:-1]) or 1
     key, found = _key_text(path), _shorten(error["input"])
     kind = error["type"]
@@ -185,7 +185,7 @@ def _explain(error: ErrorDetails, document: _Document, model: type[BaseModel]) -
     if kind in ("union_tag_not_found", "union_tag_invalid"):
         tag = error["input"].get("type") if isinstance(error["input"], dict) else None
         problem = f"is {_shorten(tag)};" if tag else "is missing;"
-        return document.lines.get((*path, "type"), line), f"{key}.type {problem}{_did_you_mean(str(tag), _tags(owner, path))}"
+        return document.lines.get((*path, "type"), line), f"{key}.type {problem}{_did_you_mean(str(tag), _tags(takes))}"
     return line, f"{key} is {found}; expected {_expectation(error, owner, path)}"
 
 
@@ -206,8 +206,8 @@ def words_of_allowed(error: ErrorDetails) -> str:
     return _IN_OUR_WORDS.get(error["type"]) or re.sub(r"^(greater|less) than", r"a number \1 than", allowed)
 
 
-def _place(location: tuple[str | int, ...], document: _Document, model: type[BaseModel]) -> tuple[Path, type[BaseModel] | None]:
-    """Path in the text of a pydantic location (which also names the chosen type of a union), and the model its last key is in."""
+def _place(location: tuple[str | int, ...], document: _Document, model: type[BaseModel]) -> tuple[Path, type[BaseModel] | None, Any]:
+    """Path in the text of a pydantic location (which also names the chosen type of a union), the model of its last key, and its type."""
     path: Path = ()
     here: Any = model
     owner: type[BaseModel] | None = model
@@ -228,7 +228,7 @@ def _place(location: tuple[str | int, ...], document: _Document, model: type[Bas
         known = _field(owner, str(part))
         here = known.annotation if known else None
         path = (*path, part)
-    return path, owner
+    return path, owner, here
 
 
 def _models(annotation: Any) -> list[type[BaseModel]]:
@@ -245,10 +245,9 @@ def _tag(model: type[BaseModel]) -> str | None:
     return typing.get_args(kind.annotation)[0] if kind else None
 
 
-def _tags(owner: type[BaseModel] | None, path: Path) -> list[str]:
+def _tags(takes: Any) -> list[str]:
     """List the values of `type` where one of several models may stand."""
-    known = _field(owner, str(path[-1]))
-    return [tag for model in _models(known.annotation) if (tag := _tag(model))] if known else []
+    return [tag for model in _models(takes) if (tag := _tag(model))]
 
 
 def _keys(model: type[BaseModel] | None) -> list[str]:

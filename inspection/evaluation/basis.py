@@ -10,7 +10,7 @@ from inspection.cloud import MANY
 from inspection.conclusion import Conclusion, Missing, Reason, conclude
 from inspection.evaluation.region import is_inside
 from inspection.filters import FilteredProfile, ProfileFilter, filter_profile
-from inspection.gaps import Measured, measure_region
+from inspection.gaps import Measured, measure_region, weigh_by_station
 from inspection.nominal import NominalProfile
 from inspection.result import InspectionResult
 from inspection.rigid import RigidTransform
@@ -62,6 +62,18 @@ class Basis:
             rows = rows[telling_rows(self.result.station_mm[rows], self.result.deviation_mm[rows], self.nominal.length_mm, _SHARES)]
         points = self.result.section_at(rows)
         return rows[np.lexsort((points[:, 1], points[:, 0]))]
+
+    def shares(self, rows: Rows) -> Array | None:
+        """How much of the profile rows (k,) of a region stand for, at the pose of the run; None where all points count alike.
+
+        The neighbours outside count too, so that the last points of a region do not stand for what lies beyond it.
+        """
+        if self.terms.weights != "arc-length":
+            return None
+        station = self.result.station_mm
+        weights = np.where(np.isnan(station), 0.0, 1.0)
+        weigh_by_station(station, weights, self.nominal)
+        return weights[rows]
 
     def deviations_at(self, rows: Rows, pose: RigidTransform) -> Deviations:
         """Deviations of rows (k,) at a pose."""

@@ -26,8 +26,9 @@ Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 _GAP_SHARE = 1e-3  # of the zone's width: by so much the proof of a minimum zone may fall short of it, and by 0.01 um at least
+_GAP_SHARE_REGION = 1e-2  # of a region, which fits nearly as well in many other places of the profile
 _GAP_MM = 1e-5
-_GAP_CONSUMPTION = 0.01  # of the zone, for the proof of a least consumption
+_GAP_CONSUMPTION = 0.02  # of the zone, for the proof of a least consumption
 _MOST_BOXES = 200_000
 _FEWEST_POINTS = 4  # of a fit: one more than there are freedoms
 
@@ -54,10 +55,12 @@ class Placed:
 
 def place(asked: LineProfile, basis: Basis, rows: Rows) -> Placed:
     """Find the pose of a characteristic from the rows (k,) of its region, in any order."""
+    if asked.fit == "none" or len(rows) < _FEWEST_POINTS:
+        return Placed(basis.pose, "none", is_known=basis.terms.known_pose is not None)
     start = basis.pose if asked.datum is None else asked.datum
     start_known = asked.datum is not None or basis.terms.known_pose is not None
-    if asked.fit in ("none", "datum") or len(rows) < _FEWEST_POINTS:
-        return Placed(start, "datum" if asked.fit == "datum" else "none", is_known=start_known)
+    if asked.fit == "datum":
+        return Placed(start, "datum", is_known=start_known)
     points = basis.result.section_at(rows)
     freedoms = asked.freedoms or _all_free(points, start)
     best = register_within(
@@ -69,6 +72,7 @@ def place(asked: LineProfile, basis: Basis, rows: Rows) -> Placed:
         basis.terms.tip_radius_mm,
         target_mm=middle_of(asked.zone, basis, rows),
         weights=basis.terms.weights,
+        shares=basis.shares(rows) if asked.region is not None else None,
     )
     words, free = _words(asked), asked.freedoms is None
     if asked.fit == "best-fit":
@@ -122,13 +126,13 @@ def certify_run(basis: Basis) -> ZoneCertificate | None:
     if len(rows) < _FEWEST_POINTS:
         return None
     points = basis.result.section_at(rows)
-    return _in_run(_certify(basis, points, basis.result.registration, zone.middle_mm, zone.upper_mm - zone.lower_mm), rows)
+    gap_mm = _GAP_SHARE * (zone.upper_mm - zone.lower_mm)
+    return _in_run(_certify(basis, points, basis.result.registration, zone.middle_mm, gap_mm), rows)
 
 
-def _certify(basis: Basis, points: Array, start: Registration, middle_mm: float, width_mm: float) -> ZoneCertificate:
+def _certify(basis: Basis, points: Array, start: Registration, middle_mm: float, gap_mm: float) -> ZoneCertificate:
     """The minimum zone of points (k, 2) near a start, and what is proven of every other placement."""
-    gap_mm = max(_GAP_MM, _GAP_SHARE * float(width_mm))
-    return certify_minimum_zone(points, basis.nominal, start, basis.terms.tip_radius_mm, middle_mm, gap_mm, _MOST_BOXES)
+    return certify_minimum_zone(points, basis.nominal, start, basis.terms.tip_radius_mm, middle_mm, max(gap_mm, _GAP_MM), _MOST_BOXES)
 
 
 def _certify_consumption(asked: LineProfile, basis: Basis, points: Array, least: ConsumptionFit, rows: Rows) -> ConsumptionCertificate:
