@@ -169,8 +169,6 @@ class Builder:
 
     def _value(self, asked: AskedCharacteristic) -> SectionCharacteristic:
         assert not isinstance(asked, AskedProfile)
-        if self._outline is None:
-            self._outline = Outline(find_airfoil(self._profile))
         lower, upper = asked.limits_of_deviation
         told = {name: getattr(asked, name) for name in ("edge", "offset_mm", "window_deg", "axis", "place_mm") if hasattr(asked, name)}
         wanted = SectionCharacteristic(
@@ -185,7 +183,12 @@ class Builder:
             filter=_filter(getattr(asked, "filter", None)),
             **told,
         )
-        return with_nominal(wanted, self._outline)
+        return with_nominal(wanted, self._found_outline)
+
+    def _found_outline(self) -> Outline:
+        if self._outline is None:
+            self._outline = Outline(find_airfoil(self._profile))
+        return self._outline
 
 
 def _is_run_itself(asked: AskedProfile) -> bool:

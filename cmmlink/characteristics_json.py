@@ -15,13 +15,13 @@ def characteristic_json(found: "CharacteristicResult") -> dict[str, Any]:
         "name": found.name,
         "type": found.type,
         "method": found.method,
-        "value": _number(found.value),
-        "nominal": _number(found.nominal),
+        "value": number(found.value),
+        "nominal": number(found.nominal),
         "unit": found.unit,
-        "lower": _number(found.lower),
-        "upper": _number(found.upper),
-        "deviation": _number(found.deviation),
-        "consumption": _number(found.consumption),
+        "lower": number(found.lower),
+        "upper": number(found.upper),
+        "deviation": number(found.deviation),
+        "consumption": number(found.consumption),
         "uncertainty": found.uncertainty,
         "rule": found.rule,
         "verdict": found.verdict.word,
@@ -34,8 +34,8 @@ def characteristic_json(found: "CharacteristicResult") -> dict[str, Any]:
         "region_words": found.region_words,
         "zone": found.zone_words,
         "pose": None if found.pose is None else pose_json(found.pose),
-        "coverage": _number(found.coverage),
-        "largest_gap_mm": _number(found.gap_mm),
+        "coverage": number(found.coverage),
+        "largest_gap_mm": number(found.gap_mm),
         "places": [{"name": name, "x_mm": x, "y_mm": y} for name, x, y in found.places_mm],
         "notes": list(found.notes),
         "certificate": certificate_json(found.certificate),
@@ -65,11 +65,11 @@ def certificate_json(proof: "ZoneCertificate | ConsumptionCertificate | None") -
             {"index": row, "x_mm": x, "y_mm": y, "deviation_mm": e, "station_mm": s, "multiplier": share}
             for row, (x, y), e, s, share in held
         ],
-        "imbalance": _number(proof.imbalance) if isinstance(proof, ZoneCertificate) else None,
+        "imbalance": number(proof.imbalance) if isinstance(proof, ZoneCertificate) else None,
         "proven": proof.proven,
         "witnesses": [{"index": row, "x_mm": x, "y_mm": y} for row, (x, y) in seen],
         "boxes": proof.boxes,
-        "finest_mm": _number(proof.finest_mm),
+        "finest_mm": number(proof.finest_mm),
         "words": proof.words,
     }
 
@@ -83,5 +83,6 @@ def _worst(worst: "WorstPlace") -> dict[str, float]:
     return {"station_mm": worst.station_mm, "x_mm": worst.x_mm, "y_mm": worst.y_mm, "deviation_mm": worst.deviation_mm}
 
 
-def _number(value: float) -> float | None:
+def number(value: float) -> float | None:
+    """A number, or null where it is infinite or none."""
     return float(value) if math.isfinite(value) else None

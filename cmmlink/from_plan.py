@@ -22,6 +22,7 @@ from inspection import (
     RigidTransform,
     Room,
     RuleName,
+    SectionCharacteristic,
     SectionPlane,
     StatedUncertainty,
     ToleranceZone,
@@ -145,11 +146,13 @@ def inspection_of(
     *,
     provisional: bool = True,
     characteristics: Sequence[Characteristic] | None = None,
+    numbers: Sequence[SectionCharacteristic] = (),
 ) -> LiveInspection:
     """A fresh inspection as a plan describes it. Points that are all there from the start need no provisional verdicts.
 
     room            : gives the arrays that grow with the scan, like numpy.empty
     characteristics : those of the plan for this profile, where they are built already
+    numbers         : what is found as well, without a part in the verdict
 
     Raises PlanError for a characteristic that the nominal does not have.
     """
@@ -164,6 +167,7 @@ def inspection_of(
         uncertainty=stated_by(plan),
         compensation=plan.warmth.compensation if plan.warmth is not None else None,
         characteristics=asked_of(plan, profile) if characteristics is None else characteristics,
+        numbers=numbers,
         provisional=provisional,
         room=room,
     )

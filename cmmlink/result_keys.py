@@ -295,10 +295,30 @@ class SectionInspected(Inspected):
     chain_sha256: str | None = Field(description="the hash of that run's last record")
 
 
+class ShareOfSection(_Json):
+    """What one section has of a characteristic of its stack."""
+
+    height_mm: float = Field(description="the height of the section")
+    value: float | None = Field(description="its value; null: it has none")
+    deviation: float | None = Field(description="value - nominal")
+    verdict: VerdictName = Field(description="the verdict on this value")
+
+
+class StackCharacterised(Characterised):
+    """A characteristic of a stack: what is said of one of a section, and where in the stack it holds."""
+
+    height_mm: float | None = Field(
+        description="the height of the section whose value stands here, the worst; null: the stack has one value"
+    )
+    sections: list[ShareOfSection] = Field(description="the sections in rising order, where each has a value of its own")
+
+
 class StackInspected(_Json):
     """The result of `ct`: the surface, and its sections."""
 
-    verdict: VerdictName = Field(description="the verdict of the worst section; at best uncertain where sections are missing")
+    verdict: VerdictName = Field(
+        description="the verdict of the worst section or characteristic of the stack; at best uncertain where sections are missing"
+    )
     complete: bool = Field(description="whether every section that was asked for was inspected to its end")
     ending: Ending = Field(description="how the inspection ended: aborted where sections are missing")
     measured_at: str = Field(description="when the inspection began, in UTC")
@@ -311,6 +331,7 @@ class StackInspected(_Json):
     lost: int = Field(description="the sum over the sections")
     out_of_tolerance: int = Field(description="the sum over the sections")
     slices: list[SectionInspected] = Field(description="the sections in the order of the plan")
+    characteristics: list[StackCharacterised] = Field(description="every characteristic of the stack, in the order of the plan")
     notes: list[str] = Field(description="what holds for all sections")
 
 

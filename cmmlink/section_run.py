@@ -24,7 +24,7 @@ from cmmlink.record import Recorder, RunInputs, Store
 from cmmlink.words import VERDICT_WORDS
 from drivers import MeshError, Rejected, ScanClosed, ScanOpened, ScanSource
 from drivers.surface import Contour, ContourSource, SurfaceSection, add_points_between
-from inspection import Characteristic, NominalProfile, Reason, RegistrationError
+from inspection import Characteristic, NominalProfile, Reason, RegistrationError, SectionCharacteristic
 
 _REFUSED = "not registered"
 
@@ -186,14 +186,16 @@ def measure_section(
     doubt: Reason | None,
     clock: Callable[[], float],
     stop: threading.Event,
+    numbers: Sequence[SectionCharacteristic] = (),
 ) -> RunOutcome:
     """Send the outline of one section through the pipeline. With a doubt about the outline no verdict is proven.
 
-    asked : the characteristics of the plan for this profile
+    asked   : the characteristics of the plan for this profile
+    numbers : what is found of it as well, for the characteristics of its stack
 
     Raises MeshError where the outline cannot be read, which is no fault of the outline: the system has no thread to give.
     """
-    live = inspection_of(plan, profile, provisional=False, characteristics=asked)
+    live = inspection_of(plan, profile, provisional=False, characteristics=asked, numbers=numbers)
     sinks = [recorder] if recorder else []
     watch = recorder.check if recorder else lambda: None
     run = run_inspection(source, live, sinks, started, buffer_points=plan.buffer_points, clock=clock, stop=stop, watch=watch, doubt=doubt)

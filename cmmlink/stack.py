@@ -34,6 +34,7 @@ from cmmlink.section_run import (
     recorder_of,
     refuse_section,
 )
+from cmmlink.stack_characteristics import JudgedSection, StackQuestions, stack_characteristic_json
 from cmmlink.words import utc_words
 from drivers.surface import (
     Contour,
@@ -49,7 +50,7 @@ from drivers.surface import (
     read_obj,
     read_stl,
 )
-from inspection import Characteristic, NominalProfile, Verdict
+from inspection import Characteristic, NominalProfile, StackCharacteristicResult, Verdict
 
 _log = logging.getLogger(__name__)
 
@@ -100,13 +101,17 @@ class SectionOutcome:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StackOutcome:
-    """The inspected sections of a surface. `asked` is how many the plan asks for; `notes` apply to all of them."""
+    """The inspected sections of a surface. `asked` is how many the plan asks for; `notes` apply to all of them.
+
+    characteristics : those of the stack, in the order of the plan
+    """
 
     mesh: SurfaceMesh
     sections: tuple[SectionOutcome, ...]
     asked: int
     notes: tuple[str, ...]
     began: datetime
+    characteristics: tuple[StackCharacteristicResult, ...] = ()
 
     @property
     def complete(self) -> bool:
@@ -120,8 +125,9 @@ class StackOutcome:
 
     @property
     def verdict(self) -> Verdict:
-        """That of the worst section; not better than uncertain when the stack was cut short."""
-        worst = max(section.verdict for section in self.sections)
+        """That of the worst section or characteristic of the stack; not better than uncertain when the stack was cut short."""
+        of_stack = (one.found.verdict for one in self.characteristics)
+        worst = max(*(section.verdict for section in self.sections), Verdict.CONFORM, *of_stack)
         return worst if self.complete else max(worst, Verdict.UNCERTAIN)
 
     def folder_of(self, pattern: Path, plan: CtPlan) -> Path:
@@ -142,6 +148,7 @@ class StackOutcome:
             "triangles": self.mesh.triangles,
             **{key: sum(section[key] for section in slices) for key in ("received", "judged", "rejected", "lost", "out_of_tolerance")},
             "slices": slices,
+            "characteristics": [stack_characteristic_json(one) for one in self.characteristics],
             "notes": list(self.notes),
         }
 
@@ -173,12 +180,15 @@ def inspect_stack(
     StoreError when the record cannot be kept.
     """
     check_fixed_place(plan)
-    began, profiles = now(), _Profiles(plan)
+    began, profiles, questions = now(), _Profiles(plan), StackQuestions(plan)
     with ExitStack() as opened:
         open3d = _Open3D(opened)
         mesh = _read(plan, open3d)
         heights = _heights(plan, mesh)
         _check_own_nominals(plan, heights)
+        questions.check_heights(heights)
+        for height in heights:
+            questions.numbers(profiles.at(height)[1])
         record = None
         if records is not None:
             store = opened.enter_context(open_to_record(records, now, patience_s))
@@ -188,7 +198,7 @@ def inspect_stack(
         notes = [*read_in, *mesh.warnings, *profiles.notes, *notes_on_temperature(plan), *notes_on_zone(plan)]
         sections: list[SectionOutcome] = []
         for cut in _slices(plan, mesh, heights, open3d, notes, profiles.shortest_mm):
-            stack = _Stack(plan, profiles, tuple(notes))
+            stack = _Stack(plan, profiles, tuple(notes), questions)
             sections.append(_inspect(stack, len(sections) + 1, cut, record, clock, stop))
             on_section(sections[-1])
             if stop.is_set():
@@ -196,7 +206,8 @@ def inspect_stack(
                 break
     if all(section.run.result is None for section in sections) and sections[0].run.refusal is not None:
         raise sections[0].run.refusal
-    outcome = StackOutcome(mesh, tuple(sections), len(heights), tuple(notes), began)
+    judged = [JudgedSection(section.slice.asked_mm, section.slice.height_mm, section.run) for section in sections]
+    outcome = StackOutcome(mesh, tuple(sections), len(heights), tuple(notes), began, questions.judge(judged, len(heights)))
     _log.info("%s: %s, %d of %d sections. %s", surface_words(plan), outcome.verdict.word, len(sections), len(heights), "; ".join(notes))
     return outcome
 
@@ -296,6 +307,7 @@ class _Stack:
     plan: CtPlan
     profiles: _Profiles
     notes: tuple[str, ...]
+    questions: StackQuestions
 
 
 def _slices(
@@ -355,7 +367,10 @@ def _inspect(
             run = refuse_section(count_points(chosen.judged), outline.refusal, started, recorder, clock())
         else:
             source = ContourSource(chosen.judged, surface)
-            run = measure_section(source, section, profile, asked, started, recorder, doubt=chosen.doubt, clock=clock, stop=stop)
+            numbers = stack.questions.numbers(profile)
+            run = measure_section(
+                source, section, profile, asked, started, recorder, doubt=chosen.doubt, clock=clock, stop=stop, numbers=numbers
+            )
     if run.refusal is not None:
         warnings.append(str(run.refusal))
     return SectionOutcome(cut, chosen.judged, path, profile, started, run, tuple(warnings), recorder.evidence if recorder else None)

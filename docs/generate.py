@@ -128,6 +128,7 @@ TABLES: tuple[tuple[str, Mapping[str, str]], ...] = (
     ),
     ("`uncertainty.csv`, where the plan states a budget: a line for every place along the profile", uncertainty_tables.COLUMNS),
     ("`sections.csv` of `ct`: a line for every section", stack_folder.SECTION_COLUMNS),
+    ("`stack.csv` of `ct`: a line for every section and characteristic of the stack", stack_folder.STACK_COLUMNS),
     ("`contours.csv` of a section: a line for every contour point", stack_folder.CONTOUR_COLUMNS),
     ("`points.csv` and `points.npy` of `export`: a line for every point", export.POINT_COLUMNS),
     ("`wire.csv` of `export`: a line for every read", export.WIRE_COLUMNS),

@@ -30,6 +30,14 @@ if TYPE_CHECKING:
     from inspection.characteristics.placement import displacement, twist_by_chord, twist_by_fit
     from inspection.characteristics.section_value import ComparedValue, SectionValue, compare_values
     from inspection.characteristics.stack import StackedSections, StackingAxis, bow, fit_stacking_axis, relative_twist, taper
+    from inspection.characteristics.stack_characteristic import (
+        MeasuredSection,
+        SectionShare,
+        StackCharacteristic,
+        StackCharacteristicResult,
+        StackingAxisMethod,
+        numbers_of,
+    )
     from inspection.characteristics.thickness import EdgeThicknessMethod, ThicknessMethod, edge_thickness, maximum_thickness
     from inspection.coarse import register_coarse
     from inspection.compensation import Compensation
@@ -43,6 +51,7 @@ if TYPE_CHECKING:
     from inspection.evaluation.line_profile import zone_words
     from inspection.evaluation.region import FeatureName, Features, features_of, region_between, station_near
     from inspection.evaluation.section_value import METHODS_OF_SECTIONS, Outline, with_nominal
+    from inspection.evaluation.stack_value import judge_stack
     from inspection.filters import FilteredProfile, FilterOrder, ProfileFilter, filter_profile
     from inspection.fine import register, register_fine
     from inspection.freedoms import FreedomName, Freedoms
@@ -85,6 +94,14 @@ else:
         "inspection.characteristics.placement": ("displacement", "twist_by_chord", "twist_by_fit"),
         "inspection.characteristics.section_value": ("ComparedValue", "SectionValue", "compare_values"),
         "inspection.characteristics.stack": ("StackedSections", "StackingAxis", "bow", "fit_stacking_axis", "relative_twist", "taper"),
+        "inspection.characteristics.stack_characteristic": (
+            "MeasuredSection",
+            "SectionShare",
+            "StackCharacteristic",
+            "StackCharacteristicResult",
+            "StackingAxisMethod",
+            "numbers_of",
+        ),
         "inspection.characteristics.thickness": ("EdgeThicknessMethod", "ThicknessMethod", "edge_thickness", "maximum_thickness"),
         "inspection.coarse": ("register_coarse",),
         "inspection.compensation": ("Compensation",),
@@ -147,6 +164,7 @@ else:
             "Outline",
             "with_nominal",
         ),
+        "inspection.evaluation.stack_value": ("judge_stack",),
         "inspection.zone_certificate": ("ConsumptionCertificate", "ConsumptionFit", "ZoneCertificate"),
         "inspection.zones": ("Transition", "VaryingZone"),
     }
@@ -199,6 +217,7 @@ __all__ = [
     "LiveInspection",
     "LiveUpdate",
     "Material",
+    "MeasuredSection",
     "Method",
     "MinimumZone",
     "Missing",
@@ -225,9 +244,13 @@ __all__ = [
     "SectionCharacteristic",
     "SectionKind",
     "SectionPlane",
+    "SectionShare",
     "SectionValue",
+    "StackCharacteristic",
+    "StackCharacteristicResult",
     "StackedSections",
     "StackingAxis",
+    "StackingAxisMethod",
     "State",
     "StatedUncertainty",
     "Stretch",
@@ -270,9 +293,11 @@ __all__ = [
     "fit_least_consumption",
     "fit_minimum_zone",
     "fit_stacking_axis",
+    "judge_stack",
     "largest_by_noise_mm",
     "maximum_camber",
     "maximum_thickness",
+    "numbers_of",
     "profile_error_mm",
     "reasons_of_abort",
     "region_between",

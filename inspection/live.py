@@ -18,7 +18,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inspection.characteristics.characteristic import Characteristic
+from inspection.characteristics.characteristic import Characteristic, SectionCharacteristic
 from inspection.cloud import MANY, Cloud
 from inspection.compensation import Compensation
 from inspection.conclusion import Missing
@@ -86,6 +86,7 @@ class LiveInspection:
     uncertainty     : a budget of the uncertainty; the U of the zone is then its largest along the profile, and the zone comes without one
     compensation    : takes the growth of a warm part out of every point before anything else is done with it
     characteristics : what is evaluated at the end, each with a verdict of its own; none stands for the profile alone
+    numbers         : what is found at the end as well, without a part in the verdict, for what stands on several inspections
     provisional     : False seeks no pose before `finish`, for points that are all there from the start; the result is the same
     room            : gives the arrays that grow with the scan, like numpy.empty: about 60 bytes a point until `finish` returns
     """
@@ -111,6 +112,7 @@ class LiveInspection:
         uncertainty: StatedUncertainty | None = None,
         compensation: Compensation | None = None,
         characteristics: Sequence[Characteristic] = (),
+        numbers: Sequence[SectionCharacteristic] = (),
         provisional: bool = True,
         room: Room = np.empty,
     ) -> None:
@@ -138,7 +140,7 @@ class LiveInspection:
             allow_unseen_mm=allow_unseen_mm,
             uncertainty=along,
         )
-        self._characteristics = tuple(characteristics)
+        self._characteristics, self._numbers = tuple(characteristics), tuple(numbers)
         self._known_pose = self._terms.known_pose
         self._plane = section or SectionPlane(np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
         self._provisional = provisional
@@ -223,7 +225,8 @@ class LiveInspection:
         """
         rows, self._handed_over = self._rows, True
         missing = missing or Missing()
-        return evaluate(self._characteristics, settle(rows, self._terms, complete, missing), self._terms, missing, complete)
+        result = settle(rows, self._terms, complete, missing)
+        return evaluate(self._characteristics, result, self._terms, missing, complete, self._numbers)
 
     @property
     def _rows(self) -> ScanRows:

@@ -1,5 +1,6 @@
 """The command `ct`: its options spelled out, its progress, and its table of sections."""
 
+import math
 import re
 import sys
 import time
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _MOST_WARNINGS = 20
+_MOST_SHARES = 12
 _PATIENCE_S = 60.0  # surfaces are inspected side by side, and each waits for its turn to be recorded
 _BESIDE_A_PLAN = ("mesh", "out", "records", "no_record", "as_json", "pictures")
 _OPTION_OF = {
@@ -297,6 +299,7 @@ def _print_stack(console: "Console", stack: "StackOutcome") -> None:
     )
     for section in stack.sections:
         console.print(_line(section))
+    _print_characteristics(console, stack)
     told = [f"height {section.slice.asked_mm:g} mm: {text}" for section in stack.sections for text in section.warnings]
     for text in told[:_MOST_WARNINGS]:
         console.print(f"  {text}", style="yellow", markup=False)
@@ -304,6 +307,24 @@ def _print_stack(console: "Console", stack: "StackOutcome") -> None:
         console.print(f"  and {len(told) - _MOST_WARNINGS} more warnings, all of them with --json", style="yellow")
     for note in stack.notes:
         console.print(f"  note: {note}", markup=False)
+
+
+def _print_characteristics(console: "Console", stack: "StackOutcome") -> None:
+    """Print the characteristics of the stack: each with its reasons, and with its values from section to section."""
+    from cmmlink.report import STYLES, print_characteristics
+
+    if stack.characteristics:
+        console.print("characteristics of the stack:")
+    for one in stack.characteristics:
+        print_characteristics(console, [one.found])
+        for reason in one.found.reasons:
+            console.print(f"      {reason.words}", style="yellow", markup=False)
+        shown = sorted(sorted(one.sections, key=lambda share: -share.verdict)[:_MOST_SHARES], key=lambda share: share.height_mm)
+        for share in shown:
+            style, value = STYLES[share.verdict], "no value" if math.isnan(share.value) else f"{share.value:+.4f}"
+            console.print(f"{share.height_mm:15.4f}  {value:>9}  [{style}]{VERDICT_WORDS[share.verdict]}[/]")
+        if len(shown) < len(one.sections):
+            console.print(f"      and {len(one.sections) - len(shown)} more sections, none of them worse; all of them in stack.csv")
 
 
 def _line(section: "SectionOutcome") -> str:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         place_of,
         with_own_maps,
     )
+    from cmmlink.plan.stack_characteristics import AskedOfStack
     from cmmlink.plan.surface import CtPlan, NominalAt, load_ct_plan
     from cmmlink.plan.yaml_model import Positive, Settings, line_of, read_model, words_of_allowed
 else:
@@ -49,6 +50,7 @@ else:
         ),
         "cmmlink.plan.characteristics": ("AskedCharacteristic", "AskedFilter", "AskedProfile", "Place"),
         "cmmlink.plan.cutters": ("CutterName",),
+        "cmmlink.plan.stack_characteristics": ("AskedOfStack",),
         "cmmlink.plan.surface": ("CtPlan", "NominalAt", "load_ct_plan"),
         "cmmlink.plan.yaml_model": ("Positive", "Settings", "line_of", "read_model", "words_of_allowed"),
     }
@@ -60,6 +62,7 @@ __all__ = [
     "PROFILE",
     "AskedCharacteristic",
     "AskedFilter",
+    "AskedOfStack",
     "AskedProfile",
     "CtPlan",
     "CutterName",

@@ -186,7 +186,9 @@ class AskedProfile(_Named):
         return ToleranceZone(min(lower), max(upper), uncertainty_mm)
 
 
-class _Limited(_Named):
+class Limited(_Named):
+    """What has limits of its deviation."""
+
     @model_validator(mode="after")
     def _some_limit(self) -> Self:
         low, high = self.limits_of_deviation
@@ -209,7 +211,9 @@ class _Limited(_Named):
         raise NotImplementedError
 
 
-class _InMm(_Limited):
+class InMm(Limited):
+    """What is a length."""
+
     nominal_mm: float | None = Field(default=None, description=NOMINAL)
     lower_mm: float | None = Field(default=None, description=LOWER)
     upper_mm: float | None = Field(default=None, description=UPPER)
@@ -218,7 +222,7 @@ class _InMm(_Limited):
     @property
     def limits_of_deviation(self) -> tuple[float, float]:
         """Lower and upper limit of the deviation, infinite where there is none."""
-        return _infinite(self.lower_mm, self.upper_mm)
+        return limits_of(self.lower_mm, self.upper_mm)
 
     @property
     def expanded_uncertainty(self) -> float:
@@ -231,7 +235,9 @@ class _InMm(_Limited):
         return self.nominal_mm
 
 
-class _InDeg(_Limited):
+class InDeg(Limited):
+    """What is an angle."""
+
     nominal_deg: float | None = Field(default=None, description=NOMINAL)
     lower_deg: float | None = Field(default=None, description=LOWER)
     upper_deg: float | None = Field(default=None, description=UPPER)
@@ -240,7 +246,7 @@ class _InDeg(_Limited):
     @property
     def limits_of_deviation(self) -> tuple[float, float]:
         """Lower and upper limit of the deviation, infinite where there is none."""
-        return _infinite(self.lower_deg, self.upper_deg)
+        return limits_of(self.lower_deg, self.upper_deg)
 
     @property
     def expanded_uncertainty(self) -> float:
@@ -257,28 +263,28 @@ class _OfOutline(_Named):
     filter: AskedFilter | None = Field(default=None, description="what the actual section is drawn from went through; null: raw deviations")
 
 
-class Chord(_OfOutline, _InMm):
+class Chord(_OfOutline, InMm):
     """The length of the chord."""
 
     type: Literal["chord"] = Field(description="the length of the chord")
     method: ChordMethod = Field(default="tangent", description="how it is measured; the methods differ by up to half a percent")
 
 
-class ChordAngle(_OfOutline, _InDeg):
+class ChordAngle(_OfOutline, InDeg):
     """The angle of the chord, counted from the datum."""
 
     type: Literal["chord-angle"] = Field(description="the angle of the chord from the x axis, from leading to trailing edge; needs a datum")
     method: ChordAngleMethod = Field(default="nose-tail", description="by nose and tail, by the flat, or by the farthest two places")
 
 
-class Thickness(_OfOutline, _InMm):
+class Thickness(_OfOutline, InMm):
     """The largest thickness."""
 
     type: Literal["thickness"] = Field(description="the largest thickness")
     method: ThicknessMethod = Field(default="inscribed", description="by the largest inscribed circle, or square to the camber line")
 
 
-class EdgeThickness(_OfOutline, _InMm):
+class EdgeThickness(_OfOutline, InMm):
     """The thickness at a stated way in from an edge, square to the camber line or, for a blunt edge, along its flat."""
 
     type: Literal["edge-thickness"] = Field(description="the thickness at a stated way in from an edge")
@@ -291,7 +297,7 @@ class EdgeThickness(_OfOutline, _InMm):
     offset_mm: Positive = Field(description="how far in from the edge point")
 
 
-class EdgeRadius(_OfOutline, _InMm):
+class EdgeRadius(_OfOutline, InMm):
     """The radius of an edge."""
 
     type: Literal["edge-radius"] = Field(description="the radius of an edge")
@@ -300,14 +306,14 @@ class EdgeRadius(_OfOutline, _InMm):
     window_deg: float = Field(default=30.0, gt=0, le=180, description="how far the tangent turns from the tip to either end of the window")
 
 
-class Camber(_OfOutline, _InMm):
+class Camber(_OfOutline, InMm):
     """The largest camber."""
 
     type: Literal["camber"] = Field(description="how far the camber line bulges from the line between its ends, positive upwards")
     method: Literal["inscribed"] = Field(default="inscribed", description="the camber line is that of the centres of inscribed circles")
 
 
-class Twist(_OfOutline, _InDeg):
+class Twist(_OfOutline, InDeg):
     """How the section is turned against its nominal, counted from the datum, positive counterclockwise."""
 
     type: Literal["twist"] = Field(description="how the section is turned against its nominal; needs a datum")
@@ -316,7 +322,7 @@ class Twist(_OfOutline, _InDeg):
     )
 
 
-class Displacement(_InMm):
+class Displacement(InMm):
     """How far the section lies from its nominal, counted from the datum."""
 
     type: Literal["displacement"] = Field(description="how far the section lies from its nominal; needs a datum")
@@ -332,5 +338,6 @@ AskedCharacteristic = Annotated[
 ]
 
 
-def _infinite(lower: float | None, upper: float | None) -> tuple[float, float]:
+def limits_of(lower: float | None, upper: float | None) -> tuple[float, float]:
+    """Limits as numbers, infinite where there is none."""
     return -math.inf if lower is None else lower, math.inf if upper is None else upper

@@ -1,8 +1,9 @@
 """What every plan says of how a part is judged: the tolerance, the characteristics, and what the verdict rests on."""
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Annotated
+from typing import Annotated, Protocol
 
 import yaml
 from pydantic import Field, ValidationInfo, field_validator
@@ -60,6 +61,18 @@ class Allow(Settings):
     )
 
 
+class _HasName(Protocol):
+    @property
+    def name(self) -> str: ...
+
+
+def check_names(asked: Sequence[_HasName]) -> None:
+    """Raise ValueError where two characteristics have one name."""
+    names = Counter(one.name for one in asked)
+    if twice := next((name for name, count in names.items() if count > 1), None):
+        raise ValueError(f"characteristics with names of their own; '{twice}' is given {names[twice]} times")
+
+
 def _first_profile(asked: tuple[AskedCharacteristic, ...]) -> AskedProfile | None:
     """The first line-profile, if it is one of the whole profile."""
     first = next((one for one in asked if isinstance(one, AskedProfile)), None)
@@ -94,9 +107,7 @@ class Deciding(Settings):
     @field_validator("characteristics")
     @classmethod
     def _names_of_their_own(cls, asked: tuple[AskedCharacteristic, ...]) -> tuple[AskedCharacteristic, ...]:
-        names = Counter(one.name for one in asked)
-        if twice := next((name for name, count in names.items() if count > 1), None):
-            raise ValueError(f"characteristics with names of their own; '{twice}' is given {names[twice]} times")
+        check_names(asked)
         return asked
 
     @field_validator("tolerance")

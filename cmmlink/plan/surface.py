@@ -7,12 +7,13 @@ from these descriptions.
 from pathlib import Path
 from typing import Annotated, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from cmmlink.errors import PlanError, YamlError
 from cmmlink.plan.cutters import CutterName
-from cmmlink.plan.deciding import Deciding
+from cmmlink.plan.deciding import Deciding, check_names
 from cmmlink.plan.scan import OUT, RECORDS, Nominal, Part, Registration, ResultFolder, Unit
+from cmmlink.plan.stack_characteristics import AskedOfStack
 from cmmlink.plan.yaml_model import Positive, Settings, read_model
 from drivers import PointFileError, mm_per, read_text
 
@@ -88,8 +89,26 @@ class CtPlan(Deciding):
     sections: Sections = Field(description="a mapping with heights_mm or every_mm")
     cut: Cut = Field(default=Cut(), description="how the surface is cut")
     registration: Registration = Field(default=Registration(), description="how the points of a section come onto its nominal")
+    stack_characteristics: tuple[AskedOfStack, ...] = Field(
+        default=(), description="what is evaluated of all sections together, each with a verdict of its own; the part has the worst of all"
+    )
     out: ResultFolder | None = Field(default=None, description=OUT)
     records: Path | None = Field(default=None, description=RECORDS)
+
+    @field_validator("stack_characteristics")
+    @classmethod
+    def _names_of_the_stack(cls, asked: tuple[AskedOfStack, ...], info: ValidationInfo) -> tuple[AskedOfStack, ...]:
+        check_names(asked)
+        sections: Sections | None = info.data.get("sections")
+        if sections is not None and asked and sections.every_mm is None:
+            heights = sections.heights_mm
+            if len(set(heights)) < max(len(heights), 2):
+                raise ValueError("sections at two heights or more, each once")
+            for one in asked:
+                for key in ("reference_mm", "root_mm", "tip_mm"):
+                    if (at := getattr(one, key, None)) is not None and at not in heights:
+                        raise ValueError(f"a {key} that is one of heights_mm, not {at:g} ({one.name})")
+        return asked
 
 
 def load_ct_plan(path: Path) -> CtPlan:

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from cmmlink.report.folder import prepare, write_results, write_run
     from cmmlink.report.section_pictures import SectionPictures
     from cmmlink.report.stack_folder import write_stack
-    from cmmlink.report.terminal import STYLE_OF, STYLES, LiveTable, print_summary
+    from cmmlink.report.terminal import STYLE_OF, STYLES, LiveTable, print_characteristics, print_summary
 else:
     from cmmlink.front_door import load_on_use
 
@@ -17,7 +17,7 @@ else:
         "cmmlink.report.folder": ("prepare", "write_results", "write_run"),
         "cmmlink.report.section_pictures": ("SectionPictures",),
         "cmmlink.report.stack_folder": ("write_stack",),
-        "cmmlink.report.terminal": ("STYLE_OF", "STYLES", "LiveTable", "print_summary"),
+        "cmmlink.report.terminal": ("STYLE_OF", "STYLES", "LiveTable", "print_characteristics", "print_summary"),
     }
 
     __getattr__ = load_on_use(__name__, _PLACES)
@@ -29,6 +29,7 @@ __all__ = [
     "LiveTable",
     "SectionPictures",
     "prepare",
+    "print_characteristics",
     "print_summary",
     "write_results",
     "write_run",

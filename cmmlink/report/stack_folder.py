@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from cmmlink.characteristics_csv import write_characteristics
+from cmmlink.characteristics_json import number
 from cmmlink.csv_rows import Texts, write_rows
 from cmmlink.deviations_csv import write_deviations
 from cmmlink.errors import PlanError
@@ -40,6 +42,19 @@ SECTION_COLUMNS = {
 }
 
 
+STACK_COLUMNS = {
+    "name": "the name of the characteristic of the stack",
+    "height_mm": "the height of the section",
+    "value": "its value; empty: it has none",
+    "nominal": "the value that the deviation is counted from",
+    "unit": "the unit of all numbers of the line but the height",
+    "deviation": "value - nominal",
+    "lower": "the lower limit of the deviation; empty: no limit",
+    "upper": "the upper limit, likewise",
+    "verdict": "the verdict on this value",
+}
+
+
 def write_stack(
     folder: Path,
     stack: StackOutcome,
@@ -51,12 +66,17 @@ def write_stack(
 ) -> None:
     """Write result.json, sections.csv, stack.png and for each section its deviations, contours and picture.
 
+    Of a stack with characteristics there are characteristics.csv and, with the value of each section, stack.csv as well.
+
     pictures : draws those of the sections; None where no picture is wanted
     """
     try:
         with new_files(folder, make_room) as files:
             files("result.json").write_text(json.dumps(stack.result_json(), indent=2) + "\n", encoding="utf-8")
             _write_sections(stack, files("sections.csv"))
+            if stack.characteristics:
+                write_characteristics([one.found for one in stack.characteristics], files("characteristics.csv"))
+                _write_shares(stack, files("stack.csv"))
             for number, section in enumerate(stack.sections, start=1):
                 own = section_folder(number, section)
                 write_contours(section.slice.contours, files(f"{own}/contours.csv"))
@@ -87,6 +107,19 @@ def write_contours(contours: Iterable[Contour], path: Path) -> None:
             head = f"{number},{'closed' if contour.closed else 'open'},{'hole' if contour.hole else 'outer'}"
             heads = Texts(np.zeros(len(contour.points_mm), dtype=np.int64), [head])
             write_rows(file, [heads, np.column_stack([contour.points_mm, contour.section_mm])])
+
+
+def _write_shares(stack: StackOutcome, path: Path) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(STACK_COLUMNS)
+        for one in stack.characteristics:
+            for share in one.sections:
+                limits = [number(one.found.lower), number(one.found.upper)]
+                values = [number(share.value), one.found.nominal, one.found.unit, number(share.deviation), *limits]
+                writer.writerow(
+                    [one.found.name, share.height_mm, *("" if value is None else value for value in values), share.verdict.word]
+                )
 
 
 def _write_sections(stack: StackOutcome, path: Path) -> None:

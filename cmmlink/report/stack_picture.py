@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from cmmlink.report.heading import draw_heading, heading_of, save_picture
+from cmmlink.report.stack_panels import along_height, draw_panel, words_of
 from cmmlink.stack import SectionOutcome, StackOutcome
 from cmmlink.words import headline_of
 from inspection import ToleranceZone
@@ -29,8 +30,11 @@ def write_stack_picture(stack: StackOutcome, zone: ToleranceZone, title: str, pa
     lengths = np.array([section.profile.length_mm for section in sections])
     common = bool(np.ptp(lengths) <= 0.001 * lengths[0])
     scale = float(lengths[0]) if common else 100.0
-    figure = Figure(figsize=(12, 7), dpi=110, layout="constrained")
-    axes = figure.subplots()
+    panels = along_height(stack.characteristics)
+    figure = Figure(figsize=(12 + 2.4 * len(panels), 7), dpi=110, layout="constrained")
+    axes, *beside = figure.subplots(1, 1 + len(panels), squeeze=False, sharey=True, width_ratios=[4.5, *([1.0] * len(panels))])[0]
+    for panel, one in zip(beside, panels, strict=True):
+        draw_panel(panel, one)
     axes.set_facecolor(_EMPTY)
     half = 0.75 * (zone.upper_mm - zone.lower_mm)
     edges = _edges(np.array([section.slice.height_mm for section in sections]))
@@ -43,7 +47,9 @@ def write_stack_picture(stack: StackOutcome, zone: ToleranceZone, title: str, pa
         bar.ax.axhline(limit, color="black", lw=1.2)
     _mark(axes, sections, scale)
     where = "station (mm)" if common else "station (% of the section's length)"
-    axes.set(xlabel=where, ylabel="height along the normal (mm)", title=f"{len(sections)} sections; grey: nothing judged")
+    axes.set(xlabel=where, ylabel="height along the normal (mm)")
+    told = [f"{len(sections)} sections; grey: nothing judged", *(words_of(one) for one in stack.characteristics if not one.sections)]
+    axes.set_title("\n".join(told), fontsize=10, parse_math=False)
     headline = headline_of(stack.verdict, stack.ending, len(stack.sections) / stack.asked)
     draw_heading(figure, heading_of(title, headline.words))
     save_picture(figure, path)

@@ -145,8 +145,9 @@ def print_characteristics(console: Console, found: Sequence[CharacteristicResult
     """A line for every characteristic, with its verdict, its value and how it was found, and the reasons of those that do not conform."""
     for one in found:
         unit = "" if one.unit == "1" else f" {one.unit}"
-        value = "no value" if math.isnan(one.value) else f"{one.value:.4f}{unit}"
-        deviation = "" if math.isnan(one.deviation) else f", deviation {one.deviation:+.4f}"
+        digits = 4 if unit else 7  # of what has no unit, a slope
+        value = "no value" if math.isnan(one.value) else f"{one.value:.{digits}f}{unit}"
+        deviation = "" if math.isnan(one.deviation) else f", deviation {one.deviation:+.{digits}f}"
         limits = " .. ".join(f"{limit:+g}" if math.isfinite(limit) else "any" for limit in (one.lower, one.upper))
         how = "; ".join(part for part in (one.method, _of_profile(one), f"filter {one.filter}" if one.filter != "none" else "") if part)
         console.print(

@@ -8,6 +8,7 @@ from inspection.characteristics.characteristic import (
     Characteristic,
     CharacteristicResult,
     LineProfile,
+    SectionCharacteristic,
     WholeProfile,
 )
 from inspection.conclusion import Missing, Reason
@@ -22,22 +23,35 @@ PROFILE = WholeProfile("profile")
 """What a plan without characteristics asks for."""
 
 
-def evaluate(asked: Sequence[Characteristic], result: InspectionResult, terms: Terms, missing: Missing, complete: bool) -> InspectionResult:
+def evaluate(
+    asked: Sequence[Characteristic],
+    result: InspectionResult,
+    terms: Terms,
+    missing: Missing,
+    complete: bool,
+    numbers: Sequence[SectionCharacteristic] = (),
+) -> InspectionResult:
     """The result of a run with its characteristics, and with the verdict on the part that follows from them.
 
-    asked  : in the order of the plan; none asks for the profile alone
-    result : the profile as the run judged it on its terms
+    asked   : in the order of the plan; none asks for the profile alone
+    result  : the profile as the run judged it on its terms
+    numbers : what is found as well, without a part in the verdict, for what stands on several runs
     """
     basis = Basis(result, terms, missing, complete)
     outlines = ActualOutlines(basis)
     found = tuple(_judge(one, basis, outlines) for one in asked or (PROFILE,))
-    return replace(result, characteristics=found, verdict=max(one.verdict for one in found), reasons=_reasons_of_part(found))
+    beside = tuple(judge_value(one, basis, outlines) for one in numbers)
+    verdict, reasons = max(one.verdict for one in found), _reasons_of_part(found)
+    return replace(result, characteristics=found, numbers=beside, verdict=verdict, reasons=reasons)
 
 
 def doubt_part(result: InspectionResult, reasons: tuple[Reason, ...]) -> InspectionResult:
     """The result where nothing of the part is proven, whatever was found, for reasons that stand before all others."""
-    doubted = tuple(replace(one, verdict=Verdict.UNCERTAIN, reasons=(*reasons, *one.reasons)) for one in result.characteristics)
-    return replace(result, verdict=Verdict.UNCERTAIN, reasons=(*reasons, *result.reasons), characteristics=doubted)
+    found, beside = (
+        tuple(replace(one, verdict=Verdict.UNCERTAIN, reasons=(*reasons, *one.reasons)) for one in every)
+        for every in (result.characteristics, result.numbers)
+    )
+    return replace(result, verdict=Verdict.UNCERTAIN, reasons=(*reasons, *result.reasons), characteristics=found, numbers=beside)
 
 
 def _judge(asked: Characteristic, basis: Basis, outlines: ActualOutlines) -> CharacteristicResult:

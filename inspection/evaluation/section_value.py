@@ -87,19 +87,25 @@ _MEASURES: Mapping[str, Callable[[Outline, SectionCharacteristic], SectionValue]
 }
 
 
-def with_nominal(asked: SectionCharacteristic, nominal: Outline) -> SectionCharacteristic:
-    """The characteristic with the value of the nominal section. Raises InspectionError where the section has none by that method."""
+def with_nominal(asked: SectionCharacteristic, nominal: Callable[[], Outline]) -> SectionCharacteristic:
+    """The characteristic with the value of the nominal section. Raises InspectionError where the section has none by that method.
+
+    nominal : gives the nominal section; it is not asked for what the best fit tells, which needs no airfoil
+    """
     if asked.method not in METHODS_OF_SECTIONS[asked.type]:
         raise ValueError(f"the method of {asked.type} is {' or '.join(METHODS_OF_SECTIONS[asked.type])}, not {asked.method!r}")
     if asked.type == "displacement" or (asked.type == "twist" and asked.method == "best-fit"):
+        section = None
         found = SectionValue(asked.type, asked.method, 0.0, "deg" if asked.type == "twist" else "mm", no_places(), ())
     elif asked.type == "twist":
-        found = chord_angle(nominal.section, nominal.camber, cast(ChordAngleMethod, asked.method))
+        section = nominal().section
+        found = chord_angle(section, nominal().camber, cast(ChordAngleMethod, asked.method))
     else:
-        found = _MEASURES[asked.type](nominal, asked)
+        section = nominal().section
+        found = _MEASURES[asked.type](nominal(), asked)
     drawn = 0.0 if asked.type == "twist" else found.value
     value = drawn if math.isnan(asked.nominal_value) else asked.nominal_value
-    return replace(asked, section=nominal.section, nominal=found, nominal_value=value)
+    return replace(asked, section=section, nominal=found, nominal_value=value)
 
 
 class ActualOutlines:

@@ -46,7 +46,7 @@ def even(lower: float, upper: float) -> VaryingZone:
 
 def value(name: str, type_: Any, method: str, limit: float = LIMIT, **told: Any) -> SectionCharacteristic:
     asked = SectionCharacteristic(name, type_, method, -limit, limit, datum=DATUM, **told)
-    return with_nominal(asked, Outline(find_airfoil(nominal())))
+    return with_nominal(asked, lambda: Outline(find_airfoil(nominal())))
 
 
 @cache
