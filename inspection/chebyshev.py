@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog
 
 from inspection.freedoms import Freedoms, gradients
 from inspection.rigid import RigidTransform
@@ -169,6 +168,8 @@ class _Problem(NamedTuple):
 
     def _step(self, points: Array, here: Values, amounts: Array, trust_mm: float) -> _Step:
         """Solve min t with |value + J q| <= t, beginning with few points and adding those that the solution violates."""
+        from scipy.optimize import linprog  # noqa: PLC0415 - it takes half a second, and few verdicts need the minimum zone
+
         every = np.flatnonzero(here.takes_part)
         arms = self.freedoms.arms(self.freedoms.pose(self.start, amounts).apply(points[every]), amounts)
         units = self.freedoms.units_mm(float(np.hypot(*arms.T).max()))  # rotation in mm at the farthest point

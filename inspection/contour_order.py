@@ -2,23 +2,27 @@
 
 Points are gathered in small cells, whose means stand for them, so that density does not count either. The shortest tree that joins
 the means runs along the contour, since on a sampled curve the nearest neighbours are neighbours on it; its longest path is the walk.
-The tree is a part of the Delaunay triangulation (Shamos & Hoey 1975), which keeps the search nearly linear.
+The tree is a part of the Delaunay triangulation (Shamos & Hoey 1975), which keeps the search nearly linear; over few points it is grown
+without (Prim 1957), which takes no longer and needs nothing of scipy. Where several trees are as short, the triangulation decides.
 """
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array
-from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
-from scipy.spatial import Delaunay, QhullError
 
 from inspection.cloud import corners_of
+from inspection.kernels import GrownTree, shortest_tree
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
+_FEW = 4096  # points: to look at all pairs of more takes longer than their triangulation
 _ROUND_STEPS = 1e-9  # of a step: cell means are rounded to it, so that the order of a sum does not show
 _SQUEEZED = 1e-6  # points whose box is thinner than this share of its length lie on a line, which has no triangulation
 
@@ -50,20 +54,80 @@ def trace_contour(blocks: Callable[[], Iterable[Array]], step_mm: float) -> Cont
     The direction of the walk, and where a closed contour is opened, follow from the points alone.
     """
     means = _cell_means(blocks, step_mm)
-    first, second = _edges(means).T.astype(np.int32)  # the width that the graph searches of every SciPy take
-    lengths = np.hypot(*(means[first] - means[second]).T)
-    network = coo_array((lengths, (first, second)), shape=(len(means), len(means))).tocsr()
-    tree = minimum_spanning_tree(network)
-    ends, share = tree.tocoo(), np.zeros(len(means))
-    for side in (ends.row, ends.col):
-        np.add.at(share, side, ends.data / 2)
-    return Contour(means, share, _longest_path(tree))
+    tree = _tree_of(means)
+    share = np.zeros(len(means))
+    for side in (tree.first, tree.second):
+        np.add.at(share, side, tree.length_mm / 2)
+    return Contour(means, share, tree.longest_path)
 
 
-def _edges(means: Array) -> Rows:
-    """Pairs (e, 2) of neighbours: of the triangulation, or along the line where all points lie on one."""
+class _Tree(NamedTuple):
+    """The shortest tree over points: its edges (e,) in the order of their ends, and the nodes (w,) of its longest path."""
+
+    first: Rows
+    second: Rows
+    length_mm: Array
+    longest_path: Rows
+
+
+def _tree_of(means: Array) -> _Tree:
+    """The shortest tree: grown over all pairs of points where these are few and it is the only one, else of neighbours."""
+    lie_on_line = _lie_on_line(means)
+    grown = shortest_tree(means) if len(means) <= _FEW and not lie_on_line else None
+    return _tree_of_neighbours(means, lie_on_line) if grown is None else _tree_that_grew(means, grown)
+
+
+def _lie_on_line(means: Array) -> bool:
     spread = np.sqrt(np.maximum(np.linalg.eigvalsh(np.cov(means.T)), 0.0)) if len(means) > 3 else np.zeros(2)
-    if spread[0] > _SQUEEZED * spread[1]:
+    return not spread[0] > _SQUEEZED * spread[1]
+
+
+def _tree_that_grew(means: Array, grown: GrownTree) -> _Tree:
+    child = grown.joined[1:]
+    pairs = np.sort(np.column_stack([grown.parent[child], child]), axis=1)
+    first, second = pairs[np.lexsort(pairs.T[::-1])].T
+    length = np.hypot(*(means - means[grown.parent]).T)  # (n,) from each point to its parent
+    return _Tree(first, second, np.hypot(*(means[first] - means[second]).T), _longest_path_of(grown, length))
+
+
+def _longest_path_of(grown: GrownTree, length: Array) -> Rows:
+    """Nodes of the longest path: from the node farthest from any one to the node farthest from it."""
+    parent, to_parent, joined = grown.parent.tolist(), length.tolist(), grown.joined.tolist()
+    away = [0.0] * len(parent)
+    for node in joined[1:]:
+        away[node] = away[parent[node]] + to_parent[node]
+    end = node = int(np.argmax(away))
+    away, before = [-1.0] * len(parent), list(parent)
+    away[end] = 0.0
+    while parent[node] >= 0:  # from the end up to where the tree began, every node is reached from the one below
+        before[parent[node]], away[parent[node]] = node, away[node] + to_parent[node]
+        node = parent[node]
+    for node in joined:
+        if away[node] < 0:
+            away[node] = away[parent[node]] + to_parent[node]
+    path = [int(np.argmax(away))]
+    while path[-1] != end:
+        path.append(before[path[-1]])
+    return np.array(path, dtype=np.int64)
+
+
+def _tree_of_neighbours(means: Array, lie_on_line: bool) -> _Tree:
+    """The tree as a part of the Delaunay triangulation."""
+    from scipy.sparse import coo_array  # noqa: PLC0415 - together they take a third of a second, and the points are few as a rule
+    from scipy.sparse.csgraph import minimum_spanning_tree  # noqa: PLC0415
+
+    first, second = _edges(means, lie_on_line).T.astype(np.int32)  # the width that the graph searches of every SciPy take
+    lengths = np.hypot(*(means[first] - means[second]).T)
+    tree = minimum_spanning_tree(coo_array((lengths, (first, second)), shape=(len(means), len(means))).tocsr())
+    ends = tree.tocoo()
+    return _Tree(ends.row.astype(np.int64), ends.col.astype(np.int64), ends.data, _longest_path(tree))
+
+
+def _edges(means: Array, lie_on_line: bool) -> Rows:
+    """Pairs (e, 2) of neighbours: of the triangulation, or along the line where all points lie on one."""
+    from scipy.spatial import Delaunay, QhullError  # noqa: PLC0415
+
+    if not lie_on_line:
         try:
             corners = Delaunay(means).simplices
         except QhullError:
@@ -101,8 +165,10 @@ def _cell_means(blocks: Callable[[], Iterable[Array]], step_mm: float) -> Array:
     return rounded
 
 
-def _longest_path(tree: "csr_array[np.float64, tuple[int, int]]") -> NDArray[np.int64]:
-    """Nodes of the longest path in a tree: from the node farthest from any one to the node farthest from it."""
+def _longest_path(tree: "csr_array[np.float64, tuple[int, int]]") -> Rows:
+    """Nodes of the longest path, see `_longest_path_of`, in a tree of neighbours."""
+    from scipy.sparse.csgraph import dijkstra  # noqa: PLC0415
+
     end = int(np.argmax(dijkstra(tree, directed=False, indices=[0])[0]))
     away, before = dijkstra(tree, directed=False, indices=[end], return_predecessors=True)
     path = [int(np.argmax(away[0]))]

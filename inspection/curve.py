@@ -1,6 +1,6 @@
 """NURBS curves in the plane: points, exact derivatives, curvature, arc length, interpolation.
 
-A curve is a rational B-spline in homogeneous form; scipy evaluates the B-spline, the quotient rule does the rest.
+A curve is a rational B-spline in homogeneous form; the quotient rule makes its derivatives of those of the B-spline.
 A closed curve is either periodic (wrapped control points, smooth seam) or clamped with equal ends (a corner at the seam).
 """
 
@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import BSpline, make_interp_spline
 
+from inspection.b_spline import evaluate_b_spline
 from inspection.errors import NominalError
 
 Array = NDArray[np.float64]
@@ -42,7 +42,7 @@ class NurbsCurve:
     closed: bool = False
     length_mm: float = field(init=False)
     corners: Array = field(init=False)
-    _spline: BSpline = field(init=False, repr=False)  # of (w x, w y, w)
+    _homogeneous: Array = field(init=False, repr=False)  # (k, 3) of w x, w y, w
     _borders: Array = field(init=False, repr=False)  # (b,) parameters between which Gauss-Legendre is exact to round-off
     _border_stations_mm: Array = field(init=False, repr=False)  # (b,)
 
@@ -53,9 +53,7 @@ class NurbsCurve:
         weights = np.ones(len(self.control_points_mm)) if self.weights is None else np.array(self.weights, dtype=np.float64)
         put(self, "weights", weights)
         self._check_arrays()
-        homogeneous = np.column_stack([self.control_points_mm * weights[:, None], weights])  # (k, 3)
-        spline = BSpline(self.knots, homogeneous, self.degree, extrapolate=True)
-        put(self, "_spline", spline)
+        put(self, "_homogeneous", np.column_stack([self.control_points_mm * weights[:, None], weights]))
         self._check_geometry()
         borders, stations = _arc_length_table(self)
         put(self, "_borders", borders)
@@ -81,6 +79,8 @@ class NurbsCurve:
         seam): the curve leaves its first point in the direction of the second, and reaches its last from that of the one before.
         Raises NominalError for too few or coinciding neighbours.
         """
+        from scipy.interpolate import make_interp_spline  # noqa: PLC0415 - it takes a third of a second, and most curves come as they are
+
         points = _check_neighbours(np.array(points_mm, dtype=np.float64), degree, closed)
         steps = np.sqrt(np.linalg.norm(np.diff(points, axis=0), axis=1))
         parameter = np.concatenate([[0.0], np.cumsum(steps)])
@@ -104,9 +104,9 @@ class NurbsCurve:
         parameter = self._bring_inside(np.atleast_1d(np.asarray(u, dtype=np.float64)))
         result = np.zeros((order + 1, len(parameter), 2))
         weight = np.zeros((order + 1, len(parameter)))
-        for nu in range(min(order, self.degree) + 1):
-            homogeneous = self._spline(parameter, nu)  # (m, 3)
-            result[nu], weight[nu] = homogeneous[:, :2], homogeneous[:, 2]
+        highest = min(order, self.degree)
+        homogeneous = evaluate_b_spline(self.knots, self._homogeneous, self.degree, parameter, highest)  # (highest + 1, m, 3)
+        result[: highest + 1], weight[: highest + 1] = homogeneous[:, :, :2], homogeneous[:, :, 2]
         for nu in range(order + 1):  # Leibniz on A = w C: C(nu) = (A(nu) - sum binomial w(j) C(nu - j)) / w
             binomial = 1
             for j in range(1, nu + 1):

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from inspection.cloud import Cloud, row_blocks
 from inspection.coarse import FEWEST_POINTS
@@ -90,6 +89,8 @@ def _marks(space_mm: Array, nominal: NominalProfile) -> Array:
     others = np.unique(space_mm, axis=0)
     if not len(candidates) or len(others) < FEWEST_POINTS:
         return np.empty((0, 3))
+    from scipy.spatial import KDTree  # noqa: PLC0415 - it takes a third of a second, and few scans have such candidates
+
     tree = KDTree(others)
     away = np.asarray(tree.query(candidates, k=2)[0])[:, 1]
     typical = float(np.quantile(np.asarray(tree.query(others[:: max(1, len(others) // _TYPICAL)], k=2)[0])[:, 1], 0.95))

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import lsq_linear
 
 from inspection.coarse import check_registrable
 from inspection.freedoms import FreedomName, Freedoms, gradients
@@ -153,6 +152,8 @@ def _step(state: _State, lower: Array, upper: Array) -> Array:
     step = np.linalg.lstsq(rows, aim)[0]
     if ((step >= lower) & (step <= upper)).all():
         return np.asarray(step)
+    from scipy.optimize import lsq_linear  # noqa: PLC0415 - it takes half a second, and few fits meet their limits
+
     open_to = np.maximum(upper, lower + 1e-300)  # a limit of no width is a lock
     return np.clip(lsq_linear(rows, aim, (lower, open_to), method="bvls", tol=1e-15).x, lower, upper)
 

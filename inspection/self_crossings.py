@@ -9,8 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from inspection.curve import NurbsCurve
 from inspection.curve_pieces import CurvePieces, cut_into_pieces, derivative_bounds, piece_tree
@@ -267,6 +265,9 @@ def _places(curve: NurbsCurve, rows: Array, grain_mm: float) -> tuple[Crossing, 
     """The crossings of the rows. Rows whose stations follow one another by the grain are one place, of which the first is taken."""
     if not len(rows):
         return ()
+    from scipy.sparse.csgraph import connected_components  # noqa: PLC0415 - it takes a third of a second, and most curves do not cross
+    from scipy.spatial import cKDTree  # noqa: PLC0415
+
     if len(rows) > _MOST_PLACES:
         rows = rows[np.argsort(rows[:, 2:].min(axis=1), kind="stable")[:_MOST_PLACES]]
     stations = np.sort(curve.station_mm(rows[:, 2:].ravel()).reshape(-1, 2), axis=1)

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, KDTree, QhullError
 
 from inspection.cloud import MANY, Cloud, few_of
 from inspection.coarse import FEWEST_POINTS
@@ -27,6 +26,8 @@ Array = NDArray[np.float64]
 
 _FAR_STRAIGHTER = 0.1  # of the rms at the best fit
 _SIZES_APART = 1.25
+_SURELY_APART = _SIZES_APART * (1 - 1e-9)  # and rounding changes nothing
+_LOOKS = 16  # directions: what lies between two of them shows at least 99.5 % of its length
 _GROUPS_APART = 0.2  # of the size: no gap of a scan that still goes round is so wide
 _FACTOR_NEAR = 1.05
 _NEARLY_CLOSED = 3.0  # steps between the two ends of the line on which the points lie
@@ -148,6 +149,8 @@ class _Found:
 def _check_size(points_mm: Array, terms: Terms) -> None:
     """Raise NotMeasured where a scan that goes round is not of the nominal's size, or where a known factor would make all of it fit."""
     nominal = terms.nominal
+    if _are_as_wide(points_mm, nominal.points_mm):
+        return
     scan, want = _across(points_mm), _across(nominal.points_mm)
     if not scan > 0 or 1 / _SIZES_APART < want / scan < _SIZES_APART:
         return
@@ -181,8 +184,23 @@ def _words_of_groups(points_mm: Array, across_mm: float) -> str:
     return f". They lie in two groups, {places}, {gaps[cut - 1]:.4g} mm apart: leave out what is not of this part"
 
 
+def _are_as_wide(points_mm: Array, others_mm: Array) -> bool:
+    """Tell whether the largest distances between two of either points (m, 2) are alike for certain, looked at from a few directions."""
+    (low, high), (other_low, other_high) = _bounds_across(points_mm), _bounds_across(others_mm)
+    return low * _SURELY_APART > other_high and other_low * _SURELY_APART > high
+
+
+def _bounds_across(points_mm: Array) -> tuple[float, float]:
+    """Bounds of the largest distance between two of the points (m, 2): from right across all of it shows, from nearby nearly all."""
+    turns = np.pi * np.arange(_LOOKS) / _LOOKS
+    widest = max(float(np.ptp(points_mm @ (np.cos(turn), np.sin(turn)))) for turn in turns)
+    return widest, widest / float(np.cos(np.pi / (2 * _LOOKS)))
+
+
 def _across(points_mm: Array) -> float:
     """The largest distance between two of the points (m, 2), in mm."""
+    from scipy.spatial import ConvexHull, QhullError  # noqa: PLC0415 - it takes a third of a second, and few sizes are in doubt
+
     try:
         corners = points_mm[ConvexHull(points_mm).vertices]
     except QhullError:  # all on a line
@@ -199,6 +217,8 @@ def _across(points_mm: Array) -> float:
 
 def _goes_round(points_mm: Array) -> bool:
     """Tell whether the points (m, 2), in whatever order, lie along a line that ends where it begins and goes round something."""
+    from scipy.spatial import ConvexHull, KDTree, QhullError  # noqa: PLC0415
+
     places = np.unique(points_mm, axis=0)
     try:
         round_mm = float(ConvexHull(places).area)  # of a hull in the plane, the area is its circumference

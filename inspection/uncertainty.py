@@ -12,7 +12,6 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import ndtr
 
 from inspection.freedoms import Freedoms, gradients
 from inspection.gaps import weigh_by_station
@@ -288,6 +287,8 @@ def largest_by_noise_mm(deviation_mm: ArrayLike, standard_mm: ArrayLike, counts:
     e, u, times = e[counted], u[counted], times[counted]
     if not len(e) or not u.max() > 0:
         return 0.0
+    from scipy.special import ndtr  # noqa: PLC0415 - it takes a quarter of a second, and nothing else here needs it
+
     largest, widest = float(e.max()), float(u.max())
     near = (e > largest - _FAR * widest) & (u > 0)
     low, high = float(max(e[u <= 0].max(initial=0.0), largest - _FAR * widest, 0.0)), largest + _FAR * widest

@@ -10,7 +10,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import BSpline
 
 from inspection import NominalError
 
@@ -62,6 +61,8 @@ class Piece:
 
     def derivatives(self, u: Array, order: int) -> Array:
         """Points and derivatives up to `order` (0 to 2) at the parameters u (m,): (order + 1, m, 3)."""
+        from scipy.interpolate import BSpline  # noqa: PLC0415 - it takes a third of a second, and only drawings have pieces
+
         spline = BSpline(self.knots, self.poles, self.degree)
         given = [spline(u, nu) if nu <= self.degree else np.zeros((len(u), 4)) for nu in range(order + 1)]
         weight = given[0][:, 3:]

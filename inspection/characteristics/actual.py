@@ -7,12 +7,10 @@ deviations stands beside it, and so do the stretches without a measured point: n
 """
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline, make_interp_spline
-from scipy.sparse import csr_array, diags_array
-from scipy.sparse.linalg import spsolve
 
 from inspection.characteristics.outline import AirfoilSection, section_on
 from inspection.characteristics.section_value import SectionValue
@@ -20,6 +18,9 @@ from inspection.curve import NurbsCurve
 from inspection.errors import InspectionError
 from inspection.filters import ProfileFilter
 from inspection.signed_deviations import Deviations
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 Array = NDArray[np.float64]
 
@@ -155,8 +156,12 @@ def _stations(nominal: AirfoilSection, u: Array, start: float) -> Array:
 
 def _draw_deviations(
     nominal: AirfoilSection, station: Array, values: Array, ends: tuple[float, float], spacing: float
-) -> tuple[BSpline, float]:
+) -> tuple["BSpline", float]:
     """The spline of least squares over rising stations (m,), and the weighted root mean square of what it leaves."""
+    from scipy.interpolate import BSpline  # noqa: PLC0415 - it takes half a second, and a plan knows only names of this file
+    from scipy.sparse import csr_array, diags_array  # noqa: PLC0415
+    from scipy.sparse.linalg import spsolve  # noqa: PLC0415
+
     start, end = ends
     count = max(4, round((end - start) / spacing))
     step = (end - start) / count
@@ -193,8 +198,10 @@ def _find_unseen(station: Array, ends: tuple[float, float], gap_max_mm: float, i
     return stretches
 
 
-def _move_outline(nominal: AirfoilSection, spline: BSpline, start: float) -> AirfoilSection:
+def _move_outline(nominal: AirfoilSection, spline: "BSpline", start: float) -> AirfoilSection:
     """The section whose outline is the nominal one moved along its normals by the spline of deviations over stations."""
+    from scipy.interpolate import make_interp_spline  # noqa: PLC0415
+
     u = _without_close_pairs(nominal.parameter)
     u = np.sort(np.concatenate([u, (u[1:] + u[:-1]) / 2]))
     station = _stations(nominal, u, start)  # a spline over the station does not feel how the nominal is parametrised

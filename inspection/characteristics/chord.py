@@ -15,7 +15,6 @@ from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull
 
 from inspection.characteristics.inscribed import CamberLine
 from inspection.characteristics.outline import AirfoilSection
@@ -124,6 +123,8 @@ def _reach_beside(section: AirfoilSection, u: float, direction: Array) -> float:
 
 def _longest_hull_edge(section: AirfoilSection) -> tuple[int, int] | None:
     """The samples at the ends of the longest hull edge that bridges a hollow; None where there is none but at the trailing edge."""
+    from scipy.spatial import ConvexHull  # noqa: PLC0415 - it takes half a second, and a plan knows only names of this file
+
     points = section.points_mm
     last = len(points) - 1
     edges = np.sort(ConvexHull(points).simplices, axis=1)
@@ -147,6 +148,8 @@ def _farthest_from(section: AirfoilSection, place: Array) -> Array:
 
 def _farthest_pair(section: AirfoilSection) -> tuple[Array, Array]:
     """The two places (2,) of the outline that are farthest apart."""
+    from scipy.spatial import ConvexHull  # noqa: PLC0415 - it takes half a second, and a plan knows only names of this file
+
     hull = section.points_mm[ConvexHull(section.points_mm).vertices]
     x, y = hull[:, None, 0] - hull[None, :, 0], hull[:, None, 1] - hull[None, :, 1]
     apart = x * x + y * y

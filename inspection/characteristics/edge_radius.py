@@ -10,7 +10,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from inspection.characteristics.outline import FRONT, AirfoilSection, Edge, dense_parameters, largest_curvature
 from inspection.characteristics.section_value import SectionValue
@@ -86,6 +85,8 @@ def _by_circle(curve: NurbsCurve, edge: Edge, window_deg: float, around: tuple[f
 
 def _turn_by(curve: NurbsCurve, tip: float, limit: float, window_deg: float) -> tuple[float, float]:
     """The parameter towards `limit` at which the tangent has turned by the window, and how far it has turned there in degrees."""
+    from scipy.optimize import brentq  # noqa: PLC0415 - it takes half a second, and a plan knows only names of this file
+
     u = dense_parameters(curve, min(tip, limit), max(tip, limit))
     u = u if limit > tip else u[::-1]
     heading = np.unwrap(_heading(curve, u))

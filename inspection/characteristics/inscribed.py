@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from inspection.characteristics.outline import AirfoilSection
 from inspection.errors import InspectionError
@@ -213,6 +212,8 @@ def _continue_to_edges(section: AirfoilSection, circles: InscribedCircles) -> Ca
 
 def _leave_between(section: AirfoilSection, centre: Array, direction: Array, low: float, high: float) -> Array:
     """Where the ray from a centre (2,) crosses the outline between two parameters of it; they may run past a round edge."""
+    from scipy.optimize import brentq  # noqa: PLC0415 - it takes half a second, and a plan knows only names of this file
+
     square = np.array([-direction[1], direction[0]])
 
     def aside(u: float) -> float:

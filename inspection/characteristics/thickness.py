@@ -18,7 +18,6 @@ from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from inspection.characteristics.inscribed import CamberLine, InscribedCircles, inscribe_circles
 from inspection.characteristics.outline import AirfoilSection, Edge
@@ -172,12 +171,16 @@ def _meet_camber_line(
     def excess(at: float) -> float:
         return float(away(inscribe_circles(section, np.array([at])).centre_mm)[0]) - offset_mm
 
+    from scipy.optimize import brentq  # noqa: PLC0415 - it takes half a second, and a plan knows only names of this file
+
     circle = inscribe_circles(section, np.array([brentq(excess, u[beyond[0] - 1], u[beyond[0]], xtol=1e-14)]))
     return circle.centre_mm[0], circle.along()[0]
 
 
 def _cross_side(section: AirfoilSection, centre: Array, along: Array, side: slice) -> Array:
     """The place (2,) nearest to `centre` where the line through it, square to `along`, crosses the samples of a side."""
+    from scipy.optimize import brentq  # noqa: PLC0415 - it takes half a second, and a plan knows only names of this file
+
     u, points = section.parameter[side], section.points_mm[side]
     height = (points - centre) @ along
     changes = np.flatnonzero(height[:-1] * height[1:] <= 0)

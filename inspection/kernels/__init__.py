@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from inspection.kernels.rows import JUDGED_AS, NONE_TAKEN, TALLY, Columns, Judgement, Places, Taken, judge_few_rows, judge_rows, take_in
     from inspection.kernels.side_by_side import fit_compiled_beside
     from inspection.kernels.thinning import strides
+    from inspection.kernels.tree_growing import GrownTree, shortest_tree
 else:
     from inspection.front_door import load_on_use
 
@@ -50,6 +51,7 @@ else:
         ),
         "inspection.kernels.side_by_side": ("fit_compiled_beside",),
         "inspection.kernels.thinning": ("strides",),
+        "inspection.kernels.tree_growing": ("GrownTree", "shortest_tree"),
     }
 
     __getattr__ = load_on_use(__name__, _PLACES)
@@ -66,6 +68,7 @@ __all__ = [
     "CurveTables",
     "Feet",
     "GrowingSums",
+    "GrownTree",
     "Judgement",
     "Marks",
     "OutlierLimit",
@@ -84,6 +87,7 @@ __all__ = [
     "project",
     "project_on_samples",
     "project_outward",
+    "shortest_tree",
     "strides",
     "take_in",
     "while_compiling",

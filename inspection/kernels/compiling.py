@@ -3,9 +3,11 @@
 Nothing is compiled at import; the first call of a kernel does it.
 """
 
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
+from importlib import import_module
 from operator import attrgetter
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -15,6 +17,7 @@ from numba import carray, njit, typeof, types
 from numba.core import cgutils, config
 from numba.core.event import Event, Listener, register
 from numba.extending import intrinsic
+from numba.np import linalg
 
 from inspection.kernels.cache_folder import places_for, stamp_of, stamped_folder
 from inspection.kernels.compile_notice import begin_to_compile
@@ -208,3 +211,21 @@ class _Notice(Listener):  # type: ignore[misc]  # numba has no types
 
 
 register("numba:compile", _Notice())  # at import, because who waits to be told has long said so
+
+
+def _load_arrays_without_blas() -> None:
+    """Load what numba compiles arrays with, without the linear algebra of scipy: that takes a fifth of a second, and no kernel needs it.
+
+    numba loads it to see whether it is there. Where a product of matrices is compiled it looks again.
+    """
+    if "numba.np.arraymath" in sys.modules or not hasattr(linalg, "ensure_blas"):
+        return
+    look = linalg.ensure_blas
+    linalg.ensure_blas = lambda: None
+    try:
+        import_module("numba.np.arraymath").ensure_blas = look  # type: ignore[attr-defined]  # numba has no types
+    finally:
+        linalg.ensure_blas = look
+
+
+_load_arrays_without_blas()

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from inspection import contour_order
 from inspection.contour_order import Contour, trace_contour
 from tests.inspection import profiles
 from tests.inspection.profiles import Array, curve_of
@@ -47,3 +48,27 @@ def test_points_on_a_line_have_a_walk(count: int) -> None:
     contour = trace(np.random.default_rng(3).permutation(points), 0.01)
     assert len(contour.walk) == count
     assert (np.diff(contour.walk_mm[:, 0]) > 0).all() or (np.diff(contour.walk_mm[:, 0]) < 0).all()
+
+
+@pytest.mark.parametrize("name", ["P1", "P3", "GOE404"])
+@pytest.mark.parametrize("noise_mm", [1e-6, 0.05])
+def test_a_tree_that_grew_is_that_of_the_triangulation(name: str, noise_mm: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """To the last bit: weights, the walk and its direction."""
+    curve, rng = curve_of(name), np.random.default_rng(7)
+    points = curve.point(profiles.even_in_arc_length(curve, 1500))
+    points += rng.normal(0, noise_mm, points.shape)
+    triangulated: list[int] = []
+    of_neighbours = contour_order._tree_of_neighbours
+
+    def note(means: Array, lie_on_line: bool) -> contour_order._Tree:
+        triangulated.append(len(means))
+        return of_neighbours(means, lie_on_line)
+
+    monkeypatch.setattr(contour_order, "_tree_of_neighbours", note)
+    grown = trace(points, curve.length_mm / 700)
+    assert not triangulated
+    monkeypatch.setattr(contour_order, "_FEW", 0)
+    other = trace(points, curve.length_mm / 700)
+    assert triangulated
+    assert (grown.weights_mm == other.weights_mm).all()
+    assert (grown.walk == other.walk).all()

@@ -8,7 +8,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from inspection import LiveInspection, NominalProfile, NotMeasured, NurbsCurve, SectionPlane, ToleranceZone, Verdict, discretize
+from inspection import (
+    LiveInspection,
+    NominalProfile,
+    NotMeasured,
+    NurbsCurve,
+    SectionPlane,
+    ToleranceZone,
+    Verdict,
+    discretize,
+    setup_check,
+)
 from inspection.cloud import MANY
 
 Array = NDArray[np.float64]
@@ -362,3 +372,18 @@ def test_what_few_of_very_many_points_tell_does_not_depend_on_their_order(nomina
     told = refusal(points, nominal, fit="none")
     assert "scatter" in told
     assert refusal(np.random.default_rng(5).permutation(points), nominal, fit="none") == told
+
+
+def test_sizes_that_are_alike_for_certain_are_so_and_the_largest_distance_lies_between_its_bounds() -> None:
+    """Law: what a few looks tell never differs from what the hull tells."""
+    rng, certain = np.random.default_rng(9), 0
+    for _ in range(300):
+        one = rng.normal(size=(int(rng.integers(3, 60)), 2)) * rng.uniform(0.05, 1.0, 2)
+        other = one @ np.linalg.qr(rng.normal(size=(2, 2)))[0] * rng.uniform(0.75, 1.35)
+        low, high = setup_check._bounds_across(one)
+        assert low * (1 - 1e-12) <= setup_check._across(one) <= high * (1 + 1e-12)
+        if setup_check._are_as_wide(one, other):
+            certain += 1
+            assert 1 / 1.25 < setup_check._across(one) / setup_check._across(other) < 1.25
+    assert certain > 150
+    assert not setup_check._are_as_wide(np.ones((5, 2)), np.ones((5, 2)))

@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
+
 from cmmlink.record.store import FILE_NAME
 from tests.cmmlink.commands.oval_files import TOLERANCE
 from tests.cmmlink.oval_part import oval_points, write_points
@@ -14,7 +16,8 @@ ROOT = Path(__file__).resolve().parents[3]
 DEVICES, PAGE, PICTURES = {"pymodbus", "serial"}, {"starlette", "uvicorn", "websockets", "ssl", "asyncio"}, {"matplotlib"}
 CAD = {"ezdxf", "OCP"}
 MATHS, PLANS, SPEECH = {"numpy", "scipy", "numba", "llvmlite"}, {"yaml", "cmmlink.plan.scan"}, {"rich"}
-HEAVY = DEVICES | PAGE | PICTURES | MATHS | PLANS | SPEECH | CAD | {"simulators", "sqlite3"}
+SCIPY = {f"scipy.{part}" for part in ("interpolate", "linalg", "optimize", "sparse", "spatial", "special")}  # a third of a second together
+HEAVY = SCIPY | DEVICES | PAGE | PICTURES | MATHS | PLANS | SPEECH | CAD | {"simulators", "sqlite3"}
 
 IN_ONE_PROCESS = """
 import contextlib, io, json, sys
@@ -62,4 +65,7 @@ def test_points_are_inspected_without_devices_page_and_pictures_and_pictures_dra
     assert judged == 0
     assert plain & (DEVICES | PAGE | PICTURES | SPEECH | CAD | {"simulators"}) == set()
     assert "matplotlib" in drawn
+    noisy = write_points(tmp_path / "noisy.csv", oval_points(np.random.default_rng(1).normal(0.0, 0.003, 360)))
+    ((_, _, least),) = loaded_by(("inspect", noisy, "--nominal", nominal, *TOLERANCE, "--no-record", "--json"))
+    assert least & SCIPY == set()
     assert drawn & (DEVICES | PAGE | CAD | {"simulators"}) == set()

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from numba import njit, types
 from numba.core import config
+from numba.np import arraymath, linalg
 from numpy.typing import NDArray
 
 from inspection.kernels import PoseFit, cache_folder, compiling, pose
@@ -179,3 +180,9 @@ def test_python_calls_no_kernel_that_is_there_for_other_kernels_alone(path: Path
     for function in (node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef) and node.name not in kernels):
         called = {node.func.id for node in ast.walk(function) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)}
         assert not called & inner, function.name
+
+
+def test_products_of_matrices_are_still_compiled_beside_the_kernels() -> None:
+    """What is not loaded for the kernels is there for whoever compiles with numba in the same process."""
+    assert linalg.ensure_blas.__name__ == arraymath.ensure_blas.__name__ == "ensure_blas"
+    assert njit(lambda a: np.dot(a, a))(np.full((2, 2), 3.0)).sum() == 72.0
