@@ -112,9 +112,7 @@ class Builder:
         profile, zone = self._profile, asked.zone
         lower, upper = zone.limits
         uncertainty = asked.uncertainty_mm
-        if uncertainty is None:
-            uncertainty = self._plan.tolerance.uncertainty_mm if self._plan.tolerance else 0.0
-        if 2 * uncertainty >= min(high - low for low, high in zip(lower, upper, strict=True)):
+        if uncertainty is not None and 2 * uncertainty >= min(high - low for low, high in zip(lower, upper, strict=True)):
             raise ValueError(f"an uncertainty of {uncertainty:g} mm leaves nothing provable of its zone")
         whole = profile.length_mm, profile.curve.closed
         stations = zone.stations_mm

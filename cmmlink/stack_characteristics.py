@@ -41,6 +41,7 @@ class StackQuestions:
 
     def __init__(self, plan: CtPlan) -> None:
         self._asked = plan.stack_characteristics
+        self._decision = plan.decision_rule
         self._wanted = tuple(_wanted(one, plan) for one in plan.stack_characteristics)
         self._numbers: dict[int, tuple[SectionCharacteristic, ...]] = {}
 
@@ -79,7 +80,8 @@ class StackQuestions:
         if len(sections) < asked or any(section.run.ending != "complete" for section in sections):
             done = sum(section.run.ending == "complete" for section in sections)
             lost = Reason("incomplete", f"Only {done} of {asked} sections were inspected to their end.")
-        return judge_stack([_at_cuts(one, cut_at) for one in self._wanted], [_measured(section) for section in rising], lost)
+        wanted, measured = [_at_cuts(one, cut_at) for one in self._wanted], [_measured(section) for section in rising]
+        return judge_stack(wanted, measured, lost, self._decision)
 
 
 def stack_characteristic_json(result: StackCharacteristicResult) -> dict[str, Any]:

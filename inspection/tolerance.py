@@ -11,9 +11,9 @@ from inspection.verdict import Verdict
 DecisionRule = Literal["iso-14253-1", "ilac-g8", "simple"]
 
 _WORDS: dict[DecisionRule, str] = {
-    "iso-14253-1": "ISO 14253-1: conform inside the zone less U, nonconform outside the zone plus U, U = {U:g} mm",
-    "ilac-g8": "ILAC-G8:09/2019, guard band w = U on both sides: pass inside the zone less w, fail outside the zone plus w, U = {U:g} mm",
-    "simple": "simple acceptance (ASME B89.7.3.1): U does not count, U = {U:g} mm, the zone is {ratio:.3g} : 1 wide to U on both sides",
+    "iso-14253-1": "ISO 14253-1: conform inside the zone less U, nonconform outside the zone plus U, U = {U:g} {unit}",
+    "ilac-g8": "ILAC-G8:09/2019, guard band w = U on both sides: pass inside the zone less w, fail outside it plus w, U = {U:g} {unit}",
+    "simple": "simple acceptance (ASME B89.7.3.1): U does not count, U = {U:g} {unit}, the zone is {ratio:.3g} : 1 wide to U on both sides",
 }
 
 
@@ -61,10 +61,7 @@ class ToleranceZone:
     @property
     def decision_rule(self) -> str:
         """How the uncertainty counts, in words."""
-        if not self.uncertainty_mm:
-            return "U not stated: simple acceptance"
-        ratio = (self.upper_mm - self.lower_mm) / (2 * self.uncertainty_mm)
-        return _WORDS[self.rule].format(U=self.uncertainty_mm, ratio=ratio)
+        return decision_words(self.rule, self.uncertainty_mm, self.upper_mm - self.lower_mm)
 
     def verdicts(self, deviation_mm: ArrayLike) -> NDArray[np.int8]:
         """Verdict (m,) of each deviation (m,), as the codes of `Verdict`. A limit itself belongs to the zone; NaN is UNCERTAIN."""
@@ -77,3 +74,10 @@ class ToleranceZone:
         """Verdict on the profile: that of its worst point, and UNCERTAIN where there is no point."""
         verdicts = self.verdicts(np.atleast_1d(np.asarray(deviation_mm, dtype=np.float64)))
         return Verdict(int(verdicts.max())) if verdicts.size else Verdict.UNCERTAIN
+
+
+def decision_words(rule: DecisionRule, uncertainty: float, width: float, unit: str = "mm") -> str:
+    """How an expanded uncertainty counts beside limits that are so far apart, in words; the width may be infinite."""
+    if not uncertainty:
+        return "U not stated: simple acceptance"
+    return _WORDS[rule].format(U=uncertainty, ratio=width / (2 * uncertainty), unit=unit)

@@ -155,7 +155,9 @@ class AskedProfile(_Named):
     filter: AskedFilter | None = Field(default=None, description=_FILTER)
     rule: RuleName | None = Field(default=None, description="what decides at a free best fit; null: the rule of the plan")
     uncertainty_mm: float | None = Field(
-        default=None, ge=0, description="the expanded uncertainty U (95 %) of one deviation; null: that of tolerance, or 0"
+        default=None,
+        ge=0,
+        description="the expanded uncertainty U (95 %) of one deviation; null: that of the run, by tolerance or by the budget",
     )
 
     @model_validator(mode="after")

@@ -60,7 +60,7 @@ class LineProfile:
     """A zone around the profile or a region of it, judged at a pose of its own.
 
     zone        : limits of the deviation along the whole profile
-    uncertainty_mm : expanded uncertainty U of one deviation
+    uncertainty_mm : expanded uncertainty U of one deviation; None for that of the run
     region      : None for the whole profile. Which points belong to it is decided by their stations at the pose of the run
     fit         : how the pose is found: "none" (that of the run), "datum", by least squares, by the smallest zone, or by the least
                   consumption of the zone
@@ -73,7 +73,7 @@ class LineProfile:
 
     name: str
     zone: VaryingZone
-    uncertainty_mm: float = 0.0
+    uncertainty_mm: float | None = None
     region: Region | None = None
     fit: CharacteristicFit = "best-fit"
     freedoms: Freedoms | None = None
@@ -184,17 +184,9 @@ def consumption_of(deviation: float, lower: float, upper: float) -> float:
     return abs(2 * deviation - lower - upper) / (upper - lower) if upper - lower < float("inf") else float("nan")
 
 
-def verdict_of(deviation: float, lower: float, upper: float, uncertainty: float) -> Verdict:
-    """What is proven of one deviation by ISO 14253-1; a limit itself is inside, and NaN proves nothing."""
+def verdict_of(deviation: float, lower: float, upper: float, guard: float) -> Verdict:
+    """What is proven of one deviation that must lie by `guard` inside or outside the limits; a limit itself is inside."""
     beyond = max(lower - deviation, deviation - upper)
-    if beyond > uncertainty:
+    if beyond > guard:
         return Verdict.NONCONFORM
-    return Verdict.CONFORM if beyond <= -uncertainty else Verdict.UNCERTAIN
-
-
-def rule_words(uncertainty: float, unit: Unit) -> str:
-    """How the uncertainty counts, in words."""
-    if not uncertainty:
-        return "U not stated: simple acceptance"
-    u = f"{uncertainty:g} {unit}" if unit != "1" else f"{uncertainty:g}"
-    return f"ISO 14253-1: conform inside the limits less U, nonconform outside the limits plus U, U = {u}"
+    return Verdict.CONFORM if beyond <= -guard else Verdict.UNCERTAIN

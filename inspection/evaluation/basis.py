@@ -49,6 +49,10 @@ class Basis:
         """Nominal from section, where the run judged its points."""
         return self.result.registration.nominal_from_section
 
+    def guard(self, uncertainty: float) -> float:
+        """How far inside or outside its limits a value must lie for that to be proven, by the decision rule of the run."""
+        return 0.0 if self.terms.zone.rule == "simple" else uncertainty
+
     def rows(self, region: Region | None) -> Rows:
         """Rows (k,) of the judged points in a region."""
         judged = self.result.verdicts != NOT_JUDGED

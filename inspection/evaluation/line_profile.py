@@ -11,14 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inspection.bands import Band, EvenBand, VaryingBand
-from inspection.characteristics.characteristic import CharacteristicResult, LineProfile, WholeProfile, WorstPlace, rule_words
+from inspection.characteristics.characteristic import CharacteristicResult, LineProfile, WholeProfile, WorstPlace
 from inspection.cloud import MANY, row_blocks
 from inspection.conclusion import Reason, word_points
 from inspection.evaluation.basis import Basis, filter_deviations
 from inspection.evaluation.placing import Placed, certify_run, consume_least, is_constant, place, shrink_zone
 from inspection.placements import PlacementSearch
+from inspection.profile_uncertainty import uncertainty_along, uncertainty_at_fit
 from inspection.rigid import RigidTransform
-from inspection.tolerance import ToleranceZone
+from inspection.tolerance import DecisionRule, ToleranceZone, decision_words
 from inspection.verdict import Verdict
 
 Array = NDArray[np.float64]
@@ -26,6 +27,7 @@ Rows = NDArray[np.int64]
 
 _PLACED = 0.95  # share of the region whose points place it, where the plan asks for no coverage
 _MOST_BOXES = 200_000  # of placements, before the search for one that passes is given up
+_FEWEST_POINTS = 8  # of a region, after whose fit its uncertainty is asked
 _DECIDED = {"none": "at the pose of the run", "datum": "at the datum"}
 
 
@@ -100,6 +102,7 @@ def judge_profile(asked: LineProfile, basis: Basis) -> CharacteristicResult:
     rows = basis.rows(asked.region)
     few = basis.few(rows)
     placed = place(asked, basis, few)
+    asked = replace(asked, uncertainty_mm=_uncertainty_mm(asked, basis, few, placed))
     seen = _see(asked, basis, rows, placed.pose)
     placed, seen, points, why = _decide(asked, basis, rows, few, placed, seen)
     measured = basis.measured(asked.region)
@@ -115,8 +118,8 @@ def judge_profile(asked: LineProfile, basis: Basis) -> CharacteristicResult:
         upper=seen.limits[1],
         deviation=seen.worst.deviation_mm if seen.worst else math.nan,
         consumption=seen.consumption,
-        uncertainty=asked.uncertainty_mm,
-        rule=f"{_rule(asked, placed)}; {rule_words(asked.uncertainty_mm, 'mm')}",
+        uncertainty=_u(asked),
+        rule=f"{_rule(asked, placed)}; {decision_words(basis.terms.zone.rule, _u(asked), seen.limits[1] - seen.limits[0])}",
         verdict=conclusion.verdict,
         reasons=conclusion.reasons,
         worst=seen.worst,
@@ -132,6 +135,30 @@ def judge_profile(asked: LineProfile, basis: Basis) -> CharacteristicResult:
         certificate=placed.certificate,
         notes=seen.notes,
     )
+
+
+def _u(asked: LineProfile) -> float:
+    """The expanded uncertainty of one deviation."""
+    return asked.uncertainty_mm or 0.0
+
+
+def _uncertainty_mm(asked: LineProfile, basis: Basis, few: Rows, placed: Placed) -> float:
+    """U of one deviation: that of the characteristic, or what is stated for the run, at the pose where it is judged.
+
+    At a datum the errors that a free fit takes away count in full, and after a best fit that decides alone what it brings in.
+    """
+    whole = basis.result.zone.uncertainty_mm
+    if asked.uncertainty_mm is not None:
+        return asked.uncertainty_mm
+    if basis.terms.uncertainty is None:
+        return whole
+    stated = basis.terms.uncertainty.stated
+    if asked.datum is not None and not placed.is_free and asked.fit != "none":
+        return max(whole, uncertainty_along(basis.nominal, stated, asked.datum).largest_mm)
+    if asked.rule == "best-fit" and asked.fit == "best-fit" and len(few) > _FEWEST_POINTS:
+        points = placed.pose.apply(basis.result.section_at(few))
+        return max(whole, uncertainty_at_fit(points, basis.nominal, stated, basis.terms.tip_radius_mm, basis.terms.weights).largest_mm)
+    return whole
 
 
 def zone_words(lower_mm: float, upper_mm: float) -> str:
@@ -184,7 +211,7 @@ def _judge(asked: LineProfile, deviation: Array, station: Array, places: Array, 
     lower, upper, _, _ = asked.zone.limits(station)
     known = np.isfinite(deviation) & ~beyond_end
     out = np.maximum(lower - deviation, deviation - upper)[known]
-    u = asked.uncertainty_mm
+    u = basis.guard(_u(asked))
     off = np.abs(deviation - (lower + upper) / 2)
     consumed = np.where(known, 2 * off / (upper - lower), -1.0)
     farther = np.where(beyond_end, np.abs(deviation), 0.0)
@@ -222,7 +249,7 @@ def _decide(
     asked: LineProfile, basis: Basis, rows: Rows, few: Rows, placed: Placed, seen: _Seen
 ) -> tuple[Placed, _Seen, Verdict, Reason | None]:
     """The pose that decides and what was seen there; the verdict on the points, NONCONFORM only where it is proven, and its reason."""
-    why = _why(asked, seen)
+    why = _why(asked, seen, basis.terms.zone.rule)
     if seen.verdict is not Verdict.NONCONFORM or placed.is_known:
         return placed, seen, seen.verdict, why
     if asked.filter is not None or (asked.rule == "best-fit" and asked.fit in ("best-fit", "none")):
@@ -232,7 +259,7 @@ def _decide(
         at_elsewhere = _see(asked, basis, rows, elsewhere)
         if at_elsewhere.verdict is not Verdict.NONCONFORM:
             decided = replace(placed, pose=elsewhere, fit="minimum-zone" if is_constant(asked.zone) else "tolerance")
-            return decided, at_elsewhere, at_elsewhere.verdict, _why(asked, at_elsewhere)
+            return decided, at_elsewhere, at_elsewhere.verdict, _why(asked, at_elsewhere, basis.terms.zone.rule)
     return placed, seen, *_ask_every_placement(asked, basis, few, placed, why)
 
 
@@ -260,7 +287,7 @@ def _doubt_fit(asked: LineProfile, basis: Basis, placed: Placed, why: Reason | N
 
 def _ask_every_placement(asked: LineProfile, basis: Basis, few: Rows, placed: Placed, why: Reason | None) -> tuple[Verdict, Reason | None]:
     """The verdict of points that are out at a fitted pose: NONCONFORM where no placement at all brings them into the zone."""
-    zone, u = asked.zone, asked.uncertainty_mm
+    zone, u = asked.zone, basis.guard(_u(asked))
     band: Band = EvenBand(float(zone.upper_mm[0] - zone.lower_mm[0]) / 2 + u, float(zone.upper_mm[0] + zone.lower_mm[0]) / 2)
     if not is_constant(zone):
         band = VaryingBand(basis.nominal, replace(zone, lower_mm=zone.lower_mm - u, upper_mm=zone.upper_mm + u), 1.0)
@@ -276,10 +303,10 @@ def _ask_every_placement(asked: LineProfile, basis: Basis, few: Rows, placed: Pl
     return Verdict.UNCERTAIN, Reason("placement", words)
 
 
-def _why(asked: LineProfile, seen: _Seen) -> Reason | None:
+def _why(asked: LineProfile, seen: _Seen, rule: DecisionRule) -> Reason | None:
     """The reason that the points themselves give."""
     if is_constant(asked.zone):
-        zone = ToleranceZone(float(asked.zone.lower_mm[0]), float(asked.zone.upper_mm[0]), asked.uncertainty_mm)
+        zone = ToleranceZone(float(asked.zone.lower_mm[0]), float(asked.zone.upper_mm[0]), _u(asked), rule, provable=False)
         return word_points(zone, seen.beyond, seen.within)
     if (not seen.beyond and not seen.within) or seen.worst is None:
         return None

@@ -139,13 +139,18 @@ def _certify_consumption(asked: LineProfile, basis: Basis, points: Array, least:
     """The least consumption of points (k, 2) near a fit, and what is proven of every other placement; its rows are those of the run."""
     tip = basis.terms.tip_radius_mm
     proof = certify_consumption(points, basis.nominal, asked.zone, least, tip, gap=_GAP_CONSUMPTION, most_boxes=_MOST_BOXES)
-    fit = replace(proof.fit, active=rows[proof.fit.active])
-    return replace(proof, fit=fit, witnesses=rows[proof.witnesses])
+    order = np.argsort(rows[proof.fit.active])
+    active, station = rows[proof.fit.active][order], proof.fit.active_station_mm[order]
+    fit = replace(proof.fit, active=active, active_station_mm=station, multipliers=proof.fit.multipliers[order])
+    return replace(proof, fit=fit, active_place_mm=proof.active_place_mm[order], witnesses=rows[proof.witnesses])
 
 
 def _in_run(certificate: ZoneCertificate, rows: Rows) -> ZoneCertificate:
-    """A certificate whose points have the numbers of their rows in the run."""
-    return replace(certificate, active=rows[certificate.active], witnesses=rows[certificate.witnesses])
+    """A certificate whose points have the numbers of their rows in the run, and stand in the order of these."""
+    order = np.argsort(rows[certificate.active])
+    held = ("active_place_mm", "active_deviation_mm", "active_station_mm", "multipliers")
+    sorted_ = {name: getattr(certificate, name)[order] for name in held}
+    return replace(certificate, active=rows[certificate.active][order], witnesses=rows[certificate.witnesses], **sorted_)
 
 
 def _all_free(points: Array, start: RigidTransform) -> Freedoms:

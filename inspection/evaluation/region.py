@@ -83,12 +83,6 @@ def is_inside(station_mm: Array, region: Region) -> NDArray[np.bool_]:
     return np.asarray((station_mm >= region.from_mm) | (station_mm <= region.to_mm))
 
 
-def length_of(region: Region, nominal: NominalProfile) -> float:
-    """How long a region is, in mm."""
-    span = region.to_mm - region.from_mm
-    return span if span > 0 else span + nominal.length_mm
-
-
 def _region(features: Features, from_mm: float, to_mm: float) -> Region:
     """A region around an edge, which may cross the seam."""
     if to_mm - from_mm >= features.length_mm:

@@ -19,7 +19,6 @@ from inspection.characteristics.characteristic import (
     SectionCharacteristic,
     SectionKind,
     consumption_of,
-    rule_words,
     verdict_of,
 )
 from inspection.characteristics.chord import ChordAngleMethod, ChordMethod, chord, chord_angle
@@ -39,6 +38,7 @@ from inspection.gaps import Measured
 from inspection.limited_fit import register_within
 from inspection.registration import Registration
 from inspection.signed_deviations import deviations
+from inspection.tolerance import decision_words
 from inspection.verdict import Verdict
 
 Array = NDArray[np.float64]
@@ -147,7 +147,7 @@ def judge_value(asked: SectionCharacteristic, basis: Basis, outlines: ActualOutl
         value, actual = _find(asked, basis, outlines)
     except InspectionError as error:
         conclusion = basis.conclude(Verdict.UNCERTAIN, Reason("no-value", _sentence(str(error))), basis.measured(None), basis.result.judged)
-        return replace(_bare(asked, nominal), verdict=conclusion.verdict, reasons=conclusion.reasons)
+        return replace(_bare(asked, nominal, basis), verdict=conclusion.verdict, reasons=conclusion.reasons)
     deviation = value.value - asked.nominal_value
     deviation = angle_within_half_a_turn(deviation) if nominal.unit == "deg" else deviation
     measured = _measured(asked, basis, value, actual)
@@ -155,7 +155,7 @@ def judge_value(asked: SectionCharacteristic, basis: Basis, outlines: ActualOutl
     conclusion = basis.conclude(points, why, measured, basis.result.judged)
     places = tuple((name, float(x), float(y)) for name, (x, y) in zip(value.place_names, value.places_mm.tolist(), strict=True))
     return replace(
-        _bare(asked, nominal),
+        _bare(asked, nominal, basis),
         method=_method_words(value),
         value=value.value,
         deviation=deviation,
@@ -170,7 +170,7 @@ def judge_value(asked: SectionCharacteristic, basis: Basis, outlines: ActualOutl
     )
 
 
-def _bare(asked: SectionCharacteristic, nominal: SectionValue) -> CharacteristicResult:
+def _bare(asked: SectionCharacteristic, nominal: SectionValue, basis: Basis) -> CharacteristicResult:
     """What is known of a characteristic before anything is measured."""
     placed = asked.type in PLACED
     return CharacteristicResult(
@@ -185,7 +185,7 @@ def _bare(asked: SectionCharacteristic, nominal: SectionValue) -> Characteristic
         deviation=math.nan,
         consumption=math.nan,
         uncertainty=asked.uncertainty,
-        rule=rule_words(asked.uncertainty, nominal.unit),
+        rule=decision_words(basis.terms.zone.rule, asked.uncertainty, asked.upper - asked.lower, nominal.unit),
         verdict=Verdict.UNCERTAIN,
         reasons=(),
         fit="datum" if placed else "none",
@@ -232,7 +232,7 @@ def _judge(
     unseen = actual.unseen_place(value) if actual is not None else None
     if unseen is not None:
         return Verdict.UNCERTAIN, Reason("unseen", f"It was found where nothing was measured ({unseen}); measure that stretch.")
-    verdict, unit = verdict_of(deviation, asked.lower, asked.upper, asked.uncertainty), value.unit if value.unit != "1" else ""
+    verdict, unit = verdict_of(deviation, asked.lower, asked.upper, basis.guard(asked.uncertainty)), value.unit if value.unit != "1" else ""
     if verdict is Verdict.CONFORM:
         return verdict, None
     limits = f"{_limit(asked.lower)} .. {_limit(asked.upper)} {unit}".rstrip()

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from inspection.characteristics.characteristic import CharacteristicResult, consumption_of, rule_words, verdict_of
+from inspection.characteristics.characteristic import CharacteristicResult, consumption_of, verdict_of
 from inspection.characteristics.section_value import SectionValue, Unit, angle_within_half_a_turn, no_places
 from inspection.characteristics.stack import StackedSections, bow, fit_stacking_axis, relative_twist, taper
 from inspection.characteristics.stack_characteristic import (
@@ -23,6 +23,7 @@ from inspection.characteristics.stack_characteristic import (
 )
 from inspection.conclusion import Reason
 from inspection.rigid import RigidTransform
+from inspection.tolerance import DecisionRule, decision_words
 from inspection.verdict import Verdict
 
 Array = NDArray[np.float64]
@@ -47,18 +48,24 @@ class _Values(NamedTuple):
 
 
 def judge_stack(
-    asked: Sequence[StackCharacteristic], sections: Sequence[MeasuredSection], lost: Reason | None = None
+    asked: Sequence[StackCharacteristic],
+    sections: Sequence[MeasuredSection],
+    lost: Reason | None = None,
+    decision: DecisionRule = "iso-14253-1",
 ) -> tuple[StackCharacteristicResult, ...]:
     """Every characteristic of a stack whose sections stand at rising heights.
 
-    lost : why sections that were asked for are missing; nothing conforms then
+    lost     : why sections that were asked for are missing; nothing conforms then
+    decision : how U counts
     """
     if any(one.height_mm >= other.height_mm for one, other in pairwise(sections)):
         raise ValueError("the sections of a stack stand at rising heights")
-    return tuple(_judge(one, sections, lost) for one in asked)
+    return tuple(_judge(one, sections, lost, decision) for one in asked)
 
 
-def _judge(asked: StackCharacteristic, sections: Sequence[MeasuredSection], lost: Reason | None) -> StackCharacteristicResult:
+def _judge(
+    asked: StackCharacteristic, sections: Sequence[MeasuredSection], lost: Reason | None, decision: DecisionRule
+) -> StackCharacteristicResult:
     doubts = [_doubts(asked, section) for section in sections]
     sound = np.array([not doubt for doubt in doubts], dtype=bool)
     values = _evaluate(asked, sections)
@@ -68,7 +75,7 @@ def _judge(asked: StackCharacteristic, sections: Sequence[MeasuredSection], lost
         deviation = np.array([angle_within_half_a_turn(one) if math.isfinite(one) else math.nan for one in deviation.tolist()])
     proven = np.isfinite(deviation) & (sound | ~values.needs).all(axis=1)
     verdicts = [
-        verdict_of(one, asked.lower, asked.upper, asked.uncertainty) if is_proven else Verdict.UNCERTAIN
+        verdict_of(one, asked.lower, asked.upper, 0.0 if decision == "simple" else asked.uncertainty) if is_proven else Verdict.UNCERTAIN
         for one, is_proven in zip(deviation.tolist(), proven.tolist(), strict=True)
     ]
     verdict = max(verdicts) if lost is None else max(*verdicts, Verdict.UNCERTAIN)
@@ -91,7 +98,7 @@ def _judge(asked: StackCharacteristic, sections: Sequence[MeasuredSection], lost
         deviation=float(deviation[worst]),
         consumption=consumption_of(float(deviation[worst]), asked.lower, asked.upper),
         uncertainty=asked.uncertainty,
-        rule=rule_words(asked.uncertainty, values.unit),
+        rule=decision_words(decision, asked.uncertainty, asked.upper - asked.lower, values.unit),
         verdict=verdict,
         reasons=reasons,
         fit="none" if asked.type == "taper" else "datum" if asked.datum is not None else "best fit of each section",

@@ -1,0 +1,163 @@
+"""Line profiles at poses of their own: the printed values of independent programs, and what is proven where."""
+
+import numpy as np
+import pytest
+
+from inspection import (
+    CharacteristicResult,
+    ConsumptionCertificate,
+    FreedomName,
+    Freedoms,
+    LineProfile,
+    LiveInspection,
+    RigidTransform,
+    StatedUncertainty,
+    ToleranceZone,
+    UncertaintyBudget,
+    VaryingZone,
+    Verdict,
+    ZoneCertificate,
+)
+from inspection.rigid import rotation_about
+from inspection.tolerance import DecisionRule
+from tests.inspection.evaluation.asked import COUNT, DATUM, even, form, named, nominal, points_at, run, stations
+from tests.inspection.profiles import Array
+from tests.inspection.reference_parts import nominal_of, reference_form, scan
+
+PIVOT = np.array([40.0, 3.0])
+SHARES = np.array([0, 0.04, 0.06, 0.44, 0.46, 0.54, 0.56, 0.94, 0.96, 1])
+LOWER = np.array([-0.03, -0.03, -0.02, -0.02, -0.03, -0.03, -0.06, -0.06, -0.03, -0.03])
+UPPER = np.array([0.03, 0.03, 0.08, 0.08, 0.03, 0.03, 0.06, 0.06, 0.03, 0.03])
+HALF_ZONE = {"goe404": (0.036958537, [141, 309, 445, 499]), "mh42": (0.037013398, [251, 308, 445, 499])}
+CONSUMED = {"goe404": 1.025950758, "mh42": 1.046509439}
+LOCKED: list[tuple[tuple[FreedomName, ...], float]] = [
+    (("x", "y"), 0.065880484),
+    (("rotation",), 0.071607420),
+    (("x",), 0.085171728),
+    (("y",), 0.086135719),
+    (("y", "rotation"), 0.067137563),
+]
+
+
+def of_reference(name: str, points: Array, *asked: LineProfile) -> tuple[CharacteristicResult, ...]:
+    live = LiveInspection(nominal_of(name), ToleranceZone(-0.5, 0.5), provisional=False, characteristics=asked)
+    live.add(points)
+    return live.finish().characteristics
+
+
+def even_on(name: str, half_mm: float) -> VaryingZone:
+    return VaryingZone.constant(-half_mm, half_mm, nominal_of(name).length_mm, True)
+
+
+@pytest.mark.parametrize("name", HALF_ZONE)
+def test_a_minimum_zone_is_the_printed_one_with_its_points_and_its_proof(name: str) -> None:
+    half, rows = HALF_ZONE[name]
+    points = scan(name, 500, reference_form(name, 500), 92.0, (15.0, -7.0))
+    (found,) = of_reference(name, points, LineProfile("contour", even_on(name, 0.05), fit="minimum-zone"))
+    assert found.value == pytest.approx(2 * half, abs=4e-9)
+    proof = found.certificate
+    assert isinstance(proof, ZoneCertificate)
+    assert proof.active.tolist() == rows
+    assert proof.proven
+    assert proof.balanced
+    assert found.verdict is Verdict.CONFORM
+
+
+@pytest.mark.parametrize("name", CONSUMED)
+def test_a_least_consumption_is_the_printed_one_and_above_the_zone_it_is_proven_so(name: str) -> None:
+    length = nominal_of(name).length_mm
+    points = scan(name, 500, reference_form(name, 500), 92.0, (15.0, -7.0))
+    zone = VaryingZone(SHARES * length, LOWER, UPPER, length, True)
+    (found,) = of_reference(name, points, LineProfile("flank", zone, fit="tolerance"))
+    assert found.consumption == pytest.approx(CONSUMED[name], abs=2e-8)
+    assert found.verdict is Verdict.NONCONFORM
+    assert isinstance(found.certificate, ConsumptionCertificate)
+    assert found.certificate.proven
+    assert found.certificate.bound > 1
+
+
+@pytest.mark.parametrize(("free", "largest"), LOCKED, ids=lambda value: "-".join(value) if isinstance(value, tuple) else "")
+def test_locked_freedoms_leave_what_is_printed(free: tuple[FreedomName, ...], largest: float) -> None:
+    points = rotation_about(PIVOT, np.radians(0.05), np.array([0.05, -0.03])).apply(
+        scan("goe404", 500, reference_form("goe404", 500), 0, (0, 0))
+    )
+    asked = LineProfile("form", even_on("goe404", 0.5), freedoms=Freedoms.about(PIVOT, free), datum=RigidTransform.identity())
+    live = LiveInspection(nominal_of("goe404"), ToleranceZone(-0.5, 0.5), weights="points", provisional=False, characteristics=(asked,))
+    live.add(points)
+    (found,) = live.finish().characteristics
+    assert found.value == pytest.approx(2 * largest, abs=1e-8)
+    assert found.fit == f"best-fit, free: {', '.join(free)} about (40, 3) mm"
+
+
+def good(bump_mm: float = 0.0, at_mm: float = 60.0) -> Array:
+    return points_at(stations(), form(stations(), bump_mm, at_mm))
+
+
+@pytest.mark.parametrize(
+    ("rule", "verdict"), [("iso-14253-1", Verdict.UNCERTAIN), ("ilac-g8", Verdict.UNCERTAIN), ("simple", Verdict.CONFORM)]
+)
+def test_u_counts_by_the_decision_rule_of_the_run(rule: DecisionRule, verdict: Verdict) -> None:
+    live = LiveInspection(
+        nominal(),
+        ToleranceZone(-0.06, 0.06, 0.001, rule),
+        provisional=False,
+        characteristics=(LineProfile("near", even(-0.018, 0.018), 0.005, fit="minimum-zone"),),
+    )
+    live.add(good())
+    (found,) = live.finish().characteristics
+    assert 0.013 < found.value / 2 < 0.018
+    assert found.verdict is verdict
+    assert found.uncertainty == 0.005
+
+
+def test_at_a_datum_the_errors_count_that_a_free_fit_takes_away() -> None:
+    """The device's error over the length moves the part as a whole as well; a free fit leaves little of it."""
+    stated = StatedUncertainty(UncertaintyBudget(mpe_mm=0.01))
+    asked = (LineProfile("form", even(-0.06, 0.06)), LineProfile("place", even(-0.06, 0.06), fit="datum", datum=DATUM))
+    live = LiveInspection(nominal(), ToleranceZone(-0.06, 0.06), provisional=False, characteristics=asked, uncertainty=stated)
+    live.add(good())
+    form_, place = live.finish().characteristics
+    assert 0 < form_.uncertainty < 0.9 * place.uncertainty
+
+
+def test_what_passes_in_another_placement_conforms_by_the_rule_minimum_zone_alone() -> None:
+    """A bump tilts the best fit; the minimum zone halves it."""
+    zone = even(-0.09, 0.09)
+    points = good(0.2)
+    by_rule = {
+        rule: named(run(points, asked=(LineProfile("contour", zone, rule=rule),)))["contour"] for rule in ("minimum-zone", "best-fit")
+    }
+    assert by_rule["best-fit"].verdict is Verdict.NONCONFORM
+    assert by_rule["minimum-zone"].verdict in (Verdict.CONFORM, Verdict.NONCONFORM)
+    assert by_rule["minimum-zone"].value <= by_rule["best-fit"].value
+
+
+def test_points_far_out_at_a_pose_that_is_not_known_are_not_proven_out_where_another_placement_passes() -> None:
+    """At the pose of the run the filtered profile decides; a plain one is asked in every placement."""
+    twisted = rotation_about(np.array([50.0, 0.0]), np.radians(0.2), np.zeros(2)).apply(DATUM.apply(good()))
+    points = DATUM.inverse().apply(twisted)
+    asked = (
+        LineProfile("location", even(-0.06, 0.06), fit="datum", datum=DATUM),
+        LineProfile("turned back", even(-0.06, 0.06), freedoms=Freedoms.about((50.0, 0.0), ("rotation",)), datum=DATUM),
+        LineProfile("not so far", even(-0.06, 0.06), freedoms=Freedoms.about((50.0, 0.0), ("x",)), datum=DATUM),
+    )
+    found = named(run(points, asked=asked))
+    assert found["location"].verdict is Verdict.NONCONFORM
+    assert found["turned back"].verdict is Verdict.CONFORM
+    assert found["not so far"].verdict is Verdict.NONCONFORM
+
+
+def test_a_minimum_zone_with_locked_freedoms_that_is_not_proven_too_wide_is_no_nonconform() -> None:
+    """The part turned by 0.2 degrees fits in other placements, so that nothing is proven of the few that are allowed."""
+    twisted = rotation_about(np.array([50.0, 0.0]), np.radians(0.2), np.zeros(2)).apply(DATUM.apply(good()))
+    locked = Freedoms.about((50.0, 0.0), ("x",))
+    asked = LineProfile("locked", even(-0.06, 0.06), fit="minimum-zone", freedoms=locked, datum=DATUM)
+    found = named(run(DATUM.inverse().apply(twisted), asked=(asked,)))["locked"]
+    assert found.verdict is Verdict.UNCERTAIN
+    assert found.reasons[0].kind == "placement"
+    assert found.value > 0.12
+
+
+def test_too_few_points_for_a_fit_prove_nothing() -> None:
+    found = named(run(good()[: COUNT // 24]))
+    assert {one.verdict for one in found.values()} == {Verdict.UNCERTAIN}

@@ -1,0 +1,93 @@
+"""Regions of a profile: by station, by place and by the features of an airfoil; how much of one was measured."""
+
+import numpy as np
+import pytest
+
+from inspection import NominalError, Region, discretize, features_of, region_between, station_near
+from inspection.evaluation.region import is_inside, region_around
+from inspection.gaps import measure, measure_region
+from tests.inspection import profiles
+from tests.inspection.evaluation.asked import nominal
+from tests.inspection.profiles import Array
+
+CIRCLE = discretize(profiles.circle(10.0), samples=500)
+ROUND = CIRCLE.length_mm
+
+
+def test_a_place_is_taken_to_the_nearest_nominal_point() -> None:
+    assert station_near(CIRCLE, (0.0, 15.0)) == pytest.approx(ROUND / 4, abs=1e-9)
+
+
+def test_the_features_of_an_airfoil_bound_its_sides() -> None:
+    features = features_of(nominal())
+    upper, lower = features.side("UPPER"), features.side("LOWER")
+    assert upper.to_mm == lower.from_mm == features.nose
+    half_way = np.interp((upper.from_mm + upper.to_mm) / 2, nominal().station_mm, nominal().parameter)
+    assert nominal().curve.point(np.array([half_way]))[0, 1] > 5  # above: the upper side of a cambered section
+    edge = features.edge("LE", 7.0)
+    assert edge.to_mm - edge.from_mm == pytest.approx(14.0)
+    assert features.edge("TE", 5.0).from_mm > features.edge("TE", 5.0).to_mm  # over the seam
+
+
+def test_a_circle_has_no_edges_but_an_open_profile_two_ends() -> None:
+    open_profile = discretize(profiles.p1(), samples=500, material="left")
+    with pytest.raises(NominalError):
+        features_of(open_profile)
+    with pytest.raises(ValueError, match="runs with rising stations"):
+        region_between(open_profile, 20.0, 10.0)
+    with pytest.raises(ValueError, match="a station from 0 to"):
+        region_between(open_profile, 20.0, 1e4)
+    assert region_between(CIRCLE, ROUND - 5, ROUND + 5.0).to_mm == pytest.approx(5.0)
+    with pytest.raises(ValueError, match="begins where it ends"):
+        region_between(CIRCLE, 5.0, 5.0)
+
+
+def test_stations_lie_in_a_region_that_crosses_the_seam() -> None:
+    inside = is_inside(np.array([0.0, 4.9, 5.1, ROUND - 5.1, ROUND - 4.9, np.nan]), Region(ROUND - 5, 5.0))
+    assert inside.tolist() == [True, True, False, False, True, False]
+
+
+def scan_without(low: float, high: float) -> Array:
+    s = np.arange(0.25, ROUND, 0.5)
+    return s[(s < low) | (s > high)]
+
+
+@pytest.mark.parametrize(
+    ("region", "coverage", "gap"),
+    [
+        (Region(0.0, 20.0), 1 - 10.5 / 20, 10.5),  # all of the hole, from 4.75 to 15.25
+        (Region(10.0, 30.0), 1 - 5.25 / 20, 5.25),  # its second half
+        (Region(20.0, 40.0), 1.0, 0.5),
+        (Region(6.0, 12.0), 0.0, 6.0),  # nothing but hole
+        (Region(50.0, 7.0), 1 - 2.25 / (ROUND - 43), 2.25),  # over the seam, into its beginning
+    ],
+)
+def test_the_gaps_of_a_region_are_those_of_the_profile_within_it(region: Region, coverage: float, gap: float) -> None:
+    station = scan_without(5.0, 15.0)
+    found = measure_region(station, CIRCLE, 0.6, region.from_mm, region.to_mm)
+    assert found.coverage == pytest.approx(coverage)
+    assert found.gap.length_mm == pytest.approx(gap)
+
+
+def test_the_whole_profile_is_the_region_from_a_place_to_itself() -> None:
+    station = scan_without(5.0, 15.0)
+    whole, region = measure(station, CIRCLE, 0.6), measure_region(station, CIRCLE, 0.6, 7.0, 7.0)
+    assert region.coverage == pytest.approx(whole.coverage)
+
+
+def test_a_further_point_never_lowers_the_coverage_of_a_region() -> None:
+    station = scan_without(5.0, 15.0)
+    before = measure_region(station, CIRCLE, 0.6, 2.0, 22.0)
+    for place in np.linspace(0, ROUND, 60, endpoint=False):
+        after = measure_region(np.append(station, place), CIRCLE, 0.6, 2.0, 22.0)
+        assert after.coverage >= before.coverage - 1e-12
+        assert after.gap.length_mm <= before.gap.length_mm + 1e-12
+
+
+def test_the_stretch_around_an_edge_holds_the_places_on_both_sides_of_it() -> None:
+    features = features_of(nominal())
+    (around,) = region_around(features, "leading", np.array([features.nose - 9.0, features.nose + 6.0]), 1.0)
+    assert [around.from_mm, around.to_mm] == pytest.approx([features.nose - 9.0, features.nose + 6.0])
+    length = features.length_mm
+    (tail,) = region_around(features, "trailing", np.array([length - 4.0, 3.0]), 1.0)
+    assert [tail.from_mm, tail.to_mm] == pytest.approx([length - 4.0, 3.0], abs=1e-6)
