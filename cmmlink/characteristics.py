@@ -67,6 +67,15 @@ def base_of(plan: Plan | CtPlan) -> Base:
     return Base(None, "minimum-zone" if first.fit == "minimum-zone" else "best-fit", first.rule or plan.rule)
 
 
+def base_row(plan: Plan | CtPlan) -> int | None:
+    """The place of the characteristic that fails wherever a point is out of the run's own zone; None where that proves nothing of any."""
+    if plan.registration.reject_outliers:
+        return None
+    if plan.tolerance is not None:
+        return 0
+    return None if plan.first_profile.filter is not None else plan.characteristics.index(plan.first_profile)
+
+
 def notes_on_zone(plan: Plan | CtPlan) -> tuple[str, ...]:
     """What the reader has to know where the points are judged by another zone or pose than the first line-profile as they arrive."""
     if plan.tolerance is not None or _is_run_itself(plan.first_profile):

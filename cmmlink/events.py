@@ -1,7 +1,8 @@
 """What a run says while it goes on: immutable events, in the order in which things happened.
 
 `RunStarted` comes first and `RunFinished` last; between them every arrival from the source, and after points their verdicts.
-Once it is proven in mid-scan that the part will fail, `ProvenOut` says so; when it comes depends on how busy the machine is.
+Once it is proven in mid-scan that the part will fail, `ProvenOut` says so; a run that somebody looks at tells its characteristics so
+far by `Evaluated`. When these come depends on how busy the machine is.
 A sink is any function that takes an event; it is called in the thread of the run and may stop the run by raising.
 """
 
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from drivers import Arrival
 
 if TYPE_CHECKING:
-    from inspection import InspectionResult, LiveUpdate
+    from inspection import CharacteristicResult, InspectionResult, LiveUpdate, ProfileUncertainty
 
 Ending = Literal["complete", "aborted", "interrupted"]
 
@@ -87,6 +88,18 @@ class ProvenOut:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Evaluated:
+    """The characteristics over the points so far: NONCONFORM where that is proven whatever comes, else UNCERTAIN. For display.
+
+    uncertainty : of the deviations along the profile, None where no budget was stated
+    """
+
+    time_s: float
+    found: "tuple[CharacteristicResult, ...]"
+    uncertainty: "ProfileUncertainty | None"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class RunFinished:
     """The run is over. Without a result, `message` says why there is none; after a failure it says what failed."""
 
@@ -96,5 +109,5 @@ class RunFinished:
     message: str
 
 
-Event = RunStarted | Arrived | Judged | ProvenOut | RunFinished
+Event = RunStarted | Arrived | Judged | ProvenOut | Evaluated | RunFinished
 Sink = Callable[[Event], None]

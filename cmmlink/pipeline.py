@@ -6,14 +6,16 @@ verdict on what was received; a sink that raises ends it too, and its error is p
 
 import threading
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from cmmlink.buffer import Buffer
 from cmmlink.errors import StoreError
-from cmmlink.events import Arrived, Counts, Ending, Event, Judged, ProvenOut, RunFinished, RunStarted, Sink
+from cmmlink.events import Arrived, Counts, Ending, Evaluated, Event, Judged, ProvenOut, RunFinished, RunStarted, Sink
+from cmmlink.live_characteristics import LiveCharacteristics
 from cmmlink.live_proof import LiveProof
 from drivers import HARMLESS_REASONS, Arrival, Damaged, DeviceError, Lost, PointBatch, Rejected, ScanClosed, ScanOpened, ScanSource
 from inspection import InspectionError, InspectionResult, LiveInspection, Missing, Reason, Rejection, Verdict, doubt_part, reasons_of_abort
@@ -109,35 +111,77 @@ def run_inspection(
     watch: Callable[[], None] = lambda: None,
     doubt: Reason | None = None,
     no_room: Refusal = lambda received, announced: "",
+    shown: bool = False,
 ) -> RunOutcome:
     """Carry out one run to its end and publish every event to every sink. Setting `stop` aborts the run.
 
     watch : called every twentieth of a second, also while no points arrive; what it raises ends the run as an error of a sink does
     doubt : a reason known beforehand why no verdict can be proven
     no_room : asked now and then whether there is room for what is still to come; where it says why not, the run ends with what it has
+    shown : somebody looks on, who is told the characteristics while the scan runs
     """
     buffer: Buffer[tuple[float, Arrival]] = Buffer(buffer_points)
     failures: list[DeviceError] = []
     acquired = threading.Event()
     reader = threading.Thread(target=_acquire, args=(source, buffer, failures, acquired, clock), name="acquisition", daemon=True)
     tally = _Tally()
-    try:
-        _publish(sinks, started)
-        _start(reader, failures, acquired)
-        with LiveProof(live) as proof:
-            full = _judge_all(source, live, proof, sinks, buffer, tally, acquired, clock, stop, watch, no_room)
-    finally:
-        source.stop()
-        buffer.close()
-        if reader.is_alive():
-            reader.join()
-    failure = full or (failures[0] if failures else None)
-    ending: Ending = "interrupted" if failure else "aborted" if stop.is_set() else "complete"
-    result, refusal = _finish(live, ending, tally.missing(), doubt)
-    judged, reasons = (result.judged, result.rejected_by_reason) if result else (0, _reasons_without_pose(live))
-    counts = tally.counts(judged, reasons, buffer)
-    _publish(sinks, RunFinished(ending, result, counts, str(failure or refusal or "")))
+    with _Lookers(live, shown) as lookers:
+        try:
+            _publish(sinks, started)
+            _start(reader, failures, acquired)
+            full = _judge_all(source, live, lookers, sinks, buffer, tally, acquired, clock, stop, watch, no_room)
+        finally:
+            lookers.end_soon()
+            source.stop()
+            buffer.close()
+            if reader.is_alive():
+                reader.join()
+        failure = full or (failures[0] if failures else None)
+        ending: Ending = "interrupted" if failure else "aborted" if stop.is_set() else "complete"
+        result, refusal = _finish(live, ending, tally.missing(), doubt)
+        judged, reasons = (result.judged, result.rejected_by_reason) if result else (0, _reasons_without_pose(live))
+        counts = tally.counts(judged, reasons, buffer)
+        _publish(sinks, RunFinished(ending, result, counts, str(failure or refusal or "")))
     return RunOutcome(ending, result, counts, failure, refusal)
+
+
+class _Lookers:
+    """Who looks at a run from beside, while it is entered: for the proof that the part fails and, where shown, at its characteristics."""
+
+    def __init__(self, live: LiveInspection, shown: bool) -> None:
+        self._live, self._proof, self._is_told = live, LiveProof(live), False
+        self._characteristics = LiveCharacteristics(live) if shown else None
+        self._stack = ExitStack()
+
+    def __enter__(self) -> "_Lookers":
+        self._stack.enter_context(self._proof)
+        if self._characteristics is not None:
+            self._stack.enter_context(self._characteristics)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stack.close()
+
+    def end_soon(self) -> None:
+        """Have them end, without waiting until they have: the result does not wait for them."""
+        self._proof.end_soon()
+        if self._characteristics is not None:
+            self._characteristics.end_soon()
+
+    def offer(self) -> None:
+        """Hand them the points so far."""
+        self._proof.offer()
+        if self._characteristics is not None:
+            self._characteristics.offer()
+
+    def news(self, clock: Callable[[], float]) -> Iterator[Event]:
+        """What they found since they were last asked."""
+        if not self._is_told and self._proof.refuted is not None:
+            self._is_told = True
+            yield ProvenOut(clock(), self._proof.refuted)
+        found = self._characteristics.news() if self._characteristics is not None else None
+        if found is not None:
+            yield Evaluated(clock(), found, self._live.uncertainty)
 
 
 def _start(reader: threading.Thread, failures: list[DeviceError], acquired: threading.Event) -> None:
@@ -171,7 +215,7 @@ def _acquire(
 def _judge_all(
     source: ScanSource,
     live: LiveInspection,
-    proof: LiveProof,
+    lookers: _Lookers,
     sinks: Sequence[Sink],
     buffer: "Buffer[tuple[float, Arrival]]",
     tally: _Tally,
@@ -182,7 +226,7 @@ def _judge_all(
     no_room: Refusal,
 ) -> StoreError | None:
     """Take what arrives and judge it until acquisition has ended and the buffer is empty. Returns why, where there was no room for more."""
-    told, full, next_look = False, None, 0
+    full, next_look = None, 0
     while True:
         ended = acquired.is_set()  # read before the buffer is emptied: after it is set, nothing more is handed over
         taken = buffer.take(0.0 if ended else _LOOK_S)
@@ -207,10 +251,9 @@ def _judge_all(
                     source.stop()
         if batches:
             _judge(live, sinks, buffer, tally, batches, clock)
-            proof.offer()
-        if not told and proof.refuted is not None:
-            told = True
-            _publish(sinks, ProvenOut(clock(), proof.refuted))
+            lookers.offer()
+        for event in lookers.news(clock):
+            _publish(sinks, event)
 
 
 def _judge(

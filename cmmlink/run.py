@@ -90,6 +90,7 @@ def carry_out(
     sinks: Sequence[Sink] = (),
     on_ready: Callable[[], None] = lambda: None,
     patience_s: float = PATIENCE_S,
+    shown: bool = False,
 ) -> FinishedRun:
     """Carry out one run of a plan to its end. Blocks the calling thread, in which all sinks are called, the recorder first.
 
@@ -99,6 +100,7 @@ def carry_out(
     clock   : monotonic seconds of the run; now : date and time of day
     patience_s : how long another process may go on recording before this run is refused
     on_ready: called when everything is compiled, just before the device is asked for points
+    shown   : somebody looks on, who is told the characteristics while the scan runs
 
     The points of a file that no sink follows have their verdicts at the end alone; the result is the same to the last bit.
     A device that fails does not raise: the outcome says so. Raises StoreError when the record cannot be kept, PlanError when
@@ -131,6 +133,7 @@ def carry_out(
             stop=stop,
             watch=recorder.check if recorder else lambda: None,
             no_room=scratch.refusal,
+            shown=shown,
         )
     evidence = recorder.evidence if recorder else None
     if evidence is not None:

@@ -34,12 +34,16 @@ class WorstPoint:
 
 @dataclass(frozen=True, slots=True)
 class VerdictState:
-    """The verdict, or how the run ended, in words; its sign; whether it is final; why it is so, and every further reason."""
+    """The verdict, or how the run ended, in words; its sign; whether it is final; why it is so, and every further reason.
+
+    of : which of several characteristics gave the part its verdict
+    """
 
     word: str
     shape: Shape
     final: bool
     why: str
+    of: str = ""
     reasons: tuple[str, ...] = ()
 
 

@@ -15,8 +15,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cmmlink.characteristic_rows import Characteristics, characteristics_at_end, characteristics_so_far, names_of, worst_words
+from cmmlink.characteristics import base_row
 from cmmlink.endings import Ended, count_words, reasons_of
-from cmmlink.events import Arrived, Counts, Event, Judged, ProvenOut, RunStarted
+from cmmlink.events import Arrived, Counts, Evaluated, Event, Judged, ProvenOut, RunStarted
 from cmmlink.extremes import DEVIATION, FOOT_X, NORMAL_X, STATION, VERDICT, ChangedBins, Extremes, PointsVersion
 from cmmlink.from_plan import zone_of
 from cmmlink.plan import Plan
@@ -34,7 +36,10 @@ _COVERAGE_EVERY_S = 0.25
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RunContext:
-    """What is known of a run before it begins: its number or title, its plan, and what the points are judged by."""
+    """What is known of a run before it begins: its number or title, its plan, and what the points are judged by.
+
+    base : the place of the characteristic that fails wherever a point is proven to be out of the zone; None where none need fail
+    """
 
     number: str
     plan: str
@@ -44,12 +49,13 @@ class RunContext:
     buffer_points: int
     began: datetime
     kind: RunKind = "run"
+    base: int | None = 0
 
     @classmethod
     def of(cls, plan: Plan, profile: NominalProfile, began: datetime, number: str, plan_name: str, kind: RunKind = "run") -> "RunContext":
         """What a plan says of a run that begins, or began, at a time of day."""
-        coverage_min = plan.registration.coverage_min
-        return cls(number, plan_name, profile, zone_of(plan, profile), coverage_min, plan.buffer_points, began, kind)
+        zone, coverage_min = zone_of(plan, profile), plan.registration.coverage_min
+        return cls(number, plan_name, profile, zone, coverage_min, plan.buffer_points, began, kind, base_row(plan))
 
 
 class _Received(NamedTuple):
@@ -96,6 +102,7 @@ class RunView:
         self._update: LiveUpdate | None = None
         self._out = 0
         self._proven_at: int | None = None
+        self._evaluated, self._characteristics = Evaluated(0.0, (), None), Characteristics()
         self._coverage, self._coverage_s = 0.0, -math.inf
         self._ended: Ended | None = None
         self._notes: tuple[str, ...] = ()
@@ -112,6 +119,8 @@ class RunView:
             self._take_verdicts(event)
         elif isinstance(event, ProvenOut):
             self._take_proof(event)
+        elif isinstance(event, Evaluated):
+            self._take_characteristics(event)
         else:
             blocks = event.result.blocks if event.result is not None else None
             self._end(Ended(event.ending, event.message, result_json(event.result, event.counts), blocks), event.counts)
@@ -159,6 +168,11 @@ class RunView:
         published, now_s = self._published, self._clock()
         streaming = published.state.streaming and now_s - self._alive_s < _RATE_OVER_S
         return replace(published.state, streaming=streaming, rate_per_s=_rate_per_s(published, now_s))
+
+    @property
+    def characteristics(self) -> Characteristics:
+        """The newest of the characteristics. Never blocks."""
+        return self._characteristics
 
     @property
     def newest_points(self) -> PointsVersion:
@@ -216,7 +230,17 @@ class RunView:
     def _take_proof(self, event: ProvenOut) -> None:
         with self._lock:
             self._proven_at = event.points
+            self._characteristics = self._characteristics_so_far()
             self._publish()
+
+    def _take_characteristics(self, event: Evaluated) -> None:
+        with self._lock:
+            self._evaluated = event
+            self._characteristics = self._characteristics_so_far()
+            self._publish()
+
+    def _characteristics_so_far(self) -> Characteristics:
+        return characteristics_so_far(self._evaluated, None if self._proven_at is None else self.context.base)
 
     def _end(self, ended: Ended, counts: Counts) -> None:
         """Replace everything provisional by the result."""
@@ -228,6 +252,7 @@ class RunView:
                 places += density_of([rows.station_mm], self.context.profile.length_mm)
         with self._lock:
             self._phase, self._ended, self._counts, self._extremes = "finished", ended, counts, extremes
+            self._characteristics = characteristics_at_end(ended.result)
             self._link = "down" if ended.ending == "interrupted" else "closed"
             self._coverage, self._out = ended.result["coverage"], ended.result["out_of_tolerance"]
             self._notes = (*self._started.notes, *density_notes(places, self.context.profile.length_mm))
@@ -323,26 +348,32 @@ class RunView:
         early = ended.ending != "complete" and result["received"] > 0
         headline = headline_of(found, ended.ending, result["coverage"]) if early else headline_of(found)
         why, *further = reasons_of(ended, found)
-        return _state_of(headline, not early, why, further)
+        of = "" if early or found is None else worst_words(self._characteristics.rows)
+        return _state_of(headline, not early, why, further, of)
 
     def _verdict_so_far(self) -> VerdictState:
         unproven, out = headline_of(Verdict.UNCERTAIN), headline_of(Verdict.NONCONFORM)
         if self._phase == "preparing":
             return _state_of(unproven, False, "preparing the inspection")
-        if self._proven_at is not None:
-            return _state_of(out, False, f"no placement of the first {count_words(self._proven_at)} passes")
+        proven, looks_out = (names_of(self._characteristics.rows, shape) for shape in (out.shape, LOOKS_OUT.shape))
+        if self._proven_at is not None and self.context.base is not None:
+            return _state_of(out, False, f"no placement of the first {count_words(self._proven_at)} passes", of=proven)
+        if proven:
+            return _state_of(out, False, "proven, whatever comes", of=proven)
         if self._out:
-            is_proof = self._update is not None and self._update.state == "settled"
-            headline, proven = (out, "out so far") if is_proof else (LOOKS_OUT, "so far, not proven")
-            return _state_of(headline, False, f"{count_words(self._out)} {proven}")
+            is_proof = self.context.base is not None and self._registration().state == "settled"
+            headline, how = (out, "out so far") if is_proof else (LOOKS_OUT, "so far, not proven")
+            return _state_of(headline, False, f"{count_words(self._out)} {how}", of=looks_out)
+        if looks_out:
+            return _state_of(LOOKS_OUT, False, "so far, not proven", of=looks_out)
         if not self._counts.judged:
-            seeking = self._update is not None and self._update.state == "seeking"
-            return _state_of(unproven, False, "seeking the part" if seeking else "waiting for points")
+            is_sought = self._update is not None and self._update.state == "seeking"
+            return _state_of(unproven, False, "seeking the part" if is_sought else "waiting for points")
         return _state_of(unproven, False, f"{math.floor(100 * self._coverage)} % measured, none out so far")
 
 
-def _state_of(headline: Headline, final: bool, why: str, further: Sequence[str] = ()) -> VerdictState:
-    return VerdictState(headline.words, headline.shape, final, why, tuple(further))
+def _state_of(headline: Headline, final: bool, why: str, further: Sequence[str] = (), of: str = "") -> VerdictState:
+    return VerdictState(headline.words, headline.shape, final, why, of, tuple(further))
 
 
 def _settled(counts: Counts, arrived: int) -> Counts:

@@ -59,6 +59,7 @@ def section_words(place: Mapping[str, Any] | None) -> str:
 
 NOT_MEASURED = Headline("NOT MEASURED", "none")
 LOOKS_OUT = Headline("LOOKS OUT", "not-proven")
+SO_FAR = Headline("so far", "none")
 POSE_MOVES = "the pose still moves"
 
 

@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     from inspection.evaluation.line_profile import zone_words
     from inspection.evaluation.region import FeatureName, Features, features_of, region_between, station_near
     from inspection.evaluation.section_value import METHODS_OF_SECTIONS, Outline, with_nominal
+    from inspection.evaluation.so_far import EvaluationSoFar, ScanSoFar
     from inspection.evaluation.stack_value import judge_stack
     from inspection.filters import FilteredProfile, FilterOrder, ProfileFilter, filter_profile
     from inspection.fine import register, register_fine
@@ -164,6 +165,7 @@ else:
             "Outline",
             "with_nominal",
         ),
+        "inspection.evaluation.so_far": ("EvaluationSoFar", "ScanSoFar"),
         "inspection.evaluation.stack_value": ("judge_stack",),
         "inspection.zone_certificate": ("ConsumptionCertificate", "ConsumptionFit", "ZoneCertificate"),
         "inspection.zones": ("Transition", "VaryingZone"),
@@ -198,6 +200,7 @@ __all__ = [
     "Deviations",
     "EdgeRadiusMethod",
     "EdgeThicknessMethod",
+    "EvaluationSoFar",
     "FeatureName",
     "Features",
     "FilterOrder",
@@ -241,6 +244,7 @@ __all__ = [
     "RigidTransform",
     "Room",
     "RuleName",
+    "ScanSoFar",
     "SectionCharacteristic",
     "SectionKind",
     "SectionPlane",

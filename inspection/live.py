@@ -23,12 +23,13 @@ from inspection.cloud import MANY, Cloud
 from inspection.compensation import Compensation
 from inspection.conclusion import Missing
 from inspection.evaluation.evaluate import evaluate
+from inspection.evaluation.so_far import EvaluationSoFar, ScanSoFar, ScanWatch
 from inspection.kernels import Room, compile_projection, fit_compiled_beside
 from inspection.methods import FitName, Method, RuleName, WeightName
 from inspection.nominal import NominalProfile
 from inspection.pose_track import PoseTrack, seek_pose
 from inspection.prefix import Prefix, PrefixSearch, PrefixWatch
-from inspection.profile_uncertainty import StatedUncertainty, uncertainty_along
+from inspection.profile_uncertainty import ProfileUncertainty, StatedUncertainty, uncertainty_along
 from inspection.registration import Registration
 from inspection.result import InspectionResult
 from inspection.rigid import RigidTransform
@@ -148,7 +149,7 @@ class LiveInspection:
         self._handed_over = False  # the rows belong to a result by now
         self._next_fit = BLOCK  # received points at which the pose is sought, or fitted anew
         self._track: PoseTrack | None = None
-        self._watch = PrefixWatch(self._terms)
+        self._watch, self._scan_watch = PrefixWatch(self._terms), ScanWatch(self._terms)
 
     @property
     def state(self) -> State:
@@ -214,6 +215,20 @@ class LiveInspection:
     def prefix_search(self) -> PrefixSearch:
         """A search for the proof that the part will fail, on the terms of this inspection. It may run in another thread."""
         return PrefixSearch(self._terms)
+
+    def so_far(self) -> ScanSoFar | None:
+        """A copy of few points that tell of all so far, for an `evaluation_so_far`; None without a pose."""
+        pose = self._track.pose if self._track is not None else self._known_pose
+        return None if pose is None else self._scan_watch.so_far(self._rows, pose)
+
+    def evaluation_so_far(self) -> EvaluationSoFar:
+        """What evaluates the characteristics while the scan still runs, on the terms of this inspection. It may run in another thread."""
+        return EvaluationSoFar(self._characteristics, self._terms)
+
+    @property
+    def uncertainty(self) -> ProfileUncertainty | None:
+        """Of the deviations along the profile, as far as it is known before the end; None where no budget was stated."""
+        return self._terms.uncertainty
 
     def finish(self, complete: bool = True, missing: Missing | None = None) -> InspectionResult:
         """Register all points together, judge every one at that pose, evaluate what was asked for, and say the verdict on the part.

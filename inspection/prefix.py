@@ -73,15 +73,35 @@ class PrefixSearch:
         return np.arange(count) if count <= 2 * SHARES else telling_rows(prefix.station_mm, prefix.deviation_mm, self._length)
 
 
+class TellingRows:
+    """The rows of one scan that tell how far all of them go, as it grows. Each is looked at once, unless it is judged anew."""
+
+    def __init__(self, length_mm: float, shares: int) -> None:
+        self._length, self._shares = length_mm, shares
+        self._seen: tuple[ScanRows | None, int] = (None, 0)  # the rows looked at, and how often they had been judged anew
+        self._stop = 0  # rows that were looked at
+        self._telling = np.empty(0, dtype=np.int64)
+
+    def of(self, rows: ScanRows) -> NDArray[np.int64]:
+        """Rows (k,) of the lowest and the highest deviation in each share of the length."""
+        if self._seen != (rows, rows.times_anew):
+            self._seen, self._stop, self._telling = (rows, rows.times_anew), 0, self._telling[:0]
+        count = rows.count
+        told = self._telling, self._stop
+        self._telling = telling_rows(rows.station[:count], rows.deviation[:count], self._length, self._shares, *told)
+        self._stop = count
+        return self._telling
+
+
 class PrefixWatch:
     """Takes prefixes of one scan as it grows. Rows are looked at once, unless they are judged anew: what it costs does not grow."""
 
     def __init__(self, terms: Terms) -> None:
         self._terms = terms
         self._seen: tuple[ScanRows | None, int] = (None, 0)  # the rows looked at, and how often they had been judged anew
-        self._stop = self._told = 0  # rows that were looked at, and rows that the telling ones tell of
+        self._stop = 0  # rows that were looked at
         self._farthest_mm = 0.0
-        self._telling = np.empty(0, dtype=np.int64)
+        self._telling, self._told = TellingRows(terms.nominal.length_mm, MANY // 64), np.empty(0, dtype=np.int64)
 
     def prefix(self, rows: ScanRows, pose: RigidTransform, slide_mm: float) -> Prefix | None:
         """The prefix at a provisional pose, None where no point looks out there: that pose is then a placement that passes.
@@ -92,7 +112,7 @@ class PrefixWatch:
         terms, count = self._terms, rows.count
         if self._farthest_mm <= _half_mm(terms):
             return None
-        judged = self._telling if count > MANY else np.flatnonzero(rows.verdicts[:count] != NOT_JUDGED)
+        judged = self._told if count > MANY else np.flatnonzero(rows.verdicts[:count] != NOT_JUDGED)
         if not terms.nominal.curve.closed:
             reserve = _SURELY * slide_mm + terms.zone.upper_mm - terms.zone.lower_mm
             station = rows.station[judged]
@@ -105,17 +125,13 @@ class PrefixWatch:
     def _look(self, rows: ScanRows) -> None:
         """Look at the rows that were not looked at yet."""
         if self._seen != (rows, rows.times_anew):
-            self._seen, self._stop, self._told = (rows, rows.times_anew), 0, 0
-            self._farthest_mm, self._telling = 0.0, self._telling[:0]
-        count, length_mm = rows.count, self._terms.nominal.length_mm
-        for part in row_blocks(count - self._stop):
+            self._seen, self._stop, self._farthest_mm = (rows, rows.times_anew), 0, 0.0
+        for part in row_blocks(rows.count - self._stop):
             off = np.abs(rows.deviation[self._stop + part.start : self._stop + part.stop] - self._terms.target_mm)
             self._farthest_mm = float(np.fmax.reduce(off, initial=self._farthest_mm))
-        if count > MANY:  # of fewer points all are asked
-            told = self._telling, self._told
-            self._telling = telling_rows(rows.station[:count], rows.deviation[:count], length_mm, MANY // 64, *told)
-            self._told = count
-        self._stop = count
+        if rows.count > MANY:  # of fewer points all are asked
+            self._told = self._telling.of(rows)
+        self._stop = rows.count
 
 
 def _half_mm(terms: Terms) -> float:

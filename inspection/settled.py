@@ -84,6 +84,12 @@ def settle(rows: ScanRows, terms: Terms, complete: bool, missing: Missing) -> In
     return _result(rows, settled, terms, complete, missing)
 
 
+def judge_at(rows: ScanRows, pose: RigidTransform, terms: Terms) -> InspectionResult:
+    """The points of a scan that still runs, as they are at the pose of this moment. The rows belong to the result afterwards."""
+    registration = datum_registration(pose, rows.count)
+    return _result(rows, _judge_at(rows, registration, "best-fit", terms), terms, complete=False, missing=Missing())
+
+
 def _reject_outliers(rows: ScanRows, far: NDArray[np.bool_], registration: Registration) -> None:
     """Reject the points that lie far from all others, and of the rest those that the registration left out."""
     if not far.any() and not registration.outliers.any():

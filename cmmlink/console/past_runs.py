@@ -106,7 +106,8 @@ class PastRuns:
         """Measure a run again from its record; returns a sentence on the result. Raises StoreError, RunError, PlanError."""
         with open_to_read(self.folder, self.now) as store:
             recorded = recorded_run(store, find_run(store, run))
-            return _comparison_of(replay_run(store, recorded, self.decoder_of, clock=self.clock, sinks=sinks, stop=stop), recorded.run)
+            again = replay_run(store, recorded, self.decoder_of, clock=self.clock, sinks=sinks, stop=stop, shown=True)
+            return _comparison_of(again, recorded.run)
 
     def export_run(self, run: str, folder: Path) -> Path:
         """Write one run as a zip archive into a folder. Raises StoreError, RunError, PlanError."""

@@ -12,6 +12,7 @@ import json
 from dataclasses import dataclass, fields
 from typing import Any, Literal
 
+from cmmlink.characteristic_rows import CharacteristicRow
 from cmmlink.run_state import RunState
 from cmmlink.words import VERDICT_NAMES, VERDICT_WORDS, Shape, VerdictName
 
@@ -158,6 +159,21 @@ class ShownRun:
 
 
 @dataclass(frozen=True, slots=True)
+class CharacteristicList:
+    """The characteristics of the run that the page looks at, and U along its profile: pairs of station and U, mm.
+
+    more  : how many there are besides; a page is told of a hundred at most, those with the worst verdicts
+    final : they have their verdicts; before that every value is one so far
+    """
+
+    rows: tuple[CharacteristicRow, ...]
+    more: int
+    uncertainty: tuple[tuple[float, float], ...]
+    final: bool
+    type: Literal["characteristics"] = "characteristics"
+
+
+@dataclass(frozen=True, slots=True)
 class RunRow:
     """One line of the station's history. `worst_mm` is the deviation farthest from the middle of the zone.
 
@@ -292,7 +308,7 @@ class Plain:
     do: Literal["start", "end", "abort", "test", "take control", "live", "devices", "another page"]
 
 
-Message = Admitted | Hello | Alive | Answer | Control | StationState | AlarmList | ShownRun | History | SurfaceState
+Message = Admitted | Hello | Alive | Answer | Control | StationState | AlarmList | ShownRun | CharacteristicList | History | SurfaceState
 Command = Choose | Enter | Acknowledge | OfRun | OpenSection | ImportSurface | Plain
 
 

@@ -52,6 +52,7 @@ def measure(job: Job, view: RunView, checked: CheckedPlan, setup: StationSetup, 
             stop=job.stop,
             sinks=[alarms, sink_of(view, alarms)],
             on_ready=view.await_device,
+            shown=True,
         )
         job.detach()
     try:

@@ -27,6 +27,7 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from cmmlink.characteristic_rows import MOST_ROWS, Characteristics, most_shown
 from cmmlink.console.commands import Received, action_of, read_json, receive
 from cmmlink.console.connections import LARGEST_COMMAND, LARGEST_HEAD, BoundedServer, PageProtocol, Visitor
 from cmmlink.console.guard import Guard
@@ -39,6 +40,7 @@ from cmmlink.console.protocol import (
     Admitted,
     Alive,
     Answer,
+    CharacteristicList,
     Control,
     Device,
     Hello,
@@ -306,7 +308,10 @@ class ConsoleServer:
         yield Control(self._controller is page, self._controller is not None, len(self._pages))
         yield station.state
         yield station.alarms.shown
-        yield ShownRun(_for_page(view.state()) if view else None, page.opened is not None)
+        state, shown = (view.state(), view.characteristics) if view else (None, Characteristics())
+        yield ShownRun(_for_page(state) if state else None, page.opened is not None)
+        is_final = state is not None and state.phase == "finished"
+        yield CharacteristicList(most_shown(shown.rows), max(len(shown.rows) - MOST_ROWS, 0), shown.uncertainty, is_final)
         yield station.history
         yield station.ct.state
 

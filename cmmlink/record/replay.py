@@ -68,10 +68,11 @@ def replay_run(
     clock: Callable[[], float] = time.monotonic,
     sinks: Sequence[Sink] = (),
     stop: threading.Event | None = None,
+    shown: bool = False,
 ) -> Replay:
     """Evaluate a recorded run again. `decoder_of` gives the decoder of a plan's device, None for one without wire bytes.
 
-    `sinks` take the events; setting `stop` aborts the replay.
+    `sinks` take the events; setting `stop` aborts the replay. `shown`: somebody looks on, who is told the characteristics meanwhile.
 
     Raises StoreError where the record is altered or cannot be read, PlanError where the changed plan cannot be used.
     """
@@ -88,7 +89,9 @@ def replay_run(
     started = RunStarted.from_header(recorded.header)
     live = inspection_of(changed, profile, scratch_in(store.path.parent))
     doubt = _doubt_of(recorded)
-    outcome = run_inspection(source, live, sinks, started, buffer_points=plan.buffer_points, clock=clock, stop=stop, doubt=doubt)
+    outcome = run_inspection(
+        source, live, sinks, started, buffer_points=plan.buffer_points, clock=clock, stop=stop, doubt=doubt, shown=shown
+    )
     reading.raise_failure(recorded.run, outcome)
     replayed = result_json(outcome.result, outcome.counts)
     identical = None

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from inspection.bands import Band, EvenBand, VaryingBand
 from inspection.characteristics.characteristic import CharacteristicResult, LineProfile, WholeProfile, WorstPlace
 from inspection.cloud import MANY, row_blocks
-from inspection.conclusion import Reason, word_points
+from inspection.conclusion import Conclusion, Reason, word_points
 from inspection.evaluation.basis import Basis, filter_deviations
-from inspection.evaluation.placing import Placed, certify_run, consume_least, is_constant, place, shrink_zone
+from inspection.evaluation.placing import Placed, certify_run, consume_least, is_constant, place, place_so_far, shrink_zone
+from inspection.gaps import Measured
 from inspection.placements import PlacementSearch
 from inspection.profile_uncertainty import uncertainty_along, uncertainty_at_fit
 from inspection.rigid import RigidTransform
@@ -107,6 +108,29 @@ def judge_profile(asked: LineProfile, basis: Basis) -> CharacteristicResult:
     placed, seen, points, why = _decide(asked, basis, rows, few, placed, seen)
     measured = basis.measured(asked.region)
     conclusion = basis.conclude(points, why, measured, seen.judged, placed.converged, seen.beyond_end)
+    return _result(asked, basis, placed, seen, measured, conclusion)
+
+
+def judge_profile_so_far(asked: LineProfile, basis: Basis) -> CharacteristicResult:
+    """The same of a scan that still runs: NONCONFORM where that is proven whatever comes, else UNCERTAIN, without reasons.
+
+    Proven is what a known pose and raw deviations say of points that stay in the region; every fit, and every filter, can still change.
+    """
+    rows = basis.rows(asked.region)
+    placed = place_so_far(asked, basis, basis.few(rows))
+    seen = _see(asked, basis, rows, placed.pose)
+    stays = asked.region is None or basis.terms.known_pose is not None
+    proven = seen.beyond > 0 and placed.is_known and stays and asked.filter is None and not basis.terms.reject_outliers
+    verdict = Verdict.NONCONFORM if proven else Verdict.UNCERTAIN
+    if seen.worst is None:
+        seen = replace(seen, limits=(float(asked.zone.lower_mm.min()), float(asked.zone.upper_mm.max())), consumption=math.nan)
+    return _result(asked, basis, placed, seen, basis.measured(asked.region), Conclusion(verdict, ()))
+
+
+def _result(
+    asked: LineProfile, basis: Basis, placed: Placed, seen: _Seen, measured: Measured, conclusion: Conclusion
+) -> CharacteristicResult:
+    """A line profile with what was seen of its points at a pose, and what was concluded from it."""
     return CharacteristicResult(
         name=asked.name,
         type="line-profile",

@@ -92,6 +92,19 @@ def place(asked: LineProfile, basis: Basis, rows: Rows) -> Placed:
     return Placed(certificate.nominal_from_section.snap_to_grid(), words, False, True, certificate.balanced, _in_run(certificate, rows))
 
 
+def place_so_far(asked: LineProfile, basis: Basis, rows: Rows) -> Placed:
+    """The same while the scan still runs: nothing is proven of other placements, so that it takes milliseconds."""
+    if asked.fit in ("none", "datum", "best-fit") or len(rows) < _FEWEST_POINTS:
+        return place(asked, basis, rows)
+    near, points = place(replace(asked, fit="best-fit"), basis, rows).pose, basis.result.section_at(rows)
+    limited_from = None if asked.freedoms is None else asked.datum or basis.pose
+    if asked.fit == "tolerance":
+        pose = consume_least(asked, basis, points, near, limited_from).nominal_from_section
+    else:
+        pose = shrink_zone(asked, basis, points, limited_from or near).nominal_from_section
+    return Placed(pose.snap_to_grid(), _words(asked), is_free=asked.freedoms is None)
+
+
 def middle_of(zone: VaryingZone, basis: Basis, rows: Rows) -> float:
     """The deviation that a best fit aims at: the middle of the zone, of one that varies its mean over the points of the region."""
     if is_constant(zone):

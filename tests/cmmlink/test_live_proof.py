@@ -115,8 +115,7 @@ def test_the_run_does_not_wait_for_the_search_and_the_newest_points_are_looked_a
             proof.offer()  # returns, although the search has not
         assert (looked_at, proof.refuted) == ([700], None)
         goes_on.set()
-        assert proof._thread is not None
-        proof._thread.join(PATIENCE_S)
+        proof._beside.join(PATIENCE_S)
         assert looked_at == [700, 800], "what waited was replaced by what is newer"
         assert proof.refuted == 800
     assert not proof_threads()

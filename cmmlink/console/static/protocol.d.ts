@@ -126,12 +126,13 @@ export interface WorstPoint {
   readonly verdict: "conform" | "uncertain" | "nonconform";
 }
 
-/** The verdict, or how the run ended, in words; its sign; whether it is final; why it is so, and every further reason. */
+/** The verdict, or how the run ended, in words; its sign; whether it is final; why it is so, and every further reason. of : which of several characteristics gave the part its verdict */
 export interface VerdictState {
   readonly word: string;
   readonly shape: "conform" | "not-proven" | "not-conform" | "ended-early" | "none";
   readonly final: boolean;
   readonly why: string;
+  readonly of: string;
   readonly reasons: readonly string[];
 }
 
@@ -193,6 +194,42 @@ export interface ShownRun {
   readonly run: RunState | null;
   readonly recorded: boolean;
   readonly type: "run";
+}
+
+/** One characteristic as it is shown. word, shape : its verdict, or how it looks so far, and the sign of it value, nominal, deviation, lower, upper, uncertainty : in `unit`; null where there is none. The limits are those of the deviation method : how the value is found; `fit`, `filter`, `zone` and `region` in words, `fit` and `filter` "none" where there is none from_mm, to_mm : the stretch of the profile that it is of; null for the whole. From above to where it crosses the seam why : the first reason of the verdict worst : the point that consumes most of its tolerance places : places that its value was found at, with their names, in the coordinates of the nominal, mm */
+export interface CharacteristicRow {
+  readonly name: string;
+  readonly type: string;
+  readonly word: string;
+  readonly shape: "conform" | "not-proven" | "not-conform" | "ended-early" | "none";
+  readonly verdict: "conform" | "uncertain" | "nonconform";
+  readonly value: number | null;
+  readonly nominal: number | null;
+  readonly unit: string;
+  readonly lower: number | null;
+  readonly upper: number | null;
+  readonly deviation: number | null;
+  readonly uncertainty: number;
+  readonly method: string;
+  readonly fit: string;
+  readonly filter: string;
+  readonly zone: string;
+  readonly region: string;
+  readonly rule: string;
+  readonly from_mm: number | null;
+  readonly to_mm: number | null;
+  readonly why: string;
+  readonly worst: WorstPoint | null;
+  readonly places: readonly (readonly [string, number, number])[];
+}
+
+/** The characteristics of the run that the page looks at, and U along its profile: pairs of station and U, mm. more : how many there are besides; a page is told of a hundred at most, those with the worst verdicts final : they have their verdicts; before that every value is one so far */
+export interface CharacteristicList {
+  readonly rows: readonly CharacteristicRow[];
+  readonly more: number;
+  readonly uncertainty: readonly (readonly [number, number])[];
+  readonly final: boolean;
+  readonly type: "characteristics";
 }
 
 /** One line of the station's history. `worst_mm` is the deviation farthest from the middle of the zone. section : which section of a surface it is, in words; empty for a run of a device word, shape : the verdict, or how early the run ended, and its sign; `counted`: the scan came to its end with a verdict */
@@ -298,6 +335,6 @@ export interface Device {
   readonly description: string;
 }
 
-export type Message = Admitted | Hello | Alive | Answer | Control | StationState | AlarmList | ShownRun | History | SurfaceState;
+export type Message = Admitted | Hello | Alive | Answer | Control | StationState | AlarmList | ShownRun | CharacteristicList | History | SurfaceState;
 
 export type Command = Choose | Enter | Acknowledge | OfRun | OpenSection | ImportSurface | Plain;
