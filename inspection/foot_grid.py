@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inspection.cache_lines import align
 from inspection.curve import NurbsCurve
 from inspection.curve_pieces import CurvePieces, cut_into_pieces, derivative_bounds, piece_tree
 from inspection.kernels.layout import (
@@ -353,15 +354,7 @@ def _pack_grid(pieces: CurvePieces, origin: Array, root: float, size: float, lea
     header[FIRST_PARAMETER], header[LAST_PARAMETER], header[LENGTH_MM] = ends
     index_header[BLOCKS_ACROSS], index_header[PIECES], index_header[LEAVES] = across, len(pieces), len(boxes) // 2
     index_header[PIECES_AT : REALS_END + 1], index_header[LINKS_AT : INTEGERS_END + 1] = real_at, index_at
-    return FootGrid(_align(np.concatenate(tables)), np.concatenate(index_tables).astype(np.int32), len(pieces), len(cells), _BAND * size)
-
-
-def _align(numbers: Array) -> Array:
-    """A copy of the numbers (n,) that begins on a cache line."""
-    memory = np.empty(len(numbers) + 8)
-    skip = (-memory.ctypes.data % 64) // 8
-    memory[skip : skip + len(numbers)] = numbers
-    return memory[skip : skip + len(numbers)]
+    return FootGrid(align(np.concatenate(tables)), np.concatenate(index_tables).astype(np.int32), len(pieces), len(cells), _BAND * size)
 
 
 def _pack_cells(leaves: _Leaves) -> tuple[Index, Index]:

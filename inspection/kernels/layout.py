@@ -45,8 +45,11 @@ LIST_WIDTH = 1 + MOST_BRANCHES  # a list: how many pieces, then the pieces
 SAMPLE_X, SAMPLE_Y, TANGENT_X, TANGENT_Y, NORMAL_X, NORMAL_Y, SAMPLE_CURVATURE, SAMPLE_U, SAMPLE_STATION, SAMPLE_SPEED = range(10)
 LEFT_POLE_X, LEFT_POLE_Y, RIGHT_POLE_X, RIGHT_POLE_Y, LEFT_POLE_CURVATURE, RIGHT_POLE_CURVATURE = range(10, 16)
 LEFT_EDGE_X, LEFT_EDGE_Y, RIGHT_EDGE_X, RIGHT_EDGE_Y = range(16, 20)  # ends of the Voronoi edge shared with the next sample
-SAMPLE_WIDTH = 20
+SAMPLE_COLUMNS, SAMPLE_WIDTH = 20, 24  # rows of whole cache lines
 NEXT_SAMPLE, PREVIOUS_SAMPLE, TWIN_SAMPLE, AT_OPEN_END, LINK_WIDTH = range(5)  # -1 for none; AT_OPEN_END is 1 or 0
+# What proves a sample the nearest: its place, and for each side three numbers (a, b, c). With (x, y) seen from the sample, a y - b x < c
+# says that a point is surely on this side of the far edge of the sample's Voronoi cell. Nothing is below a c of minus infinity.
+CELL_LEFT, CELL_RIGHT, CELL_WIDTH = 2, 5, 8  # after SAMPLE_X and SAMPLE_Y
 LEAF = 16  # samples in a leaf of the search tree
 DOMAIN_START, DOMAIN_END, DOMAIN_LENGTH_MM, DOMAIN_CLOSED = range(4)
 

@@ -13,16 +13,21 @@ from inspection.kernels.compiling import (
     INTEGER_TABLE,
     REAL_ARRAY,
     REAL_TABLE,
+    SHORT_TABLE,
+    array_at,
     call_of,
     claim_chunk,
     code_of,
     inlined_kernel,
     inner_kernel,
+    stack_integers,
+    stack_reals,
     tuple_of,
 )
 from inspection.kernels.feet import store_foot
 from inspection.kernels.layout import (
     AT_OPEN_END,
+    BLOCK,
     CHORD,
     CHUNK,
     CIRCLE,
@@ -42,6 +47,7 @@ from inspection.kernels.layout import (
     FOOT_X,
     FOOT_Y,
     INSIDE,
+    INTEGERS,
     LEFT_EDGE_X,
     LEFT_POLE_CURVATURE,
     LEFT_POLE_X,
@@ -53,6 +59,7 @@ from inspection.kernels.layout import (
     OPEN_END,
     PCP,
     PREVIOUS_SAMPLE,
+    REALS,
     RIGHT_EDGE_X,
     RIGHT_POLE_CURVATURE,
     RIGHT_POLE_X,
@@ -65,12 +72,28 @@ from inspection.kernels.layout import (
     SAMPLE_WIDTH,
     SAMPLE_X,
     SAMPLE_Y,
-    STACK,
+    STACK_AT,
     TANGENT_X,
     TANGENT_Y,
     TWIN_SAMPLE,
+    VEAW,
 )
 from inspection.kernels.nearest_sample import nearest_sample
+from inspection.kernels.sample_lanes import (
+    IS_NEAREST,
+    PLAIN,
+    SITE,
+    SMALL_TURN,
+    angle_between,
+    blend_pole_circles,
+    choose_neighbours,
+    complete,
+    find_sample,
+    load_samples,
+    store_plain,
+    take_osculating_circle,
+    take_pole_circle,
+)
 
 Array = NDArray[np.float64]
 
@@ -79,21 +102,20 @@ class SampleTables(Protocol):
     """The samples of a nominal, packed."""
 
     @property
-    def flat(self) -> tuple[Array, NDArray[np.int64], Array, NDArray[np.int64], Array]:
-        """Samples, their links, the boxes of their search tree, where a search begins, and the domain of the curve."""
+    def flat(self) -> tuple[Array, NDArray[np.int64], Array, NDArray[np.int64], Array, Array, NDArray[np.int32]]:
+        """Samples, links, the boxes of the search tree, where a search begins, the domain of the curve, cells and neighbours."""
         ...
 
 
-_TABLES = tuple_of(REAL_TABLE, INTEGER_TABLE, REAL_TABLE, INTEGER_TABLE, REAL_TABLE, INTEGER)
+_TABLES = tuple_of(REAL_TABLE, INTEGER_TABLE, REAL_TABLE, INTEGER_TABLE, REAL_TABLE, REAL_TABLE, SHORT_TABLE, INTEGER)
 _ON_SAMPLES = (REAL_ARRAY, _TABLES, FEET, INTEGER_ARRAY)  # the types that `project_points_on_samples` takes
 _call_on_samples = call_of(*_ON_SAMPLES)
 # What stands in for the samples where a method needs none: of the same types, so that one compiled fit serves all methods.
-_NO_REALS, _NO_INTEGERS = np.empty(0), np.empty(0, dtype=np.int64)
-_NO_REALS.setflags(write=False)
-_NO_INTEGERS.setflags(write=False)
-_NO_TABLES = (_NO_REALS, _NO_INTEGERS, _NO_REALS, _NO_INTEGERS, _NO_REALS, 0)
+_NO_REALS, _NO_INTEGERS, _NO_SHORTS = np.empty(0), np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int32)
+for _empty in (_NO_REALS, _NO_INTEGERS, _NO_SHORTS):
+    _empty.setflags(write=False)
+_NO_TABLES = (_NO_REALS, _NO_INTEGERS, _NO_REALS, _NO_INTEGERS, _NO_REALS, _NO_REALS, _NO_SHORTS, 0)
 NO_PROJECTION = (_NO_TABLES, (0, 0, 0))  # where no point is to be projected
-_SMALL_TURN = 1e-2  # rad; as samples lie densely most turns are smaller, and the next term of the series is below round-off
 
 
 @cache
@@ -121,23 +143,51 @@ def project_by(projection: Any, points: Any, reals: Any, integers: Any, feet: An
 @inner_kernel
 def project_points_on_samples(points: Any, tables: Any, feet: Any, claimed: Any) -> None:
     """Project the points chunk by chunk as they are claimed. Feet hold the exact results and take the new ones in their place."""
-    samples, links, boxes, starts, domain, method = tables
-    stack, foot = np.empty(STACK, dtype=np.int64), np.empty(FOOT_WIDTH)
+    samples, links, boxes, starts, domain, cells, neighbours, method = tables
+    values, slots = array_at(stack_reals(), REALS), array_at(stack_integers(), INTEGERS)
+    stack, foot, start, extent = slots[STACK_AT:], np.empty(FOOT_WIDTH), domain[DOMAIN_START], domain[DOMAIN_END] - domain[DOMAIN_START]
     first = claim_chunk(claimed)
     while first < len(feet.vertex):
-        for point in range(first, min(first + CHUNK, len(feet.vertex))):
-            x, y, u = points[2 * point], points[2 * point + 1], feet.parameter[point]
-            if np.isnan(u):
-                continue
-            step = int((u - domain[DOMAIN_START]) / (domain[DOMAIN_END] - domain[DOMAIN_START]) * len(starts))
-            site = nearest_sample(x, y, starts[min(max(step, 0), len(starts) - 1)], samples, links, boxes, stack)
-            site, facing = _facing_sample(x, y, site, samples, links)
-            if facing:
-                _on_faced_sample(x, y, site, method, samples, links, domain, foot)
-            else:
-                _take_sample(x, y, site, samples, links, foot)
-            store_foot(foot, feet, point)
+        for block in range(first, min(first + CHUNK, len(feet.vertex)), BLOCK):
+            lanes = min(BLOCK, len(feet.vertex) - block)
+            here, parameter = points[2 * block : 2 * (block + lanes)], feet.parameter[block : block + lanes]
+            for j in range(lanes):
+                find_sample(values, slots, here, parameter, cells, neighbours, starts, start, extent, j)
+            if method != CHORD:
+                _project_plain(values, slots, samples, domain, neighbours, method, lanes)
+                store_plain(values, slots, feet, block, lanes)
+            for j in range(lanes):
+                if slots[PLAIN + j] == 1 or np.isnan(parameter[j]):
+                    continue
+                x, y, site = here[2 * j], here[2 * j + 1], slots[SITE + j]
+                if slots[IS_NEAREST + j] == 0:
+                    step = int((parameter[j] - start) / extent * len(starts))
+                    site = nearest_sample(x, y, starts[min(max(step, 0), len(starts) - 1)], cells, links, boxes, stack)
+                site, facing = _facing_sample(x, y, site, samples, links)
+                if facing:
+                    _on_faced_sample(x, y, site, method, samples, links, domain, foot)
+                else:
+                    _take_sample(x, y, site, samples, links, foot)
+                store_foot(foot, feet, block + j)
         first = claim_chunk(claimed)
+
+
+@inlined_kernel
+def _project_plain(values: Any, slots: Any, samples: Any, domain: Any, neighbours: Any, method: int, lanes: int) -> None:
+    """Project those points of a block of which no case has to be told apart."""
+    load_samples(values, slots, samples, lanes)
+    if method == CIRCLE:
+        for j in range(lanes):
+            take_osculating_circle(values, slots, j)
+    else:
+        for j in range(lanes):
+            take_pole_circle(values, slots, j)
+    if method == VEAW:
+        choose_neighbours(values, slots, samples, neighbours, lanes)
+        blend_pole_circles(values, slots, lanes)
+    start, end, length, is_open = domain[DOMAIN_START], domain[DOMAIN_END], domain[DOMAIN_LENGTH_MM], domain[DOMAIN_CLOSED] == 0.0
+    for j in range(lanes):
+        complete(values, slots, start, end, length, is_open, j)
 
 
 @inlined_kernel
@@ -246,8 +296,8 @@ def _between_pole_circles(x: float, y: float, site: int, samples: Any, links: An
     edge = SAMPLE_WIDTH * (site if ahead >= 0.0 else other) + (LEFT_EDGE_X if off > 0.0 else RIGHT_EDGE_X)
     vx, vy = samples[edge], samples[edge + 1]
     row, other_row = SAMPLE_WIDTH * site, SAMPLE_WIDTH * other
-    at_site = _angle_between(samples[row + SAMPLE_X] - vx, samples[row + SAMPLE_Y] - vy, x - vx, y - vy)
-    at_other = _angle_between(x - vx, y - vy, samples[other_row + SAMPLE_X] - vx, samples[other_row + SAMPLE_Y] - vy)
+    at_site = angle_between(samples[row + SAMPLE_X] - vx, samples[row + SAMPLE_Y] - vy, x - vx, y - vy)
+    at_other = angle_between(x - vx, y - vy, samples[other_row + SAMPLE_X] - vx, samples[other_row + SAMPLE_Y] - vy)
     total = at_site + at_other
     if not total > 0.0:  # also where the two cells share no edge (NaN)
         return left, gx, gy
@@ -259,11 +309,6 @@ def _between_pole_circles(x: float, y: float, site: int, samples: Any, links: An
     if length == 0.0:  # at a Voronoi vertex the two directions may be opposite: either is as near
         return left, first_x, first_y
     return share * left + (1.0 - share) * left_other, gx / length, gy / length
-
-
-@inner_kernel
-def _angle_between(ax: float, ay: float, bx: float, by: float) -> float:
-    return float(abs(np.arctan2(ax * by - ay * bx, ax * bx + ay * by)))
 
 
 @inner_kernel
@@ -297,7 +342,7 @@ def _complete(x: float, y: float, site: int, left: float, gx: float, gy: float, 
     ahead, off = _in_frame(foot_x, foot_y, site, samples)
     curvature = samples[row + SAMPLE_CURVATURE]
     turn = curvature * ahead / (1.0 - curvature * off)
-    if abs(turn) < _SMALL_TURN and curvature * off < 1.0:
+    if abs(turn) < SMALL_TURN and curvature * off < 1.0:
         square = turn * turn
         travel = ahead / (1.0 - curvature * off) * (1.0 - square * (1 / 3 - square * (1 / 5 - square / 7)))
     else:

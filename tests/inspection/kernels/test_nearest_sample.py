@@ -18,10 +18,10 @@ def test_the_nearest_sample_is_the_nearest_of_coarse_ones_as_well() -> None:
         points = centre + rng.uniform(-1, 1, (1500, 2)) * size
         table, u = nominal.sample_table, project(points, nominal.grid).parameter
         begin = np.clip((u - table.domain[0]) / (table.domain[1] - table.domain[0]) * len(table.starts), 0, len(table.starts) - 1)
-        samples, links, boxes, starts, _ = table.flat
+        _, links, boxes, starts, _, cells, _ = table.flat
         stack = np.empty(STACK, dtype=np.int64)
         found = [
-            nearest_sample(x, y, starts[k], samples, links, boxes, stack)
+            nearest_sample(x, y, starts[k], cells, links, boxes, stack)
             for (x, y), k in zip(points.tolist(), begin.astype(int).tolist(), strict=True)
         ]
         distance = np.hypot(*(points - nominal.points_mm[found]).T)

@@ -1,12 +1,16 @@
 """The paper's methods, compiled, against the same in plain numpy."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from inspection import NominalProfile, discretize
 from inspection.kernels import SAMPLE_METHODS, Feet, project, project_on_samples
+from inspection.kernels.layout import CELL_LEFT, CELL_RIGHT, CELL_WIDTH, LEFT_POLE_X
+from inspection.sample_table import SampleTable
 from tests.inspection import profiles
 from tests.inspection import projections_reference as reference
 from tests.inspection.kernels.places import grid_of, scattered
@@ -45,6 +49,32 @@ def test_no_bit_of_a_compiled_method_depends_on_the_batch(method: str) -> None:
         wanted = getattr(whole, field)
         assert np.array_equal(np.concatenate([getattr(part, field) for part in cut]), wanted), field
         assert np.array_equal(getattr(many, field), np.concatenate([wanted] * 20)), field
+
+
+@pytest.mark.parametrize("method", SAMPLE_METHODS)
+@pytest.mark.parametrize("name", ["P1", "P3", "stadium", "square", "NACA 2412 sharp", "MH42"])
+def test_points_worked_on_together_get_the_bits_that_each_gets_alone(name: str, method: str) -> None:
+    nominal = discretize(curve_of(name), samples=700, step_min=1e-3)
+    table = nominal.sample_table
+    proof = np.arange(CELL_WIDTH) >= CELL_LEFT
+    never = replace(table, cells=np.where(proof, -np.inf, table.cells))  # proves nothing: every point goes alone
+    rng = np.random.default_rng(44)
+    points = np.vstack([scattered(curve_of(name), rng, 600), table.samples[:, LEFT_POLE_X : LEFT_POLE_X + 2]])
+    nearest, next_to_it = np.asarray(nominal.tree.query(points, k=2)[0]).T
+    points = np.vstack([points[next_to_it > nearest * (1 + 1e-9)], [[np.nan, 0.0], [0.0, np.inf]]])  # of equally near ones either will do
+    alone, together = (project_on_samples(points, grid_of(name), each, method) for each in (never, table))
+    for field in FIELDS:
+        assert np.array_equal(getattr(alone, field), getattr(together, field), equal_nan=True), field
+    proven = cells_hold(table, points[: len(points) - 2])
+    assert proven.mean() > 0.5
+
+
+def cells_hold(table: SampleTable, points: Array) -> NDArray[np.bool_]:
+    """Whether the numbers of its cell prove the nearest sample of each point, which is looked for among all."""
+    site = np.hypot(*(points[:, None] - table.cells[:, :CELL_LEFT]).transpose(2, 0, 1)).argmin(axis=1)
+    x, y = (points - table.cells[site, :CELL_LEFT]).T
+    sides = [table.cells[site, column : column + 3].T for column in (CELL_LEFT, CELL_RIGHT)]
+    return np.asarray(np.all([a * y - b * x < c for a, b, c in sides], axis=0))
 
 
 def test_veaw_at_the_ends_of_voronoi_edges_gives_a_distance_between_the_curve_and_the_nearest_sample() -> None:
