@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from drivers.codecs import decoder, decoders, unseen_in
     from drivers.codecs.register_decoder import RegisterDecoder
     from drivers.codecs.register_map import RegisterMap, register_map
-    from drivers.errors import DeviceError, DeviceRefused, LinkError, MeshError, PointFileError, ProtocolError
+    from drivers.errors import CadError, DeviceError, DeviceRefused, LinkError, MeshError, PointFileError, ProtocolError
     from drivers.files.column_choice import AxisName
     from drivers.files.point_file import PointFile, PointFileSource, convert_to_mm, points_of, read_points
     from drivers.files.row_reading import shorten
@@ -41,7 +41,7 @@ else:
         "drivers.codecs": ("decoder", "decoders", "unseen_in"),
         "drivers.codecs.register_decoder": ("RegisterDecoder",),
         "drivers.codecs.register_map": ("RegisterMap", "register_map"),
-        "drivers.errors": ("DeviceError", "DeviceRefused", "LinkError", "MeshError", "PointFileError", "ProtocolError"),
+        "drivers.errors": ("CadError", "DeviceError", "DeviceRefused", "LinkError", "MeshError", "PointFileError", "ProtocolError"),
         "drivers.files.column_choice": ("AxisName",),
         "drivers.files.point_file": ("PointFile", "PointFileSource", "convert_to_mm", "points_of", "read_points"),
         "drivers.files.row_reading": ("shorten",),
@@ -81,6 +81,7 @@ __all__ = [
     "HARMLESS_REASONS",
     "Arrival",
     "AxisName",
+    "CadError",
     "Capture",
     "Columns",
     "Damaged",

@@ -6,6 +6,7 @@ DeviceError
   DeviceRefused   the device answered, and said no
 PointFileError    a file of points cannot be used
 MeshError         a surface file, or a cut through it, cannot be used
+CadError          a CAD file, or a section of it, cannot be used
 
 Libraries' own exceptions (pyserial, pymodbus) are translated in the one file that imports the library.
 A message says what happened, where (port or address), and what the operator can do.
@@ -34,3 +35,7 @@ class PointFileError(ValueError):
 
 class MeshError(ValueError):
     """A surface file or a cut through it cannot be used; the message names the file, the place in it, and what to do."""
+
+
+class CadError(ValueError):
+    """A CAD file or a section of it cannot be used; the message says why, and what to do."""

@@ -48,6 +48,8 @@ GRAB_BAGS = {"utils", "util", "helpers", "helper", "common", "base", "manager", 
 LIBRARIES_IN_ONE_FILE = {
     "serial": {"drivers/links/serial_scanner.py"},
     "numba": {"inspection/kernels/compiling.py"},
+    "ezdxf": {"cmmlink/nominal_files/dxf.py"},
+    "OCP": {"drivers/cad/occt_reader.py"},
 }
 
 
@@ -169,8 +171,14 @@ def test_the_version_stands_in_one_place() -> None:
 def test_every_library_that_is_imported_is_declared() -> None:
     """A fresh installation has what is declared and nothing else."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    imports_of = {"PyYAML": "yaml", "pyserial": "serial", "open3d-cpu": "open3d", "libusb-package": "libusb_package"}
-    lines = [*project["dependencies"], *project["optional-dependencies"]["open3d"]]
+    imports_of = {
+        "PyYAML": "yaml",
+        "pyserial": "serial",
+        "open3d-cpu": "open3d",
+        "libusb-package": "libusb_package",
+        "cadquery-ocp-novtk": "OCP",
+    }
+    lines = [*project["dependencies"], *project["optional-dependencies"]["open3d"], *project["optional-dependencies"]["cad"]]
     declared = {re.split(r"[<>=!~\[; ]", line, maxsplit=1)[0] for line in lines}
     known = {imports_of.get(name, name) for name in declared} | set(sys.stdlib_module_names) | set(PACKAGES)
     brought = {"pydantic_core": "pydantic", "llvmlite": "numba", "anyio": "starlette", "h11": "uvicorn"}  # which these cannot do without
@@ -182,7 +190,7 @@ def test_every_library_that_is_imported_is_declared() -> None:
     assert undeclared == {}
 
 
-@pytest.mark.parametrize(("file", "extras"), [("constraints.txt", ("open3d", "test", "bench")), (".ci/lowest.txt", ("test",))])
+@pytest.mark.parametrize(("file", "extras"), [("constraints.txt", ("cad", "open3d", "test", "bench")), (".ci/lowest.txt", ("test",))])
 def test_the_versions_that_are_installed_lie_within_the_ranges_that_are_declared(file: str, extras: tuple[str, ...]) -> None:
     """`make upgrade` writes both files anew."""
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))

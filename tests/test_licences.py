@@ -37,7 +37,9 @@ def rows(heading: str) -> dict[str, str]:
     return dict(re.findall(r"^\| `([^`]+)` \| ([^|]+?) \|", section[1], re.MULTILINE))
 
 
-PLAIN, OPEN3D, INSIDE = rows("A plain installation"), rows("The extra `open3d`"), rows("Inside the wheels")
+PLAIN, OPEN3D, CAD, INSIDE = (
+    rows(f"{name}") for name in ("A plain installation", "The extra `open3d`", "The extra `cad`", "Inside the wheels")
+)
 
 
 def found(name: str) -> importlib.metadata.Distribution | None:
@@ -87,7 +89,7 @@ def libraries_inside(names: Iterable[str]) -> Iterator[str]:
         distribution = found(name)
         for file in (distribution.files or ()) if distribution else ():
             if file.parts[0].endswith(".libs") or file.name.startswith("libusb-1.0"):
-                yield re.split(r"[-.]", file.name.replace("libusb-1.0", "libusb"))[0]
+                yield re.sub(r"^libTK.*", "libTK*", re.split(r"[-.]", file.name.replace("libusb-1.0", "libusb"))[0])
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -107,15 +109,17 @@ def test_everything_that_a_plain_installation_brings_is_listed() -> None:
 
 
 def test_everything_that_the_extras_bring_is_listed() -> None:
-    assert set(PROJECT["optional-dependencies"]) == {"all", "open3d", "test", "bench"}, "a new extra needs a table of its own"
+    assert set(PROJECT["optional-dependencies"]) == {"all", "cad", "open3d", "test", "bench"}, "a new extra needs a table of its own"
+    if found("cadquery-ocp-novtk") is not None:
+        assert brought_by(PROJECT["optional-dependencies"]["cad"]) & pinned() - set(PLAIN) == set(CAD)
     if found("open3d") is None and found("open3d-cpu") is None:
         pytest.skip("Open3D is not installed here")
     assert brought_by(PROJECT["optional-dependencies"]["open3d"]) & pinned() - set(PLAIN) == set(OPEN3D)
 
 
-@pytest.mark.parametrize("name", sorted({**PLAIN, **OPEN3D}))
+@pytest.mark.parametrize("name", sorted({**PLAIN, **OPEN3D, **CAD}))
 def test_the_licence_that_is_listed_is_the_one_that_is_told(name: str) -> None:
-    told, listed = told_by(name), {**PLAIN, **OPEN3D}[name]
+    told, listed = told_by(name), {**PLAIN, **OPEN3D, **CAD}[name]
     if not told:
         assert found(name) is None, f"{name} says nothing of its licence"
         return
@@ -131,11 +135,17 @@ def test_a_plain_installation_brings_no_library_under_the_gpl_or_its_kind() -> N
 
 
 def test_no_library_at_all_that_is_shipped_with_an_extra_is_under_the_gpl() -> None:
-    assert {name: told for name in OPEN3D if COPYLEFT.search(told := f"{told_by(name)} {OPEN3D[name]}")} == {}
+    assert {name: told for name, listed in {**OPEN3D, **CAD}.items() if COPYLEFT.search(told := f"{told_by(name)} {listed}")} == {}
 
 
 def test_shared_libraries_inside_the_wheels_are_listed_and_what_is_copyleft_is_named() -> None:
-    inside = set(libraries_inside([*PLAIN, *OPEN3D]))
+    inside = set(libraries_inside([*PLAIN, *OPEN3D, *CAD]))
     assert inside - set(INSIDE) == set()
-    assert {name for name, licence in INSIDE.items() if COPYLEFT.search(licence)} == {"libgfortran", "libquadmath", "libusb"}
+    assert {name for name, licence in INSIDE.items() if COPYLEFT.search(licence)} == {
+        "libTK*",
+        "libgfortran",
+        "libgomp",
+        "libquadmath",
+        "libusb",
+    }
     assert "GCC exception" in INSIDE["libgfortran"], "without the exception a plain installation would bring the GPL"

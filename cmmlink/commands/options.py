@@ -45,6 +45,10 @@ Unit = Annotated[UnitName | None, typer.Option("--unit", help="Unit of the point
 NominalUnit = Annotated[UnitName | None, typer.Option("--nominal-unit", help="Unit of the nominal file, in place of --scale.")]
 PlaneName = Literal["xy", "xz", "yz"]
 Plane = Annotated[PlaneName, typer.Option("--plane", help="The plane that the points of the section lie in.")]
+SectionPlaneNumbers = Annotated[
+    tuple[float, float, float, float, float, float] | None,
+    typer.Option("--section", metavar="X Y Z I J K", help="A point of the section and its normal, in place of --plane."),
+]
 Invalid = Annotated[
     list[float] | None, typer.Option("--invalid", metavar="V", help="A coordinate that means no point, like -9999; as often as wanted.")
 ]
@@ -100,9 +104,24 @@ def columns_from(text: str | None) -> dict[str, int] | None:
     return columns
 
 
-def section_in(plane: PlaneName) -> dict[str, Any]:
-    """The section of a plan that lies in a plane of the machine: the first axis becomes x, the second y."""
+def section_in(plane: PlaneName, given: tuple[float, ...] | None) -> dict[str, Any]:
+    """The section of a plan: a plane of the machine, whose first axis becomes x and whose second y, or one of a point and a normal."""
+    if given is not None:
+        return _section_of(given, plane)
     if plane == "xy":
         return {}  # a nominal that lies in space brings its own
     normal = {"xy": (0.0, 0.0, 1.0), "xz": (0.0, -1.0, 0.0), "yz": (1.0, 0.0, 0.0)}[plane]
     return {"normal": normal, "x_axis": (0.0, 1.0, 0.0) if plane == "yz" else (1.0, 0.0, 0.0)}
+
+
+def _section_of(given: tuple[float, ...], plane: PlaneName) -> dict[str, Any]:
+    """The section through a point with a normal; its x axis is what a cut of a surface has. Raises PlanError."""
+    from drivers.surface import axes_of
+
+    if plane != "xy":
+        raise PlanError(f"--section and --plane {plane} are both given; expected one of them")
+    try:
+        axes = axes_of(given[3:])
+    except ValueError as error:
+        raise PlanError(f"--section: {error}") from None
+    return {"origin_mm": given[:3], "normal": tuple(axes.normal.tolist()), "x_axis": tuple(axes.x.tolist())}

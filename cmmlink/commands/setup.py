@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cmmlink.commands.exit_codes import UNUSABLE, fail
-from cmmlink.commands.options import Closed, CurveNumber, Json, Layer, PlanFile, Records, records_folder
+from cmmlink.commands.options import Closed, CurveNumber, Json, Layer, PlanFile, Records, SectionPlaneNumbers, records_folder, section_in
 from cmmlink.commands.output import now, print_json
 from cmmlink.errors import PlanError
 from cmmlink.version import __version__
@@ -28,12 +28,13 @@ def nominal(
     closed: Closed = None,
     layer: Layer = None,
     curve: CurveNumber = None,
+    section: SectionPlaneNumbers = None,
     as_json: Json = False,
 ) -> int:
     """Show what was understood of a nominal file."""
     from cmmlink.nominal_files import load_nominal
 
-    understood = load_nominal(file, scale, closed, unit, layer=layer, curve=curve)
+    understood = load_nominal(file, scale, closed, unit, layer=layer, curve=curve, section=_plane_from(section))
     if as_json:
         print_json(_nominal_json(understood))
         return 0
@@ -43,6 +44,15 @@ def nominal(
     for note in understood.notes:
         typer.echo(f"  {note}")
     return 0
+
+
+def _plane_from(section: tuple[float, ...] | None) -> "SectionPlane | None":
+    if section is None:
+        return None
+    from cmmlink.from_plan import plane_of
+    from cmmlink.plan import Section
+
+    return plane_of(Section(**section_in("xy", section)))
 
 
 def _nominal_json(understood: "NominalFile") -> dict[str, Any]:

@@ -12,6 +12,7 @@ from cmmlink.nominal_files.chains import counted_names
 from cmmlink.nominal_files.drawing import Drawing
 from cmmlink.nominal_files.iges_records import Entity, IgesFile, parse_iges
 from cmmlink.nominal_files.pieces import Piece, conic_arc, polyline, reverse, spline
+from cmmlink.nominal_files.solids import drawing_by_kernel
 from drivers import read_bytes
 from inspection import NominalError, SectionPlane
 
@@ -32,6 +33,7 @@ _UNITS: Final = {
     11: ("microinch", 25.4e-6),
 }
 _NAMES: Final = {"IN": 1, "INCH": 1, "MM": 2, "FT": 4, "MI": 5, "M": 6, "KM": 7, "MIL": 8, "UM": 9, "CM": 10, "UIN": 11}
+_SURFACES: Final = {108, 114, 118, 120, 122, 128, 140, 143, 144, *range(150, 199), 510, 514}
 _OTHER = 3  # the flag of a unit that is told by its name
 _COMPOSITE, _MATRIX = 102, 124
 _DEEPEST = 20
@@ -42,8 +44,7 @@ _NO_DRAWING: Final = {_MATRIX, 314, 402, 404, 406, 410}  # matrices, colours, gr
 
 
 def draw(path: Path, section: SectionPlane | None) -> Drawing:
-    """The curves of a file, each once: those of a composite within it."""
-    del section
+    """The curves of a file, each once: those of a composite within it. Without curves, the section of its surfaces and solids."""
     file = parse_iges(read_bytes(path).decode("latin-1"))
     mm_per_unit, unit = _unit(file)
     pieces: list[Piece] = []
@@ -57,6 +58,8 @@ def draw(path: Path, section: SectionPlane | None) -> Drawing:
             left_out += [] if made else [f"entity {entity.kind} of form {entity.form} or without length"]
         elif entity.kind not in _NO_DRAWING:
             left_out.append(f"entity {entity.kind}")
+    if not pieces and _SURFACES & {entity.kind for entity in file.entities.values()}:
+        return drawing_by_kernel(path, "iges", section, "iges", mm_per_unit, unit)
     notes = [f"left out: {counted_names(left_out)}"] if left_out else []
     return Drawing(tuple(pieces), "iges", mm_per_unit, unit, notes=tuple(notes))
 

@@ -72,7 +72,7 @@ class Part(Settings):
 class Nominal(Settings):
     """The nominal profile, and on which side of it the material lies."""
 
-    file: Path = Field(description="the file of the nominal profile: UIUC dat, points, NURBS yaml, or a drawing: DXF or IGES")
+    file: Path = Field(description="the file of the nominal profile: UIUC dat, points, NURBS yaml, or CAD: DXF, IGES, STEP")
     layer: Text | None = Field(
         default=None, description="the layer of a drawing that the profile is drawn on; null: it is not chosen by its layer"
     )

@@ -3,31 +3,26 @@
 Why a process: importing Open3D stops every thread of a program for a tenth of a second at a time, and `slice_plane` holds the
 interpreter for as long as it runs; acquisition must never wait for either. And a file on which Open3D crashes
 costs a message and not the run. This is the only file that imports open3d, and only the child does.
-
-The two speak through pipes: a line of JSON, then the bytes of the arrays it announces.
 """
 
 import ctypes
 import importlib.util
-import json
-import os
 import platform
 import shutil
-import subprocess
 import sys
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from queue import SimpleQueue
-from threading import Lock, Thread
+from threading import Lock
 from types import ModuleType, TracebackType
-from typing import IO, Any, Final, Self
+from typing import Any, Final, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.errors import MeshError
+from drivers.helper_process import Answer, HelperProcess, answer_questions
 from drivers.surface.ply_header import faces_announced, header_of, readable
 from drivers.surface.stl_file import SurfaceMesh, rounding_note, surface_of
 
@@ -38,7 +33,6 @@ LIBRARIES: Final = {
     "libEGL.so.1": ("libegl1", "mesa-libEGL"),
     "libX11.so.6": ("libx11-6", "libX11"),
 }
-_CHILD: Final = "import sys; sys.path.append(sys.argv[1]); from drivers.surface.open3d_process import serve; serve()"
 
 
 class Open3DMissing(RuntimeError):  # noqa: N818 - reads as the sentence it is
@@ -79,8 +73,7 @@ class Open3DProcess:
     """
 
     def __init__(self, python: Sequence[str] = (sys.executable,)) -> None:
-        self._python = tuple(python)
-        self._child = _start(self._python)
+        self._child = HelperProcess(__name__, python)
         self._status: Open3DStatus | None = None
         self._turn = Lock()  # one question at a time; threads that chain meanwhile do not wait
 
@@ -92,7 +85,7 @@ class Open3DProcess:
 
     def close(self) -> None:
         """End the child; it has nothing to save."""
-        _end(self._child)
+        self._child.close()
 
     def status(self) -> Open3DStatus:
         """Wait until Open3D is loaded, or is known not to load."""
@@ -136,38 +129,19 @@ class Open3DProcess:
         status = self.status()
         if status.version is None:
             raise Open3DMissing(status.sentence())
-        if self._child.poll() is not None:  # it broke down on an earlier question: a bad file must not spoil the next
-            _end(self._child)
-            self._child = _start(self._python)
+        if self._child.ended:  # it broke down on an earlier question: a bad file must not spoil the next
+            self._child.start_again()
             self._receive()
         try:
-            assert self._child.stdin is not None
-            _send(self._child.stdin, request, arrays)
-        except OSError as error:
-            raise Open3DMissing(f"the process with Open3D ended (exit status {self._child.wait()})") from error
-        return self._receive()
+            return self._child.ask(request, arrays)
+        except ChildProcessError as error:
+            raise Open3DMissing(f"the process with Open3D ended ({error})") from error
 
     def _receive(self) -> tuple[dict[str, Any], list[NDArray[Any]]]:
-        assert self._child.stdout is not None
-        message = _read_message(self._child.stdout)
-        if message is None:
-            raise Open3DMissing(f"the process with Open3D ended (exit status {self._child.wait()})")
-        return message
-
-
-def _start(python: tuple[str, ...]) -> subprocess.Popen[bytes]:
-    root = str(Path(__file__).resolve().parents[2])
-    return subprocess.Popen([*python, "-P", "-c", _CHILD, root], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
-
-
-def _end(child: subprocess.Popen[bytes]) -> None:
-    assert child.stdin is not None
-    assert child.stdout is not None
-    child.kill()
-    child.wait()
-    child.stdout.close()
-    with suppress(OSError):  # what was still to be sent has no receiver any more
-        child.stdin.close()
+        try:
+            return self._child.receive()
+        except ChildProcessError as error:
+            raise Open3DMissing(f"the process with Open3D ended ({error})") from error
 
 
 def open3d_status(python: Sequence[str] = (sys.executable,)) -> Open3DStatus:
@@ -238,54 +212,22 @@ def _corners(vertices: NDArray[np.floating], triangles: NDArray[np.integer], pat
     return np.asarray(vertices[triangles])
 
 
-def _send(pipe: IO[bytes], message: dict[str, Any], arrays: list[NDArray[Any]]) -> None:
-    """Send one message: a line of JSON, which announces the arrays, then their bytes."""
-    pipe.write(json.dumps({**message, "arrays": [[array.dtype.str, list(array.shape)] for array in arrays]}).encode() + b"\n")
-    for array in arrays:
-        pipe.write(np.ascontiguousarray(array).reshape(-1).view(np.uint8).data)
-    pipe.flush()
-
-
-def _read_message(pipe: IO[bytes]) -> tuple[dict[str, Any], list[NDArray[Any]]] | None:
-    """Read what `_send` wrote; None at the end of the pipe."""
-    line = pipe.readline()
-    if not line.endswith(b"\n"):
-        return None
-    message = json.loads(line)
-    arrays = []
-    for dtype, shape in message.pop("arrays"):
-        array = np.empty(shape, np.dtype(dtype))
-        data = pipe.read(array.nbytes)
-        if len(data) < array.nbytes:
-            return None
-        arrays.append(np.frombuffer(data, array.dtype).reshape(shape))
-    return message, arrays
-
-
 def serve() -> None:
-    """Run as the child: load Open3D, say hello, answer until the pipe closes, and end with it."""
-    pipe_in, pipe_out = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what libraries print must not get among the answers
-    questions: SimpleQueue[tuple[dict[str, Any], list[NDArray[Any]]]] = SimpleQueue()
-    Thread(target=_listen, args=(pipe_in, questions), name="questions", daemon=True).start()
+    """Run as the child."""
+    answer_questions(_load)
+
+
+def _load() -> tuple[dict[str, Any], Answer | None]:
     try:
         open3d = load_open3d()
-    except Exception as error:
+    except Exception as error:  # whatever keeps it from being loaded is told to the operator
         installed = importlib.util.find_spec("open3d") is not None
-        _send(pipe_out, {"error": str(error), "installed": installed, "missing": _missing_libraries()}, [])
-        return
-    _send(pipe_out, {"version": open3d.__version__}, [])
-    while True:
-        request, arrays = questions.get()
-        answer, results = _cut(open3d, arrays[0]) if request["do"] == "cut" else _read(open3d, request["path"])
-        _send(pipe_out, answer, results)
+        return {"error": str(error), "installed": installed, "missing": _missing_libraries()}, None
+    return {"version": open3d.__version__}, partial(_answer, open3d)
 
 
-def _listen(pipe: IO[bytes], questions: "SimpleQueue[tuple[dict[str, Any], list[NDArray[Any]]]]") -> None:
-    """Hand on questions. Where the pipe ends nobody waits for an answer: the process ends at once, whatever it works on."""
-    while (message := _read_message(pipe)) is not None:
-        questions.put(message)
-    os._exit(0)
+def _answer(open3d: Any, request: dict[str, Any], arrays: list[NDArray[Any]]) -> tuple[dict[str, Any], list[NDArray[Any]]]:
+    return _cut(open3d, arrays[0]) if request["do"] == "cut" else _read(open3d, request["path"])
 
 
 def load_open3d() -> ModuleType:

@@ -121,7 +121,8 @@ def test_a_console_that_is_asked_to_end_does(request_to_end: signal.Signals, tmp
 
 def test_the_process_with_open3d_ends_with_its_pipe(tmp_path: Path) -> None:
     program = (
-        "from drivers.surface.open3d_process import _start; import sys; child = _start((sys.executable,)); print(child.pid, flush=True)"
+        "from drivers.helper_process import start_child; import sys; "
+        "child = start_child('drivers.surface.open3d_process', (sys.executable,)); print(child.pid, flush=True)"
     )
     with started(tmp_path, program=f"{program}; input()") as process:
         assert process.stdout is not None

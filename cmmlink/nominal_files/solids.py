@@ -1,0 +1,50 @@
+"""What Open CASCADE reads of a file, as a drawing: drawn curves, or the section of solids and surfaces by a plane."""
+
+import hashlib
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from cmmlink.nominal_files.chains import counted_names
+from cmmlink.nominal_files.drawing import Drawing, words_of_plane
+from cmmlink.nominal_files.pieces import Piece
+from drivers import CadError, read_bytes
+from drivers.cad import CadCurves, Kind, read_cad
+from inspection import NominalError, SectionPlane
+
+_XY = ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+Vector = tuple[float, ...]
+
+
+def drawing_by_kernel(
+    path: Path, kind: Kind, section: SectionPlane | None, source_format: str, mm_per_unit: float | None, unit: str
+) -> Drawing:
+    """The curves of a file in its own unit; faces are cut by the plane that was asked for, or by that of x and y. Raises NominalError."""
+    origin, normal = _XY if section is None else (tuple(section.origin_mm.tolist()), tuple(section.normal.tolist()))
+    try:
+        read = _read(str(path), hashlib.sha256(read_bytes(path)).hexdigest(), kind, origin, normal)
+    except CadError as error:
+        raise NominalError(str(error)) from None
+    to_unit = np.array([1 / (mm_per_unit or 1.0)] * 3 + [1.0])
+    pieces = [Piece(curve.degree, curve.poles * to_unit, curve.knots, name=f"edge {i}") for i, curve in enumerate(read.curves, 1)]
+    return Drawing(tuple(pieces), source_format, mm_per_unit, unit, has_layers=False, notes=tuple(_notes(read, section)))
+
+
+@lru_cache(maxsize=4)  # a run asks for its nominal several times, and the kernel takes seconds; the content decides
+def _read(path: str, content: str, kind: Kind, origin: Vector, normal: Vector) -> CadCurves:
+    del content
+    return read_cad(Path(path), kind, origin, normal)
+
+
+def _notes(read: CadCurves, section: SectionPlane | None) -> list[str]:
+    notes = [f"left out: {counted_names(read.left_out)}"] if read.left_out else []
+    if not read.cut:
+        return [*notes, f"{read.faces} faces left out beside drawn curves"] if read.faces else notes
+    if section is None:
+        notes.append(f"the section of {read.faces} faces by the plane z = 0: no other section was asked for")
+    else:
+        notes.append(f"the section of {read.faces} faces by the plane {words_of_plane(section)}")
+    if read.residual_mm:
+        notes.append(f"between its points the section leaves free-form faces by {read.residual_mm:.1g} mm at most")
+    return notes
