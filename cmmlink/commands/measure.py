@@ -195,7 +195,7 @@ def inspect(
     from cmmlink.devices import connect
     from cmmlink.from_plan import inspection_of, profile_of
     from cmmlink.plan import Plan
-    from cmmlink.report import prepare
+    from cmmlink.report import Pictures, prepare, processes_here
     from cmmlink.run import carry_out
     from cmmlink.scratch import scratch_in
 
@@ -223,16 +223,18 @@ def inspect(
         "out": None,
     }
     plan = plan_from_options(Plan, settings, _OPTION_OF)
-    profile = profile_of(plan)
-    folder = None if no_record else records_folder(records)
-    with connect(plan, scratch_in(folder)) as device, stop_on_ctrl_c() as stop:
-        try:
-            inspection_of(plan, profile)
-        except ValueError as error:
-            raise PlanError(f"--tip-radius {tip_radius:g}: {error}") from None
-        prepare(out)
-        finished = carry_out(plan, profile, device, records=folder, clock=time.monotonic, now=now, stop=stop, patience_s=_PATIENCE_S)
-    if finished.outcome.refusal is not None:
-        refusal = finished.outcome.refusal
-        raise type(refusal)(f"{points}: {refusal}")
-    return report_outcome(finished, Output(headless=True, as_json=as_json, out=out))
+    with Pictures() as pictures:
+        pictures.start(min(processes_here(), 0 if out is None else 1))  # it loads what it draws with while points are read and judged
+        profile = profile_of(plan)
+        folder = None if no_record else records_folder(records)
+        with connect(plan, scratch_in(folder)) as device, stop_on_ctrl_c() as stop:
+            try:
+                inspection_of(plan, profile)
+            except ValueError as error:
+                raise PlanError(f"--tip-radius {tip_radius:g}: {error}") from None
+            prepare(out)
+            finished = carry_out(plan, profile, device, records=folder, clock=time.monotonic, now=now, stop=stop, patience_s=_PATIENCE_S)
+        if finished.outcome.refusal is not None:
+            refusal = finished.outcome.refusal
+            raise type(refusal)(f"{points}: {refusal}")
+        return report_outcome(finished, Output(headless=True, as_json=as_json, out=out), pictures)

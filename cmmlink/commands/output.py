@@ -20,6 +20,7 @@ from inspection import NotMeasured
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from cmmlink.report import Pictures
     from cmmlink.run import FinishedRun
 
 _STOPPING = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")  # as far as the system has them
@@ -61,8 +62,10 @@ def terminal() -> "Console":
     return Console(highlight=False, soft_wrap=not sys.stdout.isatty())
 
 
-def report_outcome(run: "FinishedRun", output: Output) -> int:
+def report_outcome(run: "FinishedRun", output: Output, pictures: "Pictures | None" = None) -> int:
     """Print the outcome and write its files, each even if the other fails. Returns the exit code.
+
+    pictures : draws the picture among the files
 
     Raises NotMeasured where the set-up contradicts the points: then there is no result to print or to write.
     """
@@ -81,7 +84,7 @@ def report_outcome(run: "FinishedRun", output: Output) -> int:
             from cmmlink.report import write_run
 
             folder = run.folder_of(output.out)
-            written = write_run(folder, run)
+            written = write_run(folder, run, pictures)
     finally:
         if output.as_json:
             print_json(run.result_json())

@@ -184,13 +184,13 @@ def _inspect_stack(plan: "CtPlan", output: Output, pictures: bool, no_record: bo
     """Inspect a stack with a progress bar; write its files and print what came of it, each even if the other fails."""
     from rich.console import Console
 
-    from cmmlink.report import SectionPictures, prepare, write_stack
+    from cmmlink.report import Pictures, SectionPictures, prepare, write_stack
 
     pattern = output.out or plan.out
     prepare(pattern)
     bar = _SectionBar(Console(stderr=True), visible=not output.as_json and sys.stderr.isatty())
-    with SectionPictures(plan.part.name) as drawn:
-        wanted = drawn if pictures and pattern is not None else None
+    with Pictures() as drawn:
+        wanted = SectionPictures(plan.part.name, drawn) if pictures and pattern is not None else None
         stack = _judge_stack(plan, output, bar, wanted, no_record)
         folder = None if pattern is None else stack.folder_of(pattern, plan)
         try:

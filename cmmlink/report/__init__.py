@@ -7,6 +7,7 @@ TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer 
 
 if TYPE_CHECKING:
     from cmmlink.report.folder import prepare, write_results, write_run
+    from cmmlink.report.picture_processes import Pictures, processes_here
     from cmmlink.report.section_pictures import SectionPictures
     from cmmlink.report.stack_folder import write_stack
     from cmmlink.report.terminal import STYLE_OF, STYLES, LiveTable, print_characteristics, print_summary
@@ -15,6 +16,7 @@ else:
 
     _PLACES = {
         "cmmlink.report.folder": ("prepare", "write_results", "write_run"),
+        "cmmlink.report.picture_processes": ("Pictures", "processes_here"),
         "cmmlink.report.section_pictures": ("SectionPictures",),
         "cmmlink.report.stack_folder": ("write_stack",),
         "cmmlink.report.terminal": ("STYLE_OF", "STYLES", "LiveTable", "print_characteristics", "print_summary"),
@@ -27,10 +29,12 @@ __all__ = [
     "STYLES",
     "STYLE_OF",
     "LiveTable",
+    "Pictures",
     "SectionPictures",
     "prepare",
     "print_characteristics",
     "print_summary",
+    "processes_here",
     "write_results",
     "write_run",
     "write_stack",

@@ -11,6 +11,8 @@ from cmmlink.characteristics import is_short_form
 from cmmlink.characteristics_csv import write_characteristics
 from cmmlink.deviations_csv import write_deviations
 from cmmlink.errors import PlanError
+from cmmlink.report.picture_content import content_of
+from cmmlink.report.picture_processes import Pictures
 from cmmlink.result_files import new_files
 from cmmlink.result_folder import fixed_part, make_room
 from cmmlink.run import FinishedRun
@@ -36,21 +38,28 @@ def prepare(pattern: Path | None) -> None:
 
 
 def write_results(
-    folder: Path, document: dict[str, Any], result: InspectionResult | None, profile: NominalProfile, title: str
+    folder: Path,
+    document: dict[str, Any],
+    result: InspectionResult | None,
+    profile: NominalProfile,
+    title: str,
+    pictures: Pictures | None = None,
 ) -> list[str]:
     """Write result.json and, when points were judged, deviations.csv and profile.png. Returns their names; raises PlanError.
 
     Of a plan with characteristics there is characteristics.csv as well, and zone.json where one of them is a minimum zone.
     Where a budget was stated, uncertainty.csv is written as well.
 
+    pictures : draws the picture, in another process where one was started
+
     What an earlier run left there is moved aside, into a folder of its own; the new files take its place together.
     """
     with _or_refuse(folder), new_files(folder, make_room) as files:
         files("result.json").write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
         if result is not None and result.judged:
-            from cmmlink.report.picture import write_picture  # noqa: PLC0415 - matplotlib takes half a second that other commands need not pay
-
-            ending = document.get("ending", "complete")
+            ending, pictures = document.get("ending", "complete"), pictures or Pictures()
+            content = content_of(result, profile, title, ending, _said_at_foot(document))
+            drawing = pictures.begin(content)
             write_deviations(result.blocks(), files("deviations.csv"), ending)
             if not is_short_form(result.characteristics):
                 write_characteristics(result.characteristics, files("characteristics.csv"))
@@ -58,7 +67,7 @@ def write_results(
                 files("zone.json").write_text(json.dumps(zones, indent=2) + "\n", encoding="utf-8")
             if result.uncertainty is not None:
                 write_uncertainty(result.uncertainty, files("uncertainty.csv"))
-            write_picture(result, profile, title, files("profile.png"), ending, _said_at_foot(document))
+            pictures.write(drawing, lambda: content, files("profile.png"))
     return files.names
 
 
@@ -68,9 +77,9 @@ def _said_at_foot(document: dict[str, Any]) -> str:
     return "   ".join(filter(None, [run and f"run {run}", measured_at and f"measured {measured_at}"]))
 
 
-def write_run(folder: Path, run: FinishedRun) -> list[str]:
+def write_run(folder: Path, run: FinishedRun, pictures: Pictures | None = None) -> list[str]:
     """Write the files of a finished run, as `FinishedRun.folder_of` names its folder. Returns their names; raises PlanError."""
-    return write_results(folder, run.result_json(), run.outcome.result, run.profile, run.title)
+    return write_results(folder, run.result_json(), run.outcome.result, run.profile, run.title, pictures)
 
 
 @contextmanager

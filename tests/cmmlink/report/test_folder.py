@@ -8,9 +8,20 @@ import pytest
 from cmmlink.errors import PlanError
 from cmmlink.events import Counts
 from cmmlink.report.folder import prepare, write_results
+from cmmlink.report.picture_processes import Pictures
 from cmmlink.result_json import result_json
 from inspection import NominalProfile
 from tests.cmmlink.judged_oval import bumped, inspect_oval
+
+
+def test_a_picture_that_another_process_draws_is_the_same(profile: NominalProfile, tmp_path: Path) -> None:
+    result, facts = inspect_oval(profile, bumped()), {"run": "7", "measured_at": "2026-11-27"}
+    with Pictures() as pictures:
+        pictures.start(1)
+        names = write_results(tmp_path / "beside", facts, result, profile, "oval", pictures)
+    assert (pictures.drawn_beside, pictures.drawn_here) == (1, 0)
+    assert write_results(tmp_path / "here", facts, result, profile, "oval") == names
+    assert all((tmp_path / "beside" / name).read_bytes() == (tmp_path / "here" / name).read_bytes() for name in names)
 
 
 def test_the_folder_holds_what_it_says(profile: NominalProfile, tmp_path: Path) -> None:

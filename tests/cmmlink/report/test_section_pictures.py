@@ -1,5 +1,6 @@
 """Pictures of sections drawn by other processes: the same ones, and all of them whatever becomes of a process."""
 
+import os
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -7,7 +8,8 @@ from typing import Any
 import pytest
 
 from cmmlink.report.picture import write_picture
-from cmmlink.report.section_pictures import SectionPictures, _Process
+from cmmlink.report.picture_processes import Pictures, _Process
+from cmmlink.report.section_pictures import SectionPictures
 from inspection import InspectionResult, NominalProfile
 from tests.cmmlink.judged_oval import bumped, inspect_oval
 
@@ -34,60 +36,64 @@ def drawn(pictures: SectionPictures, sections: list[Any], folder: Path) -> dict[
     return files
 
 
-def test_another_process_draws_the_same_pictures_and_this_one_none(sections: list[Any], tmp_path: Path) -> None:
-    with SectionPictures("blade", processes=1) as pictures:
-        pictures.expect(8)
+@pytest.fixture
+def begun(monkeypatch: pytest.MonkeyPatch) -> list[_Process]:
+    """The processes that were started, on a computer with two cores."""
+    processes: list[_Process] = []
+    start = _Process.__init__
+
+    def note(process: _Process) -> None:
+        start(process)
+        processes.append(process)
+
+    monkeypatch.setattr(_Process, "__init__", note)
+    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    return processes
+
+
+def test_another_process_draws_the_same_pictures_and_this_one_none(sections: list[Any], tmp_path: Path, begun: list[_Process]) -> None:
+    with Pictures() as pictures:
+        of_sections = SectionPictures("blade", pictures)
+        of_sections.expect(8)
         for each in sections:
-            pictures.begin(each)
-        beside = drawn(pictures, sections, tmp_path)
-    assert (pictures.drawn_beside, pictures.drawn_here) == (3, 0)
+            of_sections.begin(each)
+        beside = drawn(of_sections, sections, tmp_path)
+    assert (len(begun), pictures.drawn_beside, pictures.drawn_here) == (1, 3, 0)
     for name, content in beside.items():
         each = sections[int(name[0]) - 1]
         write_picture(each.run.result, each.profile, f"blade, height {each.slice.height_mm:g} mm", tmp_path / "own.png")
         assert content == (tmp_path / "own.png").read_bytes()
 
 
-def test_what_a_process_that_was_ended_has_not_drawn_is_drawn_here(
-    sections: list[Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    begun: list[_Process] = []
-    start = _Process.__init__
-
-    def note(process: _Process) -> None:
-        start(process)
-        begun.append(process)
-
-    monkeypatch.setattr(_Process, "__init__", note)
-    with SectionPictures("blade", processes=1) as pictures:
-        pictures.expect(8)
+def test_what_a_process_that_was_ended_has_not_drawn_is_drawn_here(sections: list[Any], tmp_path: Path, begun: list[_Process]) -> None:
+    with Pictures() as pictures:
+        of_sections = SectionPictures("blade", pictures)
+        of_sections.expect(8)
         begun[0]._child.kill()
         for each in sections:
-            pictures.begin(each)
-        assert len(drawn(pictures, sections, tmp_path)) == 3
+            of_sections.begin(each)
+        assert len(drawn(of_sections, sections, tmp_path)) == 3
     assert (pictures.drawn_beside, pictures.drawn_here) == (0, 3)
     assert not begun[0]._child.is_alive()
 
 
-def test_few_sections_are_not_worth_a_process(sections: list[Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_Process, "__init__", lambda _: pytest.fail("a process was started"))
-    with SectionPictures("blade", processes=4) as pictures:
-        pictures.expect(7)
-        pictures.begin(sections[0])
-        pictures.write(1, sections[0], tmp_path / "1.png")
-    assert pictures.drawn_here == 1
+def test_few_sections_and_one_core_are_not_worth_a_process(
+    sections: list[Any], tmp_path: Path, begun: list[_Process], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Pictures() as pictures:
+        of_sections = SectionPictures("blade", pictures)
+        of_sections.expect(7)
+        of_sections.begin(sections[0])
+        of_sections.write(1, sections[0], tmp_path / "1.png")
+        monkeypatch.setattr(os, "cpu_count", lambda: 1)
+        of_sections.expect(100)
+    assert (len(begun), pictures.drawn_here) == (0, 1)
 
 
-def test_the_processes_are_gone_when_the_pictures_are_no_longer_wanted(sections: list[Any], monkeypatch: pytest.MonkeyPatch) -> None:
-    begun: list[_Process] = []
-    start = _Process.__init__
-
-    def note(process: _Process) -> None:
-        start(process)
-        begun.append(process)
-
-    monkeypatch.setattr(_Process, "__init__", note)
-    with SectionPictures("blade", processes=2) as pictures:
-        pictures.expect(16)
-        pictures.begin(sections[0])  # and nobody waits for it
+def test_the_processes_are_gone_when_the_pictures_are_no_longer_wanted(sections: list[Any], begun: list[_Process]) -> None:
+    with Pictures() as pictures:
+        of_sections = SectionPictures("blade", pictures)
+        of_sections.expect(16)
+        of_sections.begin(sections[0])  # and nobody waits for it
     assert len(begun) == 2
     assert not any(process._child.exitcode is None for process in begun)
