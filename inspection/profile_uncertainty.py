@@ -172,11 +172,22 @@ def _samples_that_tell(nominal: NominalProfile) -> Rows:
 
 
 def uncertainty_at_fit(
-    points_mm: Array, nominal: NominalProfile, stated: StatedUncertainty, tip_radius_mm: float, weights: WeightName
+    points_mm: Array,
+    nominal: NominalProfile,
+    stated: StatedUncertainty,
+    tip_radius_mm: float,
+    weights: WeightName,
+    freedoms: Freedoms | None = None,
+    fixed_mm: ArrayLike | None = None,
 ) -> ProfileUncertainty:
-    """Uncertainty of the deviations of points (m, 2), given at their best fit, after which it depends on where and how dense they lie."""
+    """Uncertainty of the deviations of points (m, 2), given at their best fit, after which it depends on where and how dense they lie.
+
+    freedoms, fixed_mm : the motions that were fitted, and what stays where it is as the part grows: see `deviation_uncertainty`
+    """
     in_any_order = points_mm[np.lexsort(points_mm.T)]  # so that sums over them come out the same to the last bit
-    found = deviation_uncertainty(in_any_order, nominal, stated.budget, tip_radius_mm=tip_radius_mm, weights=weights)
+    found = deviation_uncertainty(
+        in_any_order, nominal, stated.budget, freedoms, fixed_mm=fixed_mm, tip_radius_mm=tip_radius_mm, weights=weights
+    )
     return _along(found, stated, "the best fit of the points", float(np.hypot(*np.ptp(points_mm, axis=0))))
 
 

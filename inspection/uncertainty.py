@@ -81,6 +81,7 @@ class DeviationUncertainty:
     parts_mm    : (n,) each, by name; their squares add up to that of `standard_mm`
     lever_mm    : (n,) how much a deviation changes where the part grows by its own size, after the fit
     left_mm     : (n,) known growth that was not taken out of the points, as it stands in the deviations
+    grown       : (3,) motion of the fit, likewise, where the part grows by its own size
     covariance  : (3, 3) P of the pose: shift in mm and rotation in rad about `pivot_mm`; zero in motions that are locked
     pivot_mm    : (2,)
     """
@@ -91,6 +92,7 @@ class DeviationUncertainty:
     parts_mm: dict[PartName, Array]
     lever_mm: Array
     left_mm: Array
+    grown: Array
     covariance: Array
     pivot_mm: Array
 
@@ -156,6 +158,7 @@ def deviation_uncertainty(
         {name: _spread(part, known, count) for name, part in found.parts_mm.items()},
         _spread(found.lever_mm, known, count),
         _spread(found.left_mm, known, count),
+        found.grown,
         found.covariance,
         found.pivot_mm,
     )
@@ -175,9 +178,10 @@ def propagate(
         parts[name], poses = np.sqrt(np.maximum(variance, 0.0)), poses + pose
     pose_mm = np.sqrt(np.maximum(((there.rates @ poses) * there.rates).sum(axis=1), 0.0))
     standard = np.sqrt(sum((np.square(part) for part in parts.values()), np.zeros(len(there.at))))
-    lever, _ = _carried(there, gain, _growth_of(there, fixed_mm), _growth_of(fit, fixed_mm))
+    lever, amounts = _carried(there, gain, _growth_of(there, fixed_mm), _growth_of(fit, fixed_mm))
     covariance = free.directions.T @ poses @ free.directions
-    return DeviationUncertainty(there.station, standard, pose_mm, parts, lever, budget.growth_left * lever, covariance, free.pivot_mm)
+    left, grown = budget.growth_left * lever, amounts @ free.directions
+    return DeviationUncertainty(there.station, standard, pose_mm, parts, lever, left, grown, covariance, free.pivot_mm)
 
 
 def _spread(values: Array, rows: NDArray[np.int64], count: int) -> Array:

@@ -17,6 +17,7 @@ from inspection.characteristics.section_value import SectionValue
 from inspection.curve import NurbsCurve
 from inspection.errors import InspectionError
 from inspection.filters import ProfileFilter
+from inspection.first_use import OnFirstUse
 from inspection.signed_deviations import Deviations
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ Array = NDArray[np.float64]
 
 _DEGREE = 3
 _KNOTS = 200  # on the outline, unless their distance is given
+_BETWEEN = 4  # places from knot to knot at which the noise left in the spline is looked at: where points are few it swings between knots
 _GAP_KNOTS = 2.0  # a stretch without points that is longer than this many knot distances is drawn by no point
 _BRIDGING = 1e-10  # weight of smoothness beside that of the points; it acts where there are none
 _CLOSEST = 0.2  # of the steps beside it: over a step shorter than this, round-off would bend the spline
@@ -42,6 +44,7 @@ class ActualSection:
     knots_mm  : distance of the knots of the spline of deviations
     points    : number of measured points that it was drawn from
     rms_mm    : root mean square of what the spline leaves of the deviations, weighted by arc length
+    noise     : (j,) share of the noise of single points that is left, the largest beside each of the stations of `knots_on`
     unseen_mm : (k, 2) stretches of stations without a measured point, from and to; a station beyond the nominal's length wraps
     is_unseen : (n,) which samples of the outline lie in one
     notes     : all this in words
@@ -53,6 +56,7 @@ class ActualSection:
     knots_mm: float
     points: int
     rms_mm: float
+    noise: OnFirstUse[Array]
     unseen_mm: Array
     is_unseen: NDArray[np.bool_]
     notes: tuple[str, ...]
@@ -118,7 +122,7 @@ def draw_actual_section(
     spacing = (end - start) / _KNOTS if knots_mm is None else float(knots_mm)
     if not 0 < spacing < (end - start) / 4:
         raise ValueError(f"the distance of knots must be positive and below a quarter of the outline, not {spacing:g} mm")
-    spline, rms = _draw_deviations(nominal, station, values, (start, end), spacing)
+    spline, rms, noise = _draw_deviations(nominal, station, values, (start, end), spacing)
     unseen = _find_unseen(station, (start, end), _GAP_KNOTS * spacing if gap_max_mm is None else gap_max_mm, nominal.trailing == "round")
     section = _move_outline(nominal, spline, start)
     at = section.parameter
@@ -129,7 +133,25 @@ def draw_actual_section(
     gaps = tuple(f"nothing was measured from station {a:.3f} to {b:.3f} mm" for a, b in unseen)
     idle = (f"{left} points took no part: beyond an end, at a corner or on the flat of the trailing edge, or without a filtered value",)
     notes = (f"{drawn}, which leaves {rms:.3g} mm rms", *(idle if left else ()), *gaps)
-    return ActualSection(section, nominal, source, spacing, len(station), rms, unseen, is_unseen, notes)
+    return ActualSection(section, nominal, source, spacing, len(station), rms, noise, unseen, is_unseen, notes)
+
+
+def knots_on(nominal: AirfoilSection) -> tuple[Array, Array]:
+    """Stations (k,) in mm at the distance of the knots of an actual section, from end to end of its outline, and their parameters (k,)."""
+    start, end = _station_range(nominal)
+    stations = np.linspace(start, end, _KNOTS + 1)
+    return stations, np.interp(stations, _stations(nominal, nominal.parameter, start), nominal.parameter)
+
+
+def move_section(nominal: AirfoilSection, station_mm: Array, moved_mm: Array) -> AirfoilSection:
+    """The section whose outline is the nominal one moved outward by `moved_mm` (k,) at stations (k,) from end to end, smoothly between."""
+    from scipy.interpolate import make_interp_spline  # noqa: PLC0415 - it takes half a second
+
+    if nominal.trailing == "round":
+        spline = make_interp_spline(station_mm, np.append(moved_mm[:-1], moved_mm[0]), k=_DEGREE, bc_type="periodic")
+    else:
+        spline = make_interp_spline(station_mm, moved_mm, k=_DEGREE)
+    return _move_outline(nominal, spline, float(station_mm[0]))
 
 
 def _station_range(nominal: AirfoilSection) -> tuple[float, float]:
@@ -156,8 +178,8 @@ def _stations(nominal: AirfoilSection, u: Array, start: float) -> Array:
 
 def _draw_deviations(
     nominal: AirfoilSection, station: Array, values: Array, ends: tuple[float, float], spacing: float
-) -> tuple["BSpline", float]:
-    """The spline of least squares over rising stations (m,), and the weighted root mean square of what it leaves."""
+) -> tuple["BSpline", float, OnFirstUse[Array]]:
+    """The spline of least squares over rising stations (m,), the weighted root mean square of what it leaves, and the noise left in it."""
     from scipy.interpolate import BSpline  # noqa: PLC0415 - it takes half a second, and a plan knows only names of this file
     from scipy.sparse import csr_array, diags_array  # noqa: PLC0415
     from scipy.sparse.linalg import spsolve  # noqa: PLC0415
@@ -177,7 +199,16 @@ def _draw_deviations(
     coefficients = spsolve(normal_matrix.tocsc(), basis.T @ (weight * values))
     rest = values - basis @ coefficients
     rms = float(np.sqrt((weight * rest * rest).sum() / weight.sum()))
-    return BSpline(knots, np.asarray(fold @ coefficients), _DEGREE), rms
+
+    def noise() -> Array:
+        places = np.linspace(start, np.nextafter(end, start), _KNOTS * _BETWEEN + 1)
+        there = csr_array(BSpline.design_matrix(places, knots, _DEGREE)) @ fold
+        gains = np.linalg.solve(normal_matrix.toarray(), there.toarray().T)  # (columns, places) of the values there by sums over the points
+        squares = (basis.T @ (basis * np.square(weight)[:, None])).toarray()
+        left = np.sqrt(np.maximum(((squares @ gains) * gains).sum(axis=0), 0.0))
+        return np.array([left[max(at - _BETWEEN, 0) : at + _BETWEEN + 1].max() for at in range(0, len(places), _BETWEEN)])
+
+    return BSpline(knots, np.asarray(fold @ coefficients), _DEGREE), rms, OnFirstUse(noise)
 
 
 def _arc_shares(station: Array, ends: tuple[float, float], is_round: bool) -> Array:

@@ -7,10 +7,12 @@ everything that the number depends on: a value without its method is none.
 from dataclasses import dataclass
 from typing import Literal
 
+from inspection.characteristics.error_fields import Sensitivities
 from inspection.characteristics.outline import AirfoilSection, Edge
 from inspection.characteristics.section_value import SectionValue, Unit
 from inspection.conclusion import Reason
 from inspection.filters import ProfileFilter
+from inspection.first_use import OnFirstUse
 from inspection.freedoms import Freedoms
 from inspection.methods import RuleName
 from inspection.rigid import RigidTransform
@@ -91,6 +93,7 @@ class SectionCharacteristic:
     type     : what it is, and `method` by which method; `edge`, `offset_mm`, `window_deg`, `axis` and `place_mm` as its method needs
     nominal_value : what the deviation is counted from: the value of the drawing; NaN for that of the nominal section
     section, nominal : the nominal section, and its value by the same method; filled in by `with_nominal`
+    sensitivities : of the value to errors of the points, likewise; None where the pose of the best fit gives it
     lower, upper : limits of the deviation, in the unit of the value; infinite where there is none
     uncertainty  : expanded uncertainty U of the value
     datum    : the known pose, from section to nominal, that angles and places are counted from; None where there is none
@@ -113,6 +116,7 @@ class SectionCharacteristic:
     filter: ProfileFilter | None = None
     section: AirfoilSection | None = None
     nominal: SectionValue | None = None
+    sensitivities: OnFirstUse[Sensitivities] | None = None
 
 
 Characteristic = WholeProfile | LineProfile | SectionCharacteristic

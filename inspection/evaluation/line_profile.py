@@ -16,9 +16,9 @@ from inspection.cloud import MANY, row_blocks
 from inspection.conclusion import Conclusion, Reason, word_points
 from inspection.evaluation.basis import Basis, filter_deviations
 from inspection.evaluation.placing import Placed, certify_run, consume_least, is_constant, place, place_so_far, shrink_zone
+from inspection.evaluation.region_uncertainty import uncertainty_of
 from inspection.gaps import Measured
 from inspection.placements import PlacementSearch
-from inspection.profile_uncertainty import uncertainty_along, uncertainty_at_fit
 from inspection.rigid import RigidTransform
 from inspection.tolerance import DecisionRule, ToleranceZone, decision_words
 from inspection.verdict import Verdict
@@ -103,7 +103,7 @@ def judge_profile(asked: LineProfile, basis: Basis) -> CharacteristicResult:
     rows = basis.rows(asked.region)
     few = basis.few(rows)
     placed = place(asked, basis, few)
-    asked = replace(asked, uncertainty_mm=_uncertainty_mm(asked, basis, few, placed))
+    asked = replace(asked, uncertainty_mm=uncertainty_of(asked, basis, few, placed))
     seen = _see(asked, basis, rows, placed.pose)
     placed, seen, points, why = _decide(asked, basis, rows, few, placed, seen)
     measured = basis.measured(asked.region)
@@ -164,25 +164,6 @@ def _result(
 def _u(asked: LineProfile) -> float:
     """The expanded uncertainty of one deviation."""
     return asked.uncertainty_mm or 0.0
-
-
-def _uncertainty_mm(asked: LineProfile, basis: Basis, few: Rows, placed: Placed) -> float:
-    """U of one deviation: that of the characteristic, or what is stated for the run, at the pose where it is judged.
-
-    At a datum the errors that a free fit takes away count in full, and after a best fit that decides alone what it brings in.
-    """
-    whole = basis.result.zone.uncertainty_mm
-    if asked.uncertainty_mm is not None:
-        return asked.uncertainty_mm
-    if basis.terms.uncertainty is None:
-        return whole
-    stated = basis.terms.uncertainty.stated
-    if asked.datum is not None and not placed.is_free and asked.fit != "none":
-        return max(whole, uncertainty_along(basis.nominal, stated, asked.datum).largest_mm)
-    if asked.rule == "best-fit" and asked.fit == "best-fit" and len(few) > _FEWEST_POINTS:
-        points = placed.pose.apply(basis.result.section_at(few))
-        return max(whole, uncertainty_at_fit(points, basis.nominal, stated, basis.terms.tip_radius_mm, basis.terms.weights).largest_mm)
-    return whole
 
 
 def zone_words(lower_mm: float, upper_mm: float) -> str:

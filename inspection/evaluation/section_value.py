@@ -23,6 +23,7 @@ from inspection.characteristics.characteristic import (
 )
 from inspection.characteristics.chord import ChordAngleMethod, ChordMethod, chord, chord_angle
 from inspection.characteristics.edge_radius import EdgeRadiusMethod, edge_radius
+from inspection.characteristics.error_fields import MovedOutlines
 from inspection.characteristics.inscribed import CamberLine, find_camber_line
 from inspection.characteristics.outline import AirfoilSection
 from inspection.characteristics.placement import displacement, twist_by_fit
@@ -32,7 +33,9 @@ from inspection.conclusion import Reason
 from inspection.errors import InspectionError
 from inspection.evaluation.basis import Basis, filter_deviations
 from inspection.evaluation.region import features_of, region_around
+from inspection.evaluation.value_uncertainty import LINEARISED, OF_POSE, uncertainty_of_placing, uncertainty_of_value
 from inspection.filters import ProfileFilter
+from inspection.first_use import OnFirstUse
 from inspection.freedoms import Freedoms
 from inspection.gaps import Measured
 from inspection.limited_fit import register_within
@@ -65,6 +68,7 @@ class Outline:
 
     def __init__(self, section: AirfoilSection) -> None:
         self.section = section
+        self.moved = OnFirstUse(lambda: MovedOutlines(section, Outline))
         self._camber: CamberLine | None = None
 
     @property
@@ -105,7 +109,16 @@ def with_nominal(asked: SectionCharacteristic, nominal: Callable[[], Outline]) -
         found = _MEASURES[asked.type](nominal(), asked)
     drawn = 0.0 if asked.type == "twist" else found.value
     value = drawn if math.isnan(asked.nominal_value) else asked.nominal_value
-    return replace(asked, section=section, nominal=found, nominal_value=value)
+    asked = replace(asked, section=section, nominal=found, nominal_value=value)
+    measure = _measure_of(asked)
+    return replace(asked, sensitivities=OnFirstUse(lambda: nominal().moved.value.sensitivities(measure)) if measure is not None else None)
+
+
+def _measure_of(asked: SectionCharacteristic) -> Callable[[Outline], float] | None:
+    """How the number is measured on an outline; None where it is not."""
+    if asked.type == "twist" and asked.method != "best-fit":
+        return lambda of: chord_angle(of.section, of.camber, cast(ChordAngleMethod, asked.method)).value
+    return (lambda of: _MEASURES[asked.type](of, asked).value) if asked.type in _MEASURES else None
 
 
 class ActualOutlines:
@@ -141,13 +154,16 @@ def judge_value(asked: SectionCharacteristic, basis: Basis, outlines: ActualOutl
     """A number of the section with its limits, its deviation and its verdict."""
     nominal = asked.nominal
     assert nominal is not None
+    by_budget = basis.terms.uncertainty is not None and not asked.uncertainty
     try:
         if asked.type in PLACED and asked.datum is None:
             raise InspectionError(_NO_DATUM)
         value, actual = _find(asked, basis, outlines)
+        asked = replace(asked, uncertainty=_uncertainty(asked, basis, outlines, value, actual))
     except InspectionError as error:
         conclusion = basis.conclude(Verdict.UNCERTAIN, Reason("no-value", _sentence(str(error))), basis.measured(None), basis.result.judged)
         return replace(_bare(asked, nominal, basis), verdict=conclusion.verdict, reasons=conclusion.reasons)
+    how = (LINEARISED if actual is not None else OF_POSE,) if by_budget else ()
     deviation = value.value - asked.nominal_value
     deviation = angle_within_half_a_turn(deviation) if nominal.unit == "deg" else deviation
     measured = _measured(asked, basis, value, actual)
@@ -166,7 +182,7 @@ def judge_value(asked: SectionCharacteristic, basis: Basis, outlines: ActualOutl
         coverage=measured.coverage,
         gap_mm=measured.gap.length_mm,
         places_mm=places,
-        notes=(*value.notes, *(actual.notes[:1] if actual is not None else ())),
+        notes=(*value.notes, *(actual.notes[:1] if actual is not None else ()), *how),
     )
 
 
@@ -210,6 +226,21 @@ def _find(asked: SectionCharacteristic, basis: Basis, outlines: ActualOutlines) 
         return replace(angle, value=turned), actual
     assert asked.nominal is not None
     return replace(angle, name="twist", value=angle_within_half_a_turn(turned - asked.nominal.value)), actual
+
+
+def _uncertainty(
+    asked: SectionCharacteristic, basis: Basis, outlines: ActualOutlines, value: SectionValue, actual: ActualSection | None
+) -> float:
+    """U of a value: its own where the characteristic states one, else that of the budget of the run."""
+    if basis.terms.uncertainty is None or asked.uncertainty:
+        return asked.uncertainty
+    stated = basis.terms.uncertainty.stated
+    if actual is None or asked.sensitivities is None:
+        moved = value.places_mm[1] - value.places_mm[0] if len(value.places_mm) else np.zeros(2)
+        along = np.eye(2)[_AXES[asked.axis]] if asked.axis != "total" else moved
+        return uncertainty_of_placing(asked, basis, outlines.best_fit().nominal_from_section, along, stated)
+    is_known = asked.type in PLACED or basis.terms.known_pose is not None
+    return uncertainty_of_value(asked.sensitivities.value, is_known, basis, actual, stated)
 
 
 def _measured(asked: SectionCharacteristic, basis: Basis, value: SectionValue, actual: ActualSection | None) -> Measured:
