@@ -121,6 +121,14 @@ def _lowest(rows: list[Array], lots: list[NDArray[np.uint64]], most: int) -> tup
     return [every[drawn]], [lot[drawn]]
 
 
+def drawn_rows(blocks: Iterable[Array], most: int = MANY) -> NDArray[np.int64]:
+    """The numbers, rising, of at most so many rows that come piece by piece (k, c), drawn as `few_of` draws them."""
+    lots = np.concatenate([_lots(block) for block in blocks])
+    if len(lots) <= most:
+        return np.arange(len(lots))
+    return np.sort(np.argpartition(lots, most - 1)[:most])
+
+
 def _lots(rows: Array) -> NDArray[np.uint64]:
     """A number for each of the rows (k,) or (k, c) that follows from its values, and is spread evenly over all numbers of 64 bits."""
     lots = np.zeros(len(rows), dtype=np.uint64)

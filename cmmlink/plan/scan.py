@@ -4,6 +4,7 @@ Relative paths are relative to the plan's own folder. Every field says in its de
 from these descriptions. A further device is a further model with its own `type`, added to the union `Device`.
 """
 
+import re
 from collections.abc import Callable
 from math import hypot
 from pathlib import Path
@@ -305,8 +306,9 @@ def load_plan(path: Path) -> Plan:
 
 
 def place_of(path: Path, key: str) -> str:
-    """Where a key of a plan stands, for messages about its value: file, line and key."""
-    return f"{path}: line {line_of(read_text(path), key)}: {key}"
+    """Where a key of a plan stands, for messages about its value: file, line and key; that of an item of a list ends in its number."""
+    shown = re.sub(r"[.]([0-9]+)", r"[\1]", key)
+    return f"{path}: line {line_of(read_text(path), key)}: {shown}"
 
 
 def with_own_maps(device: Device, replaced: Callable[[Path], str | dict[str, Any]]) -> Device:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inspection.characteristics.characteristic import Region
-from inspection.cloud import MANY
+from inspection.cloud import MANY, drawn_rows, row_blocks
 from inspection.conclusion import Conclusion, Missing, Reason, conclude
 from inspection.evaluation.region import is_inside
 from inspection.filters import FilteredProfile, ProfileFilter, filter_profile
@@ -60,10 +60,20 @@ class Basis:
             judged &= is_inside(self.result.station_mm, region)
         return np.flatnonzero(judged)
 
+    def drawn(self, rows: Rows) -> Rows:
+        """The same rows in such an order; of very many some that are drawn by their coordinates and stand for the others on average."""
+        if len(rows) > MANY:
+            rows = rows[drawn_rows(self.result.section_at(rows[part]) for part in row_blocks(len(rows)))]
+        return self._in_any_order(rows)
+
     def few(self, rows: Rows) -> Rows:
         """The rows (k,) in an order that does not depend on when they came; of very many those that tell how far all of them go."""
         if len(rows) > MANY:
             rows = rows[telling_rows(self.result.station_mm[rows], self.result.deviation_mm[rows], self.nominal.length_mm, _SHARES)]
+        return self._in_any_order(rows)
+
+    def _in_any_order(self, rows: Rows) -> Rows:
+        """The rows (k,) in an order that does not depend on when they came."""
         points = self.result.section_at(rows)
         return rows[np.lexsort((points[:, 1], points[:, 0]))]
 

@@ -102,7 +102,7 @@ def judge_profile(asked: LineProfile, basis: Basis) -> CharacteristicResult:
     """A line profile with what was found of it, and its verdict."""
     rows = basis.rows(asked.region)
     few = basis.few(rows)
-    placed = place(asked, basis, few)
+    placed = place(asked, basis, rows, few)
     asked = replace(asked, uncertainty_mm=uncertainty_of(asked, basis, few, placed))
     seen = _see(asked, basis, rows, placed.pose)
     placed, seen, points, why = _decide(asked, basis, rows, few, placed, seen)
@@ -199,7 +199,7 @@ def _see_filtered(asked: LineProfile, basis: Basis, rows: Rows, pose: RigidTrans
     """The same with filtered deviations. Where the filter gives no value, the gap speaks for itself."""
     assert asked.filter is not None
     if len(rows) > MANY:
-        rows = basis.few(rows)
+        rows = basis.drawn(rows)
     d = basis.deviations_at(rows, pose)
     filtered = filter_deviations(d, basis.nominal, asked.filter)
     notes = () if filtered.settled else ("the robust filter's limit did not settle",)

@@ -53,27 +53,28 @@ class Placed:
     certificate: ZoneCertificate | ConsumptionCertificate | None = None
 
 
-def place(asked: LineProfile, basis: Basis, rows: Rows) -> Placed:
-    """Find the pose of a characteristic from the rows (k,) of its region, in any order."""
+def place(asked: LineProfile, basis: Basis, every: Rows, rows: Rows) -> Placed:
+    """Find the pose of a characteristic from all rows of its region, and from those (k,) of them that tell how far they go."""
     if asked.fit == "none" or len(rows) < _FEWEST_POINTS:
         return Placed(basis.pose, "none", is_known=basis.terms.known_pose is not None)
     start = basis.pose if asked.datum is None else asked.datum
     start_known = asked.datum is not None or basis.terms.known_pose is not None
     if asked.fit == "datum":
         return Placed(start, "datum", is_known=start_known)
-    points = basis.result.section_at(rows)
-    freedoms = asked.freedoms or _all_free(points, start)
+    drawn = basis.drawn(every)
+    freedoms = asked.freedoms or _all_free(basis.result.section_at(drawn), start)
     best = register_within(
-        points,
+        basis.result.section_at(drawn),
         basis.nominal,
         start,
         freedoms,
         basis.terms.method,
         basis.terms.tip_radius_mm,
-        target_mm=middle_of(asked.zone, basis, rows),
+        target_mm=middle_of(asked.zone, basis, drawn),
         weights=basis.terms.weights,
-        shares=basis.shares(rows) if asked.region is not None else None,
+        shares=basis.shares(drawn) if asked.region is not None else None,
     )
+    points = basis.result.section_at(rows)
     words, free = _words(asked), asked.freedoms is None
     if asked.fit == "best-fit":
         registration = best.registration
@@ -95,8 +96,8 @@ def place(asked: LineProfile, basis: Basis, rows: Rows) -> Placed:
 def place_so_far(asked: LineProfile, basis: Basis, rows: Rows) -> Placed:
     """The same while the scan still runs: nothing is proven of other placements, so that it takes milliseconds."""
     if asked.fit in ("none", "datum", "best-fit") or len(rows) < _FEWEST_POINTS:
-        return place(asked, basis, rows)
-    near, points = place(replace(asked, fit="best-fit"), basis, rows).pose, basis.result.section_at(rows)
+        return place(asked, basis, rows, rows)
+    near, points = place(replace(asked, fit="best-fit"), basis, rows, rows).pose, basis.result.section_at(rows)
     limited_from = None if asked.freedoms is None else asked.datum or basis.pose
     if asked.fit == "tolerance":
         pose = consume_least(asked, basis, points, near, limited_from).nominal_from_section

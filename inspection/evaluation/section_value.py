@@ -133,7 +133,7 @@ class ActualOutlines:
         """The actual section as a characteristic wants it. Raises InspectionError where too few points lie on it."""
         assert asked.section is not None
         if asked.filter not in self._drawn:
-            d = self._basis.deviations_at(self._basis.few(self._basis.rows(None)), self._basis.pose)
+            d = self._basis.deviations_at(self._basis.drawn(self._basis.rows(None)), self._basis.pose)
             filtered = None if asked.filter is None else filter_deviations(d, self._basis.nominal, asked.filter).waviness_mm.copy()
             actual = draw_actual_section(asked.section, d, filtered, asked.filter, gap_max_mm=self._basis.result.gap_max_mm)
             self._drawn[asked.filter] = actual, Outline(actual.section)
@@ -143,7 +143,7 @@ class ActualOutlines:
         """The best fit of all points, from the pose of the run on."""
         if self._fit is None:
             basis, terms = self._basis, self._basis.terms
-            points = basis.result.section_at(basis.few(basis.rows(None)))
+            points = basis.result.section_at(basis.drawn(basis.rows(None)))
             free = Freedoms.about(basis.pose.apply(points).mean(axis=0))
             settings = (terms.method, terms.tip_radius_mm, terms.target_mm, terms.weights)
             self._fit = register_within(points, basis.nominal, basis.pose, free, *settings).registration

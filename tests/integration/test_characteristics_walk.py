@@ -1,4 +1,4 @@
-"""A drawing with twelve characteristics, measured from a file: every number found again from deviations.csv by other code.
+"""The drawing of docs/characteristics.md with its twelve, measured from a file: every number found again from deviations.csv by other code.
 
 What finds it again knows the nominal as a dense polygon, points, and least squares; it shares no line with the inspection.
 """
@@ -28,28 +28,8 @@ from tests.inspection import profiles
 Array = NDArray[np.float64]
 
 COUNT = 1500
-PLAN = """\
-part: {name: blade}
-nominal: {file: blade.yaml}
-device: {type: file, file: points.npy}
-discretisation: {samples: 1500}
-records: kept
-registration: {datum: {rotation_deg: 20.0, translation_mm: [5.0, -3.0]}}
-characteristics:
-  - {name: contour, type: line-profile, zone: {lower_mm: -0.05, upper_mm: 0.05}, fit: minimum-zone}
-  - {name: LE form, type: line-profile, region: LE, within_mm: 15, zone: 0.06 UZ +0.01, fit: best-fit, rule: best-fit}
-  - {name: flank, type: line-profile, from: {near: [70, 8]}, to: {feature: LE, offset_mm: -20}, zone: {width_mm: 0.12}, fit: none}
-  - {name: location, type: line-profile, zone: {lower_mm: -0.09, upper_mm: 0.09}, fit: datum}
-  - {name: varying, type: line-profile, fit: tolerance, zone: {stations_mm: [0, 60, 120, 180], lower_mm: [-0.04, -0.06, -0.04, -0.03], \
-upper_mm: [0.04, 0.04, 0.05, 0.03]}}
-  - {name: waviness, type: line-profile, zone: {lower_mm: -0.05, upper_mm: 0.05}, fit: none, filter: {cutoff_mm: 8, order: 0}}
-  - {name: chord, type: chord, method: tangent, lower_mm: -0.1, upper_mm: 0.1}
-  - {name: thickness, type: thickness, lower_mm: -0.1, upper_mm: 0.1}
-  - {name: LE radius, type: edge-radius, window_deg: 40, lower_mm: -0.1, upper_mm: 0.1, uncertainty_mm: 0.01}
-  - {name: camber, type: camber, lower_mm: -0.08, upper_mm: 0.08}
-  - {name: twist, type: twist, lower_deg: -0.02, upper_deg: 0.02}
-  - {name: displacement, type: displacement, place_mm: [40, 3], axis: x, lower_mm: -0.1, upper_mm: 0.1}
-"""
+PAGE = (Path(__file__).resolve().parents[2] / "docs" / "characteristics.md").read_text(encoding="utf-8")
+PLAN = PAGE.split("```yaml\n")[1].split("```")[0] + "discretisation: {samples: 1500}\nrecords: kept\n"
 MOVED_DEG, MOVED_MM = 0.05, np.array([0.03, -0.02])
 
 

@@ -100,7 +100,7 @@ MISTAKES = {
     ),
     "unknown section": (
         SHORT + "colour: red\n",
-        "line 7: colour is not a known key; Allowed: rule, weights, gap_max_mm, end_allowance_mm, allow, characteristics, tolerance, part,",
+        "line 7: colour is not a known key; Allowed: rule, weights, gap_max_mm, end_allowance_mm, allow, characteristics, tolerance,",
     ),
     "missing key": (SHORT.replace("  upper_mm: 0.05\n", ""), "line 3: tolerance.upper_mm is missing: expected the upper limit"),
     "missing section": (
