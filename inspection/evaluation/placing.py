@@ -87,9 +87,8 @@ def place(asked: LineProfile, basis: Basis, every: Rows, rows: Rows) -> Placed:
     if not free:
         zone = shrink_zone(asked, basis, points, start)
         return Placed(zone.nominal_from_section.snap_to_grid(), words, False, False, zone.converged)
-    certificate = _certify(
-        basis, points, best.registration, middle_of(asked.zone, basis, rows), asked.zone.upper_mm[0] - asked.zone.lower_mm[0]
-    )
+    gap_mm = float(asked.zone.upper_mm[0] - asked.zone.lower_mm[0]) * (_GAP_SHARE if asked.region is None else _GAP_SHARE_REGION)
+    certificate = _certify(basis, points, best.registration, middle_of(asked.zone, basis, rows), gap_mm)
     return Placed(certificate.nominal_from_section.snap_to_grid(), words, False, True, certificate.balanced, _in_run(certificate, rows))
 
 

@@ -59,6 +59,8 @@ def test_a_minimum_zone_is_the_printed_one_with_its_points_and_its_proof(name: s
     assert isinstance(proof, ZoneCertificate)
     assert proof.active.tolist() == rows
     assert proof.proven
+    assert 0 < proof.gap_mm <= 1e-3 * 0.1
+    assert proof.boxes > 1000
     assert proof.balanced
     assert found.verdict is Verdict.CONFORM
 
