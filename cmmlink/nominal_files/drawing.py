@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 _FLAT = 1e-6  # of the size: how far a plane curve may leave its plane
 _LYING = 0.5  # the z of a normal: planes whose normal has more are looked at from above
 _SHOWN = 8
+_DIGITS = 9
 _ROUNDS = 20
 _SMALLEST_MM, _LARGEST_MM = 1e-2, 1e6
 _OPEN = 0.25  # of the size: a chain with a larger gap between its ends is an open profile
@@ -73,8 +74,8 @@ def nominal_of(drawing: Drawing, choice: Choice, scale: float | None, closed: bo
 
     Raises NominalError, with the list of the chains, where none or several can be meant.
     """
-    factor, unit_note = _factor(drawing, scale)
     pieces = _on_layer(drawing, choice.layer)
+    factor, unit_note = _factor(drawing, scale)
     found = chains_of([_scaled(piece, factor) for piece in pieces])
     chain = _chosen(found, choice, closed, drawing.has_layers)
     _refuse_gap(chain, closed)
@@ -153,8 +154,8 @@ def _words(chain: Chain, has_layers: bool) -> str:
 
 
 def _place(point: Array) -> str:
-    told = point if abs(point[2]) > 0 else point[:2]
-    return f"({', '.join(f'{value:.6g}' for value in told + 0.0)})"
+    told = np.round(point, _DIGITS) + 0.0  # no -0, and no 2e-16 of rounding
+    return f"({', '.join(f'{value:.6g}' for value in (told if told[2:].any() else told[:2]))})"
 
 
 def _refuse_gap(chain: Chain, closed: bool | None) -> None:
@@ -199,11 +200,10 @@ def _flat_curve(
         whole.degree, flat, whole.knots, None if np.all(weights == 1.0) else weights, closed=chain.closed and closed is not False
     )
     start, end = curve.point(np.array(curve.domain))
-    told = f"({start[0]:.6g}, {start[1]:.6g})"
     if chain.closed:
-        notes.append(f"runs counter-clockwise from {told}" + (", open as asked" if closed is False else ""))
+        notes.append(f"runs counter-clockwise from {_place(start)}" + (", open as asked" if closed is False else ""))
     else:
-        notes.append(f"open: runs from {told} to ({end[0]:.6g}, {end[1]:.6g})")
+        notes.append(f"open: runs from {_place(start)} to {_place(end)}")
     return curve, plane, notes
 
 

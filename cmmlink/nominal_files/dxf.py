@@ -42,6 +42,7 @@ _UNITS: Final = {
 _DEEPEST = 12  # blocks in blocks
 _MOST = 200_000  # entities, those of blocks as often as they are placed
 _MAGIC = 6  # bytes that tell a DWG file, like AC1032
+_TAIL = 200  # bytes in which the end mark stands
 _FRAME = 16  # flag of a vertex that is not on the curve but holds it
 _RELEASES: Final = {
     "AC1009": "r12",
@@ -67,7 +68,9 @@ def draw(path: Path, section: SectionPlane | None) -> Drawing:
             _take(entity, layer, pieces, left_out, document)
             if len(pieces) + len(left_out) > _MOST:
                 raise NominalError(f"holds more than {_MOST} entities; expected a drawing of a profile: export it alone")
-    except _foreign_errors() as error:
+    except NominalError:
+        raise
+    except Exception as error:  # ezdxf raises what Python does where a value is not what it expects: one sentence comes of it
         raise NominalError(f"is damaged: {_told(error)}; export it again") from None
     if left_out:
         notes.append(f"left out: {counted_names(left_out)}")
@@ -78,9 +81,13 @@ def draw(path: Path, section: SectionPlane | None) -> Drawing:
 
 def _document(path: Path) -> "tuple[Document, list[str]]":
     """The drawing as ezdxf reads it, and what it had to mend."""
-    start = read_bytes(path, _MAGIC)
-    if start[:2] == b"AC" and start[2:].isdigit():
+    content = read_bytes(path)
+    if content[:2] == b"AC" and content[2:_MAGIC].isdigit():
         raise NominalError("is a DWG file, not DXF; export the drawing as DXF")
+    if (
+        b"SECTION" in content and b"EOF" not in content[-_TAIL:]
+    ):  # ezdxf would read what is left of it, and curves would be missing silently
+        raise NominalError("has no end (EOF); expected a whole DXF drawing: it is cut off")
     from ezdxf import recover  # noqa: PLC0415 - half a second, for drawings only
     from ezdxf.filemanagement import readfile  # noqa: PLC0415
 
@@ -88,22 +95,15 @@ def _document(path: Path) -> "tuple[Document, list[str]]":
     logger.addHandler(logging.NullHandler())
     try:
         return readfile(path), []
-    except _foreign_errors():
-        pass
+    except Exception as error:  # its own errors, and whatever Python raises on damaged values; then it is asked to recover the file
+        logger.debug("not read at once: %s", error)
     try:
         document, auditor = recover.readfile(path)
-    except _foreign_errors() as error:
+    except Exception as error:  # as above
         raise NominalError(f"is no DXF drawing that can be read: {_told(error)}; export it again") from None
     lost = [problem.message for problem in (*auditor.errors, *auditor.fixes)]
     told = f" ({shorten(lost[0])}{f', and {len(lost) - 1} more' if len(lost) > 1 else ''})" if lost else ""
     return document, [f"the file is damaged and was mended by ezdxf{told}"]
-
-
-def _foreign_errors() -> tuple[type[Exception], ...]:
-    """What ezdxf raises for damaged files: its own errors, and whatever Python raises where a value is not what it expects."""
-    from ezdxf.lldxf.const import DXFError  # noqa: PLC0415
-
-    return (DXFError, ArithmeticError, AssertionError, AttributeError, LookupError, OSError, RuntimeError, TypeError, ValueError)
 
 
 def _told(error: Exception) -> str:

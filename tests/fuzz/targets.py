@@ -32,6 +32,9 @@ from drivers.codecs.register_decoder import RegisterDecoder
 from drivers.surface import read_obj, read_stl
 from drivers.surface.ply_header import faces_announced, header_of, readable
 from inspection import InspectionError, discretize
+from tests.cmmlink.nominal_files.iges_text import iges, wire_entities
+from tests.cmmlink.nominal_files.test_dxf import draw_wire
+from tests.cmmlink.nominal_files.test_dxf import new as new_drawing
 from tests.cmmlink.oval_part import oval_points, write_nominal
 from tests.cmmlink.recorded import Script, record, scan_arrivals, today
 from tests.drivers.codecs.test_every_codec import MAPS, OPTIONS, talk
@@ -93,6 +96,13 @@ def _nominal(path: Path) -> None:
     curve = load_nominal(path).curve
     if len(curve.control_points_mm) < 2000:
         discretize(curve, samples=400)
+
+
+def _dxf() -> list[bytes]:
+    document, stream = new_drawing("R2000"), io.StringIO()
+    draw_wire(document.modelspace())
+    document.write(stream)
+    return [stream.getvalue().encode()]
 
 
 def _yaml_nominal() -> list[bytes]:
@@ -314,6 +324,8 @@ TARGETS: dict[str, Target] = {
     "npy": Target(_npy, (*ANY, change_npy, change_npy, change_npy), _file(read_points, ".npy"), (PointFileError,)),
     "dat": Target(_dat, TEXT, _file(_nominal, ".dat"), (InspectionError,)),
     "csv-nominal": Target(lambda: [_oval_text()], TEXT, _file(_nominal, ".csv"), (InspectionError,)),
+    "dxf": Target(_dxf, TEXT, _file(_nominal, ".dxf"), (InspectionError,)),
+    "iges": Target(lambda: [iges(wire_entities()).encode()], TEXT, _file(_nominal, ".igs"), (InspectionError,)),
     "yaml-nominal": Target(_yaml_nominal, TREE, _file(_nominal, ".yaml"), (InspectionError,)),
     "stl": Target(_stl, (*TEXT, change_stl, change_stl, change_stl), _file(read_stl, ".stl"), (MeshError,)),
     "obj": Target(_obj, TEXT, _file(read_obj, ".obj"), (MeshError,)),
