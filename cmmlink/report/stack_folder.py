@@ -17,6 +17,7 @@ from cmmlink.result_files import new_files
 from cmmlink.result_folder import make_room
 from cmmlink.result_keys import SectionInspected
 from cmmlink.stack import SectionOutcome, StackOutcome
+from cmmlink.uncertainty_tables import write_uncertainty
 from drivers.surface import Contour
 from inspection import ToleranceZone
 
@@ -83,6 +84,8 @@ def write_stack(
                 result = section.run.result
                 if result is not None and result.judged:
                     write_deviations(result.blocks(), files(f"{own}/deviations.csv"), section.run.ending)
+                    if result.uncertainty is not None:
+                        write_uncertainty(result.uncertainty, files(f"{own}/uncertainty.csv"))
                     if pictures is not None:
                         pictures.write(number, section, files(f"{own}/profile.png"))
                 on_section()

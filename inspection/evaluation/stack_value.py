@@ -6,6 +6,7 @@ sound sections prove to be out of tolerance stays proven, whatever the others ar
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -22,6 +23,7 @@ from inspection.characteristics.stack_characteristic import (
     StackCharacteristicResult,
 )
 from inspection.conclusion import Reason
+from inspection.evaluation.stack_uncertainty import ADDED, uncertainty_of_stack
 from inspection.rigid import RigidTransform
 from inspection.tolerance import DecisionRule, decision_words
 from inspection.verdict import Verdict
@@ -74,12 +76,15 @@ def _judge(
     if values.unit == "deg":
         deviation = np.array([angle_within_half_a_turn(one) if math.isfinite(one) else math.nan for one in deviation.tolist()])
     proven = np.isfinite(deviation) & (sound | ~values.needs).all(axis=1)
+    uncertainty = _uncertainty(asked, sections, len(deviation))
+    guards = np.zeros(len(deviation)) if decision == "simple" else uncertainty
     verdicts = [
-        verdict_of(one, asked.lower, asked.upper, 0.0 if decision == "simple" else asked.uncertainty) if is_proven else Verdict.UNCERTAIN
-        for one, is_proven in zip(deviation.tolist(), proven.tolist(), strict=True)
+        verdict_of(one, asked.lower, asked.upper, guard) if is_proven else Verdict.UNCERTAIN
+        for one, is_proven, guard in zip(deviation.tolist(), proven.tolist(), guards.tolist(), strict=True)
     ]
     verdict = max(verdicts) if lost is None else max(*verdicts, Verdict.UNCERTAIN)
     worst = _worst(deviation, verdicts, asked)
+    asked, added = replace(asked, uncertainty=float(np.nan_to_num(uncertainty[worst]))), not asked.uncertainty and uncertainty[worst] > 0
     heights = [section.height_mm for section in sections] if len(verdicts) == len(sections) else []
     at = heights[worst] if heights else math.nan
     told = [] if lost is None else [lost]
@@ -103,10 +108,22 @@ def _judge(
         reasons=reasons,
         fit="none" if asked.type == "taper" else "datum" if asked.datum is not None else "best fit of each section",
         region_words="stack" if not heights else "each section",
-        notes=values.notes,
+        notes=(*values.notes, ADDED) if added else values.notes,
     )
     rows = zip(heights, values.value.tolist(), deviation.tolist(), verdicts, strict=True) if heights else ()
     return StackCharacteristicResult(found, at, tuple(SectionShare(*row) for row in rows))
+
+
+def _uncertainty(asked: StackCharacteristic, sections: Sequence[MeasuredSection], count: int) -> Array:
+    """U of each of so many values: its own where the characteristic states one, else what follows from that of the sections."""
+    if asked.uncertainty:
+        return np.full(count, asked.uncertainty)
+    heights = np.array([section.height_mm for section in sections])
+    root, tip = _section_at(heights, asked.root_mm, 0), _section_at(heights, asked.tip_mm, -1)
+    reference = _section_at(heights, asked.reference_mm, 0)
+    if root is None or tip is None or reference is None:
+        return np.full(count, np.nan)
+    return uncertainty_of_stack(asked, sections, root, tip, reference)
 
 
 def _doubts(asked: StackCharacteristic, section: MeasuredSection) -> tuple[Reason, ...]:

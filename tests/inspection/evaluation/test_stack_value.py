@@ -200,3 +200,51 @@ def test_a_stack_without_enough_sections_has_no_value() -> None:
     assert math.isnan(away.found.value)
     with pytest.raises(ValueError, match="rising heights"):
         judge_stack([KINDS["bow"]], sections(KINDS["bow"])[::-1])
+
+
+def with_u(section: MeasuredSection, u: float, moved: dict[str, float] | None = None) -> MeasuredSection:
+    """The section with numbers of this U, and off by so much."""
+    off = moved or {}
+    numbers = {name: replace(one, uncertainty=u, value=one.value + off.get(name, 0.0)) for name, one in section.numbers.items()}
+    return replace(section, numbers=numbers)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_errors_of_the_sections_within_their_u_change_a_value_by_more_than_its_u(kind: str) -> None:
+    """Two hundred drawings of signs and sizes, of which the extreme ones come near to what is stated."""
+    asked, rng, used = KINDS[kind], np.random.default_rng(7), 0.0
+    u = np.array([0.004, 0.002, 0.006, 0.001, 0.003])
+    found = sections(asked)
+    (before,) = judge_stack([asked], [with_u(one, size) for one, size in zip(found, u.tolist(), strict=True)])
+    heights = {share.height_mm: share.value for share in before.sections}
+    for _ in range(200):
+        moved = []
+        for one, size in zip(found, u.tolist(), strict=True):
+            signs = rng.choice([-1.0, 1.0], len(one.numbers)) * rng.choice([0.3, 1.0], len(one.numbers))
+            moved.append(with_u(one, size, dict(zip(one.numbers, (size * signs).tolist(), strict=True))))
+        (after,) = judge_stack([asked], moved)
+        off = after.found.value - before.found.value if not heights else 0.0
+        for share in after.sections:
+            if share.height_mm == before.height_mm:
+                off = share.value - heights[share.height_mm]
+        used = max(used, abs(off) / before.found.uncertainty)
+    assert 0.3 < used <= 1.0 + 1e-9
+    assert "added as if all their errors went the same way" in before.found.notes[-1]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_larger_u_of_the_sections_never_makes_a_stack_more_certain_and_its_own_stands(kind: str) -> None:
+    asked = KINDS[kind]
+    value = judge_stack([asked], sections(asked))[0].found.deviation
+    for limit in (1.01 * value, 0.99 * value):
+        zone = replace(asked, lower=-math.inf, upper=limit)
+        (before,) = judge_stack([zone], sections(zone))
+        for u in (1e-5, 1e-3, 1.0):
+            (found,) = judge_stack([zone], [with_u(one, u) for one in sections(zone)])
+            assert found.found.verdict in (before.found.verdict, Verdict.UNCERTAIN)
+            before = found
+        assert before.found.verdict is Verdict.UNCERTAIN
+        (simple,) = judge_stack([zone], [with_u(one, 1.0) for one in sections(zone)], decision="simple")
+        assert simple.found.verdict is judge_stack([zone], sections(zone))[0].found.verdict
+    (own,) = judge_stack([replace(asked, uncertainty=0.0123)], [with_u(one, 1.0) for one in sections(asked)])
+    assert own.found.uncertainty == 0.0123
