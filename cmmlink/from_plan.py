@@ -1,8 +1,10 @@
 """Builds what a plan describes, except its device: the nominal profile and the inspection. Errors name file, line and key."""
 
+import hashlib
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import TypedDict
 
@@ -85,7 +87,30 @@ def with_section(plan: Plan) -> Plan:
 
 
 def _load(plan: Plan) -> NominalFile:
-    return load_from(plan.nominal, plan.nominal.file, plane_of(plan.section) if _asks_for_section(plan) else None)
+    """The nominal of a plan. Who asks for it again has what was read before, as long as the file holds the same bytes."""
+    nominal, section = plan.nominal, plan.section if _asks_for_section(plan) else None
+    content = _content_of(nominal.file)
+    if content is not None:
+        file = _read(nominal, section, content)
+        if _content_of(nominal.file) == content:
+            return file
+        _read.cache_clear()  # it was written meanwhile: which of its contents was read is not known
+    return load_from(nominal, nominal.file, None if section is None else plane_of(section))
+
+
+@lru_cache(maxsize=2)
+def _read(nominal: Nominal, section: Section | None, content: bytes) -> NominalFile:
+    """The nominal in a file that holds this content. A drawing of a solid takes seconds to read, and a run needs it three times."""
+    return load_from(nominal, nominal.file, None if section is None else plane_of(section))
+
+
+def _content_of(path: Path) -> bytes | None:
+    """What tells the content of a file from any other; None where it cannot be read, of which whoever reads it says why."""
+    with suppress(OSError, ValueError):
+        if path.is_file():
+            with path.open("rb") as file:
+                return hashlib.file_digest(file, "sha256").digest()
+    return None
 
 
 def _asks_for_section(plan: Plan) -> bool:

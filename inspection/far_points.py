@@ -80,14 +80,18 @@ def _marks(space_mm: Array, nominal: NominalProfile) -> Array:
 
     A measured point repeats its digits at most where others lie beside it. The order of the points says nothing here.
     """
-    _, places, counts = np.unique(space_mm[:, 0], return_inverse=True, return_counts=True)
-    seen = np.flatnonzero((counts[places] > 1) | ~space_mm[:, :2].any(axis=1))
+    x = np.sort(space_mm[:, 0])
+    several = np.append(np.unique(x[1:][x[1:] == x[:-1]]), np.inf)
+    is_one_of_several = several[np.searchsorted(several, space_mm[:, 0])] == space_mm[:, 0]
+    seen = np.flatnonzero(is_one_of_several | ~space_mm[:, :2].any(axis=1))
     if not len(seen):
         return np.empty((0, 3))
-    same, places, counts = np.unique(space_mm[seen], axis=0, return_inverse=True, return_counts=True)
+    same, counts = np.unique(space_mm[seen], axis=0, return_counts=True)
     candidates = same[(counts > 1) | ~same[:, :2].any(axis=1)]
+    if not len(candidates):
+        return np.empty((0, 3))
     others = np.unique(space_mm, axis=0)
-    if not len(candidates) or len(others) < FEWEST_POINTS:
+    if len(others) < FEWEST_POINTS:
         return np.empty((0, 3))
     from scipy.spatial import KDTree  # noqa: PLC0415 - it takes a third of a second, and few scans have such candidates
 
