@@ -29,12 +29,15 @@ def nominal(
     layer: Layer = None,
     curve: CurveNumber = None,
     section: SectionPlaneNumbers = None,
+    out: Annotated[Path | None, typer.Option("--out", metavar="FILE.png", help="Draw it: shape, start, direction, corners, notes.")] = None,
     as_json: Json = False,
 ) -> int:
     """Show what was understood of a nominal file."""
     from cmmlink.nominal_files import load_nominal
 
     understood = load_nominal(file, scale, closed, unit, layer=layer, curve=curve, section=_plane_from(section))
+    if out is not None:
+        _draw(understood, file, out)
     if as_json:
         print_json(_nominal_json(understood))
         return 0
@@ -44,6 +47,14 @@ def nominal(
     for note in understood.notes:
         typer.echo(f"  {note}")
     return 0
+
+
+def _draw(understood: "NominalFile", file: Path, out: Path) -> None:
+    if out.suffix.lower() != ".png":
+        raise PlanError(f"--out {out}: expected the name of a picture that ends in .png")
+    from cmmlink.report import write_nominal_picture
+
+    write_nominal_picture(understood, file.name, out)
 
 
 def _plane_from(section: tuple[float, ...] | None) -> "SectionPlane | None":

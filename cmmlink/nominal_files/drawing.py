@@ -229,7 +229,7 @@ def _plane_of(points: Array, size: float, section: SectionPlane | None) -> tuple
     if section is None:
         return plane, [f"the curve lies in space: the section is {words_of_plane(plane)}"]
     if np.abs(section.heights(points)).max() <= _FLAT * size:
-        return section, ["the curve lies in the section of the plan, and has its coordinates"]
+        return section, ["the curve lies in the section that was asked for, and has its coordinates"]
     return plane, [
         f"the curve does not lie in the section that was asked for, but in {words_of_plane(plane)}: it has the coordinates of this"
     ]

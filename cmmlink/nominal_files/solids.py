@@ -40,11 +40,12 @@ def _read(path: str, content: str, kind: Kind, origin: Vector, normal: Vector) -
 def _notes(read: CadCurves, section: SectionPlane | None) -> list[str]:
     notes = [f"left out: {counted_names(read.left_out)}"] if read.left_out else []
     if not read.cut:
-        return [*notes, f"{read.faces} faces left out beside drawn curves"] if read.faces else notes
+        return [*notes, f"the faces of the file ({read.faces}) left out beside the drawn curves"] if read.faces else notes
+    faces = f"{read.faces} face{'' if read.faces == 1 else 's'}"
     if section is None:
-        notes.append(f"the section of {read.faces} faces by the plane z = 0: no other section was asked for")
+        notes.append(f"the section of {faces} by the plane z = 0: no other section was asked for")
     else:
-        notes.append(f"the section of {read.faces} faces by the plane {words_of_plane(section)}")
+        notes.append(f"the section of {faces} by the plane {words_of_plane(section)}")
     if read.residual_mm:
         notes.append(f"between its points the section leaves free-form faces by {read.residual_mm:.1g} mm at most")
     return notes

@@ -7,6 +7,7 @@ TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer 
 
 if TYPE_CHECKING:
     from cmmlink.report.folder import prepare, write_results, write_run
+    from cmmlink.report.nominal_picture import write_nominal_picture
     from cmmlink.report.picture_processes import Pictures, processes_here
     from cmmlink.report.section_pictures import SectionPictures
     from cmmlink.report.stack_folder import write_stack
@@ -17,6 +18,7 @@ else:
     _PLACES = {
         "cmmlink.report.folder": ("prepare", "write_results", "write_run"),
         "cmmlink.report.picture_processes": ("Pictures", "processes_here"),
+        "cmmlink.report.nominal_picture": ("write_nominal_picture",),
         "cmmlink.report.section_pictures": ("SectionPictures",),
         "cmmlink.report.stack_folder": ("write_stack",),
         "cmmlink.report.terminal": ("STYLE_OF", "STYLES", "LiveTable", "print_characteristics", "print_summary"),
@@ -35,6 +37,7 @@ __all__ = [
     "print_characteristics",
     "print_summary",
     "processes_here",
+    "write_nominal_picture",
     "write_results",
     "write_run",
     "write_stack",

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ezdxf.filemanagement import new
+from matplotlib.image import imread
 from numpy.typing import NDArray
 
 from inspection import SectionPlane
@@ -67,7 +68,7 @@ def test_a_plan_with_the_section_of_the_curve_gives_the_curve_its_coordinates(dr
     judged = cmmlink("run", drawing.parent / "plan.yaml", "--headless", "--json", "--records", drawing.parent)
     result = json.loads(judged.out)
     assert (judged.code, result["worst"]["deviation_mm"]) == (0, pytest.approx(-0.03, abs=1e-8))
-    assert any("the curve lies in the section of the plan, and has its coordinates" in note for note in result["notes"])
+    assert any("the curve lies in the section that was asked for, and has its coordinates" in note for note in result["notes"])
 
 
 def test_nominal_shows_what_was_understood_and_lists_what_can_be_chosen(drawing: Path) -> None:
@@ -80,3 +81,30 @@ def test_nominal_shows_what_was_understood_and_lists_what_can_be_chosen(drawing:
     words = cmmlink("nominal", drawing, "--curve", 2).out
     assert "unit of the file: inch ($INSUNITS 1)" in words
     assert "the profile is curve 2 of 2 of layer PROFILE" in words
+
+
+def test_nominal_draws_what_was_understood(drawing: Path) -> None:
+    """The picture shows the curve in its own colour where it runs, and the marks of the start and of the direction."""
+    out = drawing.parent / "nominal.png"
+    assert cmmlink("nominal", drawing, "--curve", 2, "--out", out).code == 0
+    pixels = np.round(imread(out)[:, :, :3] * 255).astype(int)
+    line, start = (np.abs(pixels - np.array(colour)).sum(axis=2) < 8 for colour in ((0x3A, 0x3F, 0x45), (0x2A, 0x7F, 0xA5)))
+    rows, columns = np.nonzero(line)
+    assert np.ptp(columns) / np.ptp(rows) == pytest.approx(SEMI_MM[0] / SEMI_MM[1], rel=0.03)
+    assert start.sum() > 300
+    refused = cmmlink("nominal", drawing, "--curve", 2, "--out", drawing.parent / "nominal.jpg")
+    assert (refused.code, "expected the name of a picture that ends in .png" in refused.err) == (2, True)
+    missing = cmmlink("nominal", drawing, "--curve", 2, "--out", drawing.parent / "none" / "nominal.png")
+    assert (missing.code, "cannot be written: No such file" in missing.err) == (2, True)
+
+
+def test_a_section_is_one_of_a_point_and_a_normal(drawing: Path) -> None:
+    section = ("--section", *PLANE.origin_mm, *PLANE.normal)
+    shown = json.loads(cmmlink("nominal", drawing, "--curve", 2, *section, "--json").out)
+    np.testing.assert_allclose(shown["plane"]["origin_mm"], PLANE.origin_mm, atol=1e-12)
+    points = np.array(shown["control_points_mm"])
+    np.testing.assert_allclose((points.min(axis=0) + points.max(axis=0)) / 2, [0, 0], atol=1e-9)
+    both = cmmlink("inspect", drawing, "--nominal", drawing, *OPTIONS, *section, "--plane", "xz")
+    assert (both.code, "--section and --plane xz are both given; expected one of them" in both.err) == (2, True)
+    none = cmmlink("nominal", drawing, "--section", 0, 0, 0, 0, 0, 0)
+    assert (none.code, "--section: the normal" in none.err) == (2, True)
