@@ -103,9 +103,9 @@ def check(plan_file: PlanFile) -> int:
         notes = (*notes_on_nominal(plan), *notes_on_temperature(plan), *device.notes)
     zone = zone_of(plan, profile)
     typer.echo(f"{plan_file} can be run: {plan.part.name}, zone {zone.lower_mm:+g} .. {zone.upper_mm:+g} mm, {words_of(plan.device)}")
-    typer.echo(f"decision rule: {zone.decision_rule}")
     typer.echo(f"records in {words_of_room(plan.records or records_folder(None))}")
     typer.echo(f"nominal {profile.length_mm:.3f} mm long, {len(profile)} samples, material on the {profile.material}")
+    typer.echo(f"decision rule: {zone.decision_rule}")
     for note in notes:
         typer.echo(f"  note: {note}")
     return 0

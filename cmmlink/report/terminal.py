@@ -148,11 +148,12 @@ def print_characteristics(console: Console, found: Sequence[CharacteristicResult
         digits = 4 if unit else 7  # of what has no unit, a slope
         value = "no value" if math.isnan(one.value) else f"{one.value:.{digits}f}{unit}"
         deviation = "" if math.isnan(one.deviation) else f", deviation {one.deviation:+.{digits}f}"
+        u = f", U {one.uncertainty:.4g}{unit}" if one.uncertainty else ""
         limits = " .. ".join(f"{limit:+g}" if math.isfinite(limit) else "any" for limit in (one.lower, one.upper))
         how = "; ".join(part for part in (one.method, _of_profile(one), f"filter {one.filter}" if one.filter != "none" else "") if part)
         console.print(
             f"  [{STYLES[one.verdict]}]{VERDICT_WORDS[one.verdict]:11}[/] {escape(one.name)}: {one.type} {value}{deviation} "
-            f"(limits {limits}{unit}) {escape(how)}"
+            f"(limits {limits}{unit}{u}) {escape(how)}"
         )
         if one.certificate is not None:
             for line in one.certificate.words.splitlines():
