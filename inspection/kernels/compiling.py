@@ -33,6 +33,8 @@ def tuple_of(*parts: types.Type) -> types.Type:
     return types.Tuple(parts)
 
 
+_WIDEST = '"prefer-vector-width"="512"'
+
 REAL, INTEGER = types.float64, types.int64
 REAL_ARRAY, INTEGER_ARRAY = REAL[::1], INTEGER[::1]  # that is written to
 REAL_TABLE, INTEGER_TABLE, SHORT_TABLE = (types.Array(of, 1, "C", readonly=True) for of in (REAL, INTEGER, types.int32))
@@ -135,9 +137,13 @@ def fma(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
 
 @instructions
 def stack_reals(typing_context: Any) -> Any:
-    """Memory for REALS numbers on the stack. The compiler knows that it overlaps no table, and vectorises loops that read both."""
+    """Memory for REALS numbers on the stack. The compiler knows that it overlaps no table, and vectorises loops that read both.
+
+    It does so as wide as the processor can: for some it would otherwise take half the width, which spills and takes 12 to 20 % longer.
+    """
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        set.add(builder.function.attributes, _WIDEST)  # by the set that it is, since llvmlite knows no attributes that are texts
         place = cgutils.alloca_once(builder, ir.ArrayType(ir.DoubleType(), REALS))
         place.align = 64
         return builder.bitcast(place, ir.DoubleType().as_pointer())

@@ -2,6 +2,7 @@
 
 import ast
 import os
+import platform
 import subprocess
 import sys
 from collections.abc import Callable
@@ -149,6 +150,35 @@ def test_code_called_by_its_place_gets_its_arguments_as_their_types_and_its_erro
     assert out.tolist() == [2, 4, 7]
     with pytest.raises(ValueError, match="a negative factor"):
         compiled(place, -2, table, out)
+
+
+WIDE = """
+import sys
+from llvmlite import binding
+from numba import config
+config.CPU_NAME, config.CPU_FEATURES = sys.argv[1], ""
+from numba import njit
+from inspection.kernels.compiling import array_at, stack_reals
+
+def scaled(table, factor):
+    values = array_at(stack_reals(), 256)
+    for i in range(256):
+        values[i] = factor * table[i] + 1.0
+    for i in range(256):
+        table[i] = values[i] * values[i]
+
+compiled = njit(scaled)
+compiled.compile("void(float64[::1], float64)")
+print(compiled.inspect_asm(compiled.signatures[0]).count("zmm"))
+"""
+
+
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="another processor has other vectors")
+@pytest.mark.parametrize(("processor", "is_wide"), [("skylake-avx512", True), ("haswell", False)])
+def test_loops_over_a_block_use_vectors_as_wide_as_the_processor_has(processor: str, is_wide: bool) -> None:
+    root = Path(compiling.__file__).parents[2]
+    told = subprocess.run([sys.executable, "-c", WIDE, processor], capture_output=True, text=True, cwd=root, check=True, timeout=120)
+    assert (int(told.stdout) > 0) == is_wide, "by itself the compiler takes half of them for the first"
 
 
 def test_one_compiled_fit_serves_all_methods() -> None:
