@@ -117,7 +117,9 @@ def judge_profile_so_far(asked: LineProfile, basis: Basis) -> CharacteristicResu
     Proven is what a known pose and raw deviations say of points that stay in the region; every fit, and every filter, can still change.
     """
     rows = basis.rows(asked.region)
-    placed = place_so_far(asked, basis, basis.few(rows))
+    few = basis.few(rows)
+    placed = place_so_far(asked, basis, few)
+    asked = replace(asked, uncertainty_mm=uncertainty_of(asked, basis, few, placed))
     seen = _see(asked, basis, rows, placed.pose)
     stays = asked.region is None or basis.terms.known_pose is not None
     proven = seen.beyond > 0 and placed.is_known and stays and asked.filter is None and not basis.terms.reject_outliers

@@ -59,6 +59,7 @@ METHODS_OF_SECTIONS: Mapping[SectionKind, tuple[str, ...]] = {
 PLACED: tuple[SectionKind, ...] = ("chord-angle", "twist", "displacement")  # kinds that are counted from a datum
 
 _NO_DATUM = "It is counted from a datum (registration.datum): a fit of all freedoms leaves nothing of it."
+_FEWEST_POINTS = 4  # of a fit: one more than there are freedoms
 _TIP_KNOTS = 3.0  # knots of the actual section to either side of a tip, on which its curvature depends
 _AXES = {"x": 0, "y": 1, "total": 2}
 
@@ -144,6 +145,8 @@ class ActualOutlines:
         if self._fit is None:
             basis, terms = self._basis, self._basis.terms
             points = basis.result.section_at(basis.drawn(basis.rows(None)))
+            if len(points) < _FEWEST_POINTS:
+                raise InspectionError(f"{len(points)} points are too few for a best fit")
             free = Freedoms.about(basis.pose.apply(points).mean(axis=0))
             settings = (terms.method, terms.tip_radius_mm, terms.target_mm, terms.weights)
             self._fit = register_within(points, basis.nominal, basis.pose, free, *settings).registration

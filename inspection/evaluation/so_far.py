@@ -95,7 +95,8 @@ class EvaluationSoFar:
         if isinstance(asked, LineProfile):
             return judge_profile_so_far(asked, basis)
         found = judge_value(asked, basis, outlines)
-        if any(reason.kind in _NOT_SEEN for reason in found.reasons):
+        is_partly_fitted = asked.method == "best-fit" and basis.result.gap.length_mm > basis.terms.limits.gap_max_mm
+        if is_partly_fitted or any(reason.kind in _NOT_SEEN for reason in found.reasons):
             nothing = float("nan")
             found = replace(found, value=nothing, deviation=nothing, consumption=nothing, places_mm=())
         return replace(found, verdict=Verdict.UNCERTAIN)

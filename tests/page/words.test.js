@@ -10,7 +10,7 @@ import { flooredShare } from "../../cmmlink/console/static/numbers.js";
 import { ageWords, bannersOf, moveWords } from "../../cmmlink/console/static/panels.js";
 
 const HEARD = { view: "live", chosen: null, surface: null, run: null, isRecorded: false,
-  station: null, control: null, hasFault: false, isRemote: false, link: "live" };
+  station: null, control: null, hasFault: false, hasBand: false, isRemote: false, link: "live" };
 const RUN = { number: "run 7", phase: "measuring", link: "up", remark: "" };
 
 test("the most urgent thing stands in the banner", () => {

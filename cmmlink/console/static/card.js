@@ -18,6 +18,7 @@ import { CODE_OF } from "./verdicts.js";
  * @property {string} word
  * @property {RunState["verdict"]["shape"]} shape
  * @property {boolean} final
+ * @property {string} of which characteristics gave the verdict
  * @property {string} why
  * @property {readonly string[]} reasons every further one
  * @property {readonly string[]} notes
@@ -39,14 +40,15 @@ import { CODE_OF } from "./verdicts.js";
  * @property {RunRow | null} chosen the run chosen in the history
  * @property {SurfaceState | null} surface
  * @property {boolean} hasFault
+ * @property {boolean} hasBand whether U is known along the profile
  * @property {boolean} isRemote whether the station is open to the network, unencrypted
  * @property {LinkState} link
  */
 
 /** @type {Card} */
 const NO_CARD = {
-  part: "", serial: "", names: [], word: "", shape: "none", final: false, why: "", reasons: [], notes: [], phase: "", badge: "", before: "",
-  worst: null, simulated: false, run: null,
+  part: "", serial: "", names: [], word: "", shape: "none", final: false, of: "", why: "", reasons: [], notes: [], phase: "",
+  badge: "", before: "", worst: null, simulated: false, run: null,
 };
 const PHASES = { preparing: "preparing", starting: "connecting", measuring: "so far", ending: "ending", finished: "" };
 const BADGES = { run: "", section: "SECTION", replay: "REPLAY of", recorded: "RECORDED" };
@@ -70,14 +72,14 @@ export function cardOf({ run, isRecorded, station, view, chosen, surface }) {
  */
 function cardOfRun(run) {
   const { part, serial_number: serial, plan, operator, began, notes, simulated, zone } = run;
-  const { word, shape, final, why, reasons } = run.verdict;
+  const { word, shape, final, of, why, reasons } = run.verdict;
   const badge = run.kind === "replay" || run.kind === "recorded" ? `${BADGES[run.kind]} ${began}` : BADGES[run.kind];
   const worst = run.worst && {
     deviation: run.worst.deviation_mm, station: run.worst.station_mm, zone,
     kind: classOf(run.worst.deviation_mm, CODE_OF[run.worst.verdict], zone),
   };
   return {
-    part, serial, names: [plan, operator], word, shape, final, why, reasons, notes, phase: final ? "" : PHASES[run.phase],
+    part, serial, names: [plan, operator], word, shape, final, of, why, reasons, notes, phase: final ? "" : PHASES[run.phase],
     badge, before: "", worst, simulated, run,
   };
 }

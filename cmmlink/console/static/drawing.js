@@ -5,7 +5,7 @@ import { NO_NOMINAL, Points } from "./points.js";
 import { INK, Sheet, label, ring } from "./sheet.js";
 import { wordOf } from "./verdicts.js";
 
-/** @import { WorstPoint, ZoneLimits } from "./protocol.js" */
+/** @import { CharacteristicRow, WorstPoint, ZoneLimits } from "./protocol.js" */
 /** @import { HeldPoint, Nominal, Scan } from "./points.js" */
 /** @import { Pen } from "./sheet.js" */
 /** @typedef {[x: number, y: number]} Place in pixels from the upper left corner of the sheet */
@@ -31,6 +31,10 @@ export class Drawing {
     this.zone = { lower_mm: 0, upper_mm: 0, uncertainty_mm: 0, decision_rule: "" };
     /** @type {WorstPoint | null} */
     this.worst = null;
+    /** The characteristic that is shown. @type {CharacteristicRow | null} */
+    this.chosen = null;
+    /** U along the profile, as pairs of station and U in mm. @type {readonly (readonly [number, number])[]} */
+    this.band = [];
     this.outdated = { ground: true, marks: true, cursor: true };
     this.sheet = new Sheet(element, () => this.resize());
   }
@@ -59,6 +63,23 @@ export class Drawing {
     this.zone = zone;
     this.worst = worst;
     if (isOther) this.lookAtAll();
+  }
+
+  /**
+   * Take over the characteristics, the one of them that is shown, and U along the profile.
+   * @param {readonly CharacteristicRow[]} _rows
+   * @param {CharacteristicRow | null} chosen
+   * @param {Drawing["band"]} band
+   */
+  mark(_rows, chosen, band) {
+    this.outdated.ground ||= chosen !== this.chosen || band !== this.band;
+    this.chosen = chosen;
+    this.band = band;
+  }
+
+  /** The worst point: that of the characteristic that is shown, else that of the run. */
+  get shownWorst() {
+    return this.chosen ? this.chosen.worst : this.worst;
   }
 
   /** Show nothing. */
@@ -97,7 +118,8 @@ export class Drawing {
   /** @param {Pen} pen */
   drawMarks(pen) {
     if (this.points.bins) this.drawPoints(pen);
-    if (this.worst) this.drawWorst(pen, this.worst, this.placeOfWorst(this.worst));
+    const worst = this.shownWorst;
+    if (worst) this.drawWorst(pen, worst, this.placeOfWorst(worst));
   }
 
   /**
@@ -133,8 +155,20 @@ export class Drawing {
    * @param {HeldPoint} point
    */
   reveal(point) {
-    const [x, y] = this.place(point), [middleX, middleY] = this.middle;
+    this.revealPlace(this.place(point));
+  }
+
+  /** @param {Place} place */
+  revealPlace([x, y]) {
+    const [middleX, middleY] = this.middle;
     if (!this.holds([x, y])) this.pan(x - middleX, y - middleY);
+  }
+
+  /** Move the view so that the worst point of the characteristic that is shown is seen, or the whole where it has none. */
+  revealChosen() {
+    const worst = this.chosen?.worst;
+    if (worst) this.revealPlace(this.placeOfWorst(worst));
+    else this.fit();
   }
 
   /**

@@ -2,6 +2,7 @@
 
 import { showAlarms, toggleAlarmList } from "./alarms.js";
 import { cardOf } from "./card.js";
+import { Characteristics } from "./characteristics.js";
 import { CtView } from "./ct.js";
 import { buttonOf, byId, inputOf, put } from "./dom.js";
 import { listen } from "./gestures.js";
@@ -14,7 +15,7 @@ import { Profile } from "./profile.js";
 import { Strip } from "./strip.js";
 import { Timing } from "./timing.js";
 
-/** @import { AlarmRow, Command, Hello, Message, ShownRun } from "./protocol.js" */
+/** @import { AlarmRow, CharacteristicList, Command, Hello, Message, ShownRun } from "./protocol.js" */
 /** @import { Cursor } from "./drawing.js" */
 /** @import { LinkState, Outcome } from "./link.js" */
 /** @import { Heard } from "./card.js" */
@@ -27,8 +28,8 @@ const SILENT = ["enter", "devices"]; // commands whose success is not worth a wo
 
 /** @type {Heard} */
 const heard = {
-  view: "part", chosen: null, surface: null, run: null, isRecorded: false, station: null, control: null, hasFault: false, isRemote: false,
-  link: "connecting",
+  view: "part", chosen: null, surface: null, run: null, isRecorded: false, station: null, control: null, hasFault: false, hasBand: false,
+  isRemote: false, link: "connecting",
 };
 /** @type {{ nowMs: number, at: number }} */
 let clock = { nowMs: 0, at: 0 }; // the station's time of day, and when it was heard
@@ -53,6 +54,9 @@ const history = new History({
   replay: (run) => askToSee({ do: "replay", run }),
   export: download,
 }, rewrite);
+const characteristics = new Characteristics(showChosen);
+/** @type {CharacteristicList} */
+let told = { rows: [], more: 0, uncertainty: [], final: false, type: "characteristics" };
 const ctView = new CtView((plan) => ask({ do: "import", plan }), (section) => askToSee({ do: "section", section }));
 
 // What the station says.
@@ -61,6 +65,7 @@ const ctView = new CtView((plan) => ask({ do: "import", plan }), (section) => as
 function onMessage(message) {
   if (message.type === "hello") greet(message);
   else if (message.type === "run") takeRun(message);
+  else if (message.type === "characteristics") takeCharacteristics(message);
   else if (message.type === "station") heard.station = message;
   else if (message.type === "control") heard.control = message;
   else if (message.type === "alarms") [alarms, heard.hasFault] = [message.alarms, message.fault];
@@ -89,6 +94,25 @@ function takeRun({ run, recorded }) {
   heard.isRecorded = recorded;
   if (isNew) go("live");
   redraw();
+}
+
+/** @param {CharacteristicList} message */
+function takeCharacteristics(message) {
+  told = message;
+  heard.hasBand = message.uncertainty.length > 0;
+  characteristics.show(message);
+  redraw();
+}
+
+/**
+ * Show the chosen characteristic on the drawings, and go to it where it was opened.
+ * @param {boolean} isOpened
+ */
+function showChosen(isOpened) {
+  redraw();
+  if (!isOpened) return;
+  paintDrawings(); // they know the chosen one from here on
+  for (const drawing of drawings) if (drawing.isReady) drawing.revealChosen();
 }
 
 /** @param {ArrayBuffer} buffer */
@@ -140,6 +164,7 @@ function paintDrawings() {
     if (!run) drawing.clear();
     else {
       drawing.show(scan, run.zone, run.worst);
+      drawing.mark(told.rows, characteristics.chosen, told.uncertainty);
       drawing.draw(cursor);
     }
   }

@@ -37,8 +37,9 @@ export function showRun(heard) {
   put("kind", card.badge);
   showVerdict(card);
   showRemarks(card);
-  put("rule", run?.zone.decision_rule ?? "");
-  byId("rule").title = run?.zone.decision_rule ?? ""; // a long one is cut
+  const rule = `${run?.zone.decision_rule ?? ""}${heard.hasBand ? "; shaded around the limits: the U of each station" : ""}`;
+  put("rule", rule);
+  byId("rule").title = rule; // a long one is cut
   document.body.dataset.card = run ? cardKind(run) : "summary";
   showWorst(card);
   showRegistration(run);
@@ -53,13 +54,16 @@ export function showRun(heard) {
 const cardKind = ({ kind }) => (kind === "replay" || kind === "recorded" ? "past" : "run");
 
 /** @param {Card} shown */
-function showVerdict({ word, shape, final, why, phase }) {
+function showVerdict({ word, shape, final, of, why, phase }) {
   const card = byId("verdict");
   document.body.dataset.verdict = shape;
   card.dataset.final = String(final);
   card.dataset.long = String(word.split(" ").some((part) => part.length > LONG_WORD));
   showSymbol(within(card, ".shape"), `shape-${shape}`);
   put("verdict-word", word);
+  byId("verdict-of").hidden = !of;
+  put("verdict-of", of);
+  byId("verdict-of").title = of; // a long one is cut
   put("verdict-why", why);
   byId("verdict-why").title = why; // a long one is cut
   put("provisional", phase);

@@ -4,9 +4,10 @@ import { CONFORM, DEVIATION, FOOT_X, FOOT_Y, NORMAL_X, NORMAL_Y, NONCONFORM, VER
 import { Drawing } from "./drawing.js";
 import { digitsFor, niceLength, signed } from "./numbers.js";
 import { CLASSES, classOf } from "./points.js";
+import { cut, drawPlaces, drawRegions, lanesOf, roomOf } from "./regions.js";
 import { INK, label, mark } from "./sheet.js";
 
-/** @import { WorstPoint } from "./protocol.js" */
+/** @import { CharacteristicRow, WorstPoint } from "./protocol.js" */
 /** @import { HeldPoint, PointClass } from "./points.js" */
 /** @import { Place } from "./drawing.js" */
 /** @import { Pen } from "./sheet.js" */
@@ -17,6 +18,7 @@ import { INK, label, mark } from "./sheet.js";
 const CELL_PX = 1.6; // whiskers closer together than this cannot be told apart
 const MARK_EVERY_PX = 9;
 const BAND_PX = 15; // half width of the tolerance zone that the automatic magnification aims at
+const MOST_ROOM = 0.3; // of the sheet, that may be left free on every side of the part
 const QUAD_PX = 2.5; // length of the pieces that the tolerance zone is filled with
 const CLOSEST = 400; // most that a view enlarges the whole
 
@@ -27,6 +29,8 @@ export class Profile extends Drawing {
    */
   constructor(element, onChange) {
     super("profile", element, onChange);
+    /** @type {readonly CharacteristicRow[]} */
+    this.rows = [];
     /** Chosen by the operator; null: chosen by the page. @type {number | null} */
     this.magnification = null;
     /** Null: all of the profile. @type {View | null} */
@@ -34,6 +38,18 @@ export class Profile extends Drawing {
     /** @type {View} */
     this.all = { scale: 1, x: 0, y: 0 };
     this.drawnAt = 1; // the magnification of what stands on the sheet
+    /** @type {ReturnType<typeof lanesOf>} */
+    this.regions = [];
+  }
+
+  /** @type {Drawing["mark"]} */
+  mark(rows, chosen, band) {
+    super.mark(rows, chosen, band);
+    if (rows === this.rows) return;
+    this.rows = rows;
+    this.regions = lanesOf(rows);
+    this.all = this.whole();
+    this.outdated.ground = true;
   }
 
   lookAtAll() {
@@ -49,7 +65,8 @@ export class Profile extends Drawing {
   /** The view that shows the whole nominal with room for whiskers. @returns {View} */
   whole() {
     const { width, height } = this.sheet, [x0, y0, x1, y1] = this.nominal.box;
-    const room = Math.min(width, height) * 0.04 + 3.2 * BAND_PX;
+    const least = Math.min(width, height), wanted = least * 0.04 + 3.2 * BAND_PX + roomOf(this.regions, this.sheet.text);
+    const room = Math.min(wanted, MOST_ROOM * least);
     const scale = Math.min((width - 2 * room) / Math.max(x1 - x0, 1e-9), (height - 2 * room) / Math.max(y1 - y0, 1e-9));
     return { scale, x: width / 2 - ((x0 + x1) / 2) * scale, y: height / 2 + ((y0 + y1) / 2) * scale };
   }
@@ -105,6 +122,7 @@ export class Profile extends Drawing {
     pen.strokeStyle = INK.line;
     pen.lineWidth = 1.75;
     pen.stroke(this.offset(0));
+    drawRegions(pen, this);
     this.drawRuler(pen);
   }
 
@@ -217,6 +235,12 @@ export class Profile extends Drawing {
     for (const { kind, x, y } of whiskers.flags.values()) mark(pen, kind, x, y, 4.5);
   }
 
+  /** @param {Pen} pen */
+  drawMarks(pen) {
+    super.drawMarks(pen);
+    if (this.chosen) drawPlaces(pen, this, this.chosen);
+  }
+
   /**
    * The bins with the lowest and the highest deviation among some; null where none holds a point.
    * @param {number} first
@@ -296,7 +320,8 @@ export class Profile extends Drawing {
     if (!this.holds(place)) return;
     super.drawWorst(pen, worst, place);
     const ink = worst.verdict === "nonconform" ? INK[classOf(worst.deviation_mm, NONCONFORM, this.zone)] : INK.limit;
-    const words = `${signed(worst.deviation_mm, digitsFor(this.zone))} mm at ${worst.station_mm.toFixed(2)} mm`;
+    const name = this.chosen ? `${cut(this.chosen.name)}\n` : "";
+    const words = `${name}${signed(worst.deviation_mm, digitsFor(this.zone))} mm at ${worst.station_mm.toFixed(2)} mm`;
     label(pen, this.sheet, words, ...place, ink, true);
   }
 

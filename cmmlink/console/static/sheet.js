@@ -10,6 +10,7 @@ const LAYERS = ["ground", "marks", "cursor"];
 export const INK = {
   text: "#1b2733", soft: "#5a6b7b", faint: "#c9d2da", line: "#22313f", band: "#e3eeea", limit: "#6d8f84", ground: "#ffffff",
   in: "#3f9483", near: "#8a7a10", "not-proven": "#b37400", over: "#c2410c", under: "#1d5fae", gap: "#d9dfe5",
+  region: "#6a5790", chosen: "#4b2a8c", "region-ground": "rgb(75 42 140 / 9%)", "uncertain-ground": "rgb(242 176 30 / 22%)",
 };
 
 export class Sheet {
@@ -98,14 +99,14 @@ export function mark(pen, kind, x, y, size) {
 }
 
 /**
- * A cross in the place of a run that has no verdict.
+ * A cross: in the place of a run that has no verdict, or where a value was found.
  * @param {Pen} pen
  * @param {number} x
  * @param {number} y
  * @param {number} size
  */
-export function cross(pen, x, y, size) {
-  pen.strokeStyle = INK.soft;
+export function cross(pen, x, y, size, ink = INK.soft) {
+  pen.strokeStyle = ink;
   pen.lineWidth = 2;
   pen.beginPath();
   for (const side of [-1, 1]) {

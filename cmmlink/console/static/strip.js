@@ -33,10 +33,10 @@ export class Strip extends Drawing {
   }
 
   rescale() {
-    const { zone, worst, sheet, low, high } = this, middle = middleOf(zone);
-    const room = 0.75 * (zone.upper_mm - zone.lower_mm), far = worst ? 1.18 * (worst.deviation_mm - middle) : 0;
-    this.low = middle - Math.max(room, -far);
-    this.high = middle + Math.max(room, far);
+    const { zone, sheet, low, high } = this, middle = middleOf(zone), room = 0.75 * (zone.upper_mm - zone.lower_mm);
+    const far = [this.worst, this.chosen?.worst].map((worst) => (worst ? 1.18 * (worst.deviation_mm - middle) : 0));
+    this.low = middle - Math.max(room, ...far.map((off) => -off));
+    this.high = middle + Math.max(room, ...far);
     this.left = sheet.text * 5.2;
     this.right = sheet.width - sheet.text * 1.2;
     this.top = 6;
@@ -80,6 +80,8 @@ export class Strip extends Drawing {
     const { zone, sheet } = this, lower = this.py(zone.lower_mm), upper = this.py(zone.upper_mm);
     pen.fillStyle = INK.band;
     pen.fillRect(this.left, upper, this.right - this.left, lower - upper);
+    this.drawChosen(pen);
+    this.drawBand(pen);
     this.rule(pen, 0, INK.faint, []);
     for (const limit of [zone.upper_mm, zone.lower_mm]) {
       this.rule(pen, limit, INK.limit, [7, 5]);
@@ -93,6 +95,37 @@ export class Strip extends Drawing {
     const isFree = [lower, upper].every((limit) => Math.abs(this.py(0) - limit) > sheet.text * 1.4);
     if (isFree) this.yLabel(pen, this.py(0), "0", INK.soft);
     this.drawStations(pen);
+  }
+
+  /**
+   * The region of the characteristic that is shown, as a ground of its own; two pieces where it crosses the seam.
+   * @param {Pen} pen
+   */
+  drawChosen(pen) {
+    const { from_mm: from = null, to_mm: to = null } = this.chosen ?? {};
+    if (from === null || to === null) return;
+    const pieces = from <= to ? [[from, to]] : [[0, to], [from, this.nominal.length]];
+    pen.fillStyle = INK["region-ground"];
+    for (const [first, last] of pieces) {
+      const left = Math.max(this.px(first), this.left), right = Math.min(this.px(last), this.right);
+      if (right > left) pen.fillRect(left, this.top, right - left, this.bottom - this.top);
+    }
+  }
+
+  /**
+   * U of each station, to both sides of each limit.
+   * @param {Pen} pen
+   */
+  drawBand(pen) {
+    const { band, zone } = this, seen = band.filter(([station]) => station >= this.from && station <= this.to);
+    if (seen.length < 2) return;
+    pen.fillStyle = INK["uncertain-ground"];
+    for (const limit of [zone.lower_mm, zone.upper_mm]) {
+      pen.beginPath();
+      for (const [station, u] of seen) pen.lineTo(this.px(station), this.py(limit + u));
+      for (const [station, u] of [...seen].reverse()) pen.lineTo(this.px(station), this.py(limit - u));
+      pen.fill();
+    }
   }
 
   /**

@@ -50,15 +50,27 @@ export class Table {
 
   /** @param {number} at */
   point(at) {
-    this.at = at;
-    this.onChoice();
-    const rows = this.element.querySelectorAll("tbody tr");
-    rows.forEach((row, k) => row.setAttribute("aria-selected", String(k === at)));
-    rows[at]?.scrollIntoView({ block: "nearest" });
+    this.mark(at);
+    this.rows[at]?.scrollIntoView({ block: "nearest" });
   }
 
-  /** @param {readonly Item[]} items */
+  /** @param {number} at */
+  mark(at) {
+    this.at = at;
+    this.onChoice();
+    this.rows.forEach((row, k) => row.setAttribute("aria-selected", String(k === at)));
+  }
+
+  get rows() {
+    return this.element.querySelectorAll("tbody tr");
+  }
+
+  /**
+   * Show other items; only a choice that moves is scrolled to, so that nothing moves under who reads.
+   * @param {readonly Item[]} items
+   */
   show(items, at = 0) {
+    const isSame = at === this.at;
     this.items = items;
     within(this.element, "tbody").replaceChildren(...items.map((item, k) => {
       const row = document.createElement("tr");
@@ -67,7 +79,8 @@ export class Table {
       row.addEventListener("dblclick", () => this.openChosen());
       return row;
     }));
-    this.point(at);
+    if (isSame) this.mark(at);
+    else this.point(at);
   }
 }
 

@@ -135,7 +135,7 @@ def keep(request: pytest.FixtureRequest) -> Callable[[Page, str], None]:
         Path(folder).mkdir(parents=True, exist_ok=True)
         before = page.viewport_size
         assert before is not None
-        for width, height in ((1280, 800), (1920, 1080), (1024, 768)):
+        for width, height in ((1280, 800), (1920, 1080), (1024, 768), (800, 600)):
             page.set_viewport_size({"width": width, "height": height})
             page.wait_for_timeout(400)  # until the drawings have taken their new size
             page.screenshot(path=Path(folder) / f"{name}-{width}x{height}.png")
