@@ -65,6 +65,7 @@ class EvaluationSoFar:
 
     def __init__(self, asked: Sequence[Characteristic], terms: Terms) -> None:
         self._asked, self._terms = tuple(asked) or (PROFILE,), terms
+        self._no_budget = replace(terms, uncertainty=None)  # how a number depends on every error takes seconds, and nothing rests on it yet
 
     @property
     def nothing(self) -> ScanSoFar:
@@ -80,7 +81,7 @@ class EvaluationSoFar:
         rows.take_in(scan.points_mm, XY_PLANE, np.inf)
         rows.count = len(scan.points_mm)
         basis = Basis(judge_at(rows, scan.pose, self._terms), self._terms, Missing(), complete=False)
-        outlines, found = ActualOutlines(basis), list[CharacteristicResult]()
+        outlines, found = ActualOutlines(replace(basis, terms=self._no_budget)), list[CharacteristicResult]()
         for one in self._asked:
             found.append(replace(self._judge(one, basis, outlines), reasons=()))
             if is_over():
@@ -94,7 +95,7 @@ class EvaluationSoFar:
             return replace(judge_whole(asked, basis), verdict=Verdict.NONCONFORM if proven else Verdict.UNCERTAIN)
         if isinstance(asked, LineProfile):
             return judge_profile_so_far(asked, basis)
-        found = judge_value(asked, basis, outlines)
+        found = judge_value(asked, replace(basis, terms=self._no_budget), outlines)
         is_partly_fitted = asked.method == "best-fit" and basis.result.gap.length_mm > basis.terms.limits.gap_max_mm
         if is_partly_fitted or any(reason.kind in _NOT_SEEN for reason in found.reasons):
             nothing = float("nan")

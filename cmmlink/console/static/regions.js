@@ -107,11 +107,12 @@ function drawName(pen, profile, row, distance, boxes) {
   for (const share of NAME_AT) {
     const k = nominal.nearest(stationAt(row, share, nominal));
     const [x, y] = profile.moved(k, distance + (sheet.text * 0.8) / profile.seen.scale);
-    const left = Math.min(Math.max(x - (wide / 2) * (1 - nominal.nx[k]), pad), sheet.width - wide - pad);
+    const wished = x - (wide / 2) * (1 - nominal.nx[k]), left = Math.min(Math.max(wished, pad), sheet.width - wide - pad);
     const top = Math.min(Math.max(y - (high / 2) * (1 + nominal.ny[k]), pad), sheet.height - high - pad);
     /** @type {Box} */
     const box = [left - pad, top - pad, left + wide + pad, top + high + pad];
-    if (!profile.holds([x, y]) || boxes.some((other) => doOverlap(box, other))) continue;
+    const isMoved = Math.abs(left - wished) > sheet.text; // it would lie over the part
+    if (isMoved || !profile.holds([x, y]) || boxes.some((other) => doOverlap(box, other))) continue;
     boxes.push(box);
     pen.textAlign = "left";
     pen.textBaseline = "top";

@@ -34,12 +34,12 @@ characteristics:
   - {{name: upper side, type: line-profile, region: UPPER, zone: {{width_mm: 0.08}}, fit: best-fit}}
   - {{name: lower side, type: line-profile, region: LOWER, zone: {{width_mm: 0.1}}, fit: datum}}
   - {{name: seat, type: line-profile, from: {{station_mm: 180}}, to: {{station_mm: 30}}, zone: {{width_mm: 0.09}}, fit: datum}}
-  - {{name: chord, type: chord, nominal_mm: 100, lower_mm: -0.1, upper_mm: 0.1}}
-  - {{name: chord angle, type: chord-angle, lower_deg: -0.1, upper_deg: 0.1}}
-  - {{name: thickness, type: thickness, lower_mm: -0.1, upper_mm: 0.1}}
-  - {{name: LE radius, type: edge-radius, lower_mm: -0.3, upper_mm: 0.3}}
-  - {{name: LE thickness, type: edge-thickness, edge: leading, offset_mm: 3, lower_mm: -0.1, upper_mm: 0.1}}
-  - {{name: camber, type: camber, lower_mm: -0.1}}
+  - {{name: chord, type: chord, nominal_mm: 100, lower_mm: -0.1, upper_mm: 0.1, uncertainty_mm: 0.002}}
+  - {{name: chord angle, type: chord-angle, lower_deg: -0.1, upper_deg: 0.1, uncertainty_deg: 0.002}}
+  - {{name: thickness, type: thickness, lower_mm: -0.1, upper_mm: 0.1, uncertainty_mm: 0.002}}
+  - {{name: LE radius, type: edge-radius, lower_mm: -0.3, upper_mm: 0.3, uncertainty_mm: 0.002}}
+  - {{name: LE thickness, type: edge-thickness, edge: leading, offset_mm: 3, lower_mm: -0.1, upper_mm: 0.1, uncertainty_mm: 0.002}}
+  - {{name: camber, type: camber, lower_mm: -0.1, uncertainty_mm: 0.002}}
   - {{name: twist, type: twist, lower_deg: -0.05, upper_deg: 0.05}}
 """
 OF_SECTION = ["chord", "chord angle", "thickness", "LE radius", "LE thickness", "camber", "twist"]
