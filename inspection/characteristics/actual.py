@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from inspection.characteristics.outline import AirfoilSection, section_on
 from inspection.characteristics.section_value import SectionValue
+from inspection.characteristics.tail import ON_FIRST, ON_FLAT, ON_LAST, ON_NONE, TailEnd, end_at_points
 from inspection.curve import NurbsCurve
 from inspection.errors import InspectionError
 from inspection.filters import ProfileFilter
@@ -114,6 +115,8 @@ def draw_actual_section(
     start, end = _station_range(nominal)
     station = _unwrap(nominal, deviations.station_mm, start)
     used = ~deviations.beyond_end & ~deviations.at_vertex & np.isfinite(values) & (station <= end)
+    off = _flat_off_mm(nominal, deviations, station > end)
+    used &= (station >= start + off) & (station <= end - off)
     station, values = station[used], values[used]
     if len(station) < 8:
         raise InspectionError(f"only {len(station)} points lie on the sides of the section: too few to draw it")
@@ -124,15 +127,24 @@ def draw_actual_section(
         raise ValueError(f"the distance of knots must be positive and below a quarter of the outline, not {spacing:g} mm")
     spline, rms, noise = _draw_deviations(nominal, station, values, (start, end), spacing)
     unseen = _find_unseen(station, (start, end), _GAP_KNOTS * spacing if gap_max_mm is None else gap_max_mm, nominal.trailing == "round")
-    section = _move_outline(nominal, spline, start)
+    moved = _move_outline(nominal, spline, start, _drawn_range(station, (start, end), spacing))
+    tail = None if nominal.trailing == "round" else _end_at_tail(moved, nominal, deviations, (start, end), off)
+    section = moved if tail is None else tail.section
     at = section.parameter
     is_unseen = np.any((at[:, None] > unseen[:, 0]) & (at[:, None] < unseen[:, 1]), axis=1)
+    if tail is not None:
+        is_unseen |= tail.is_unseen
     source = "raw" if filtered_by is None else f"filtered ({filtered_by.words})"
     drawn = f"drawn from {len(station)} {source} deviations as a cubic spline with knots every {spacing:.4g} mm"
     left = len(deviations) - len(station)
     gaps = tuple(f"nothing was measured from station {a:.3f} to {b:.3f} mm" for a, b in unseen)
     idle = (f"{left} points took no part: beyond an end, at a corner or on the flat of the trailing edge, or without a filtered value",)
-    notes = (f"{drawn}, which leaves {rms:.3g} mm rms", *(idle if left else ()), *gaps)
+    notes = (
+        f"{drawn}, which leaves {rms:.3g} mm rms",
+        *((tail.words,) if tail is not None and tail.words else ()),
+        *(idle if left else ()),
+        *gaps,
+    )
     return ActualSection(section, nominal, source, spacing, len(station), rms, noise, unseen, is_unseen, notes)
 
 
@@ -152,6 +164,35 @@ def move_section(nominal: AirfoilSection, station_mm: Array, moved_mm: Array) ->
     else:
         spline = make_interp_spline(station_mm, moved_mm, k=_DEGREE)
     return _move_outline(nominal, spline, float(station_mm[0]))
+
+
+def _flat_off_mm(nominal: AirfoilSection, deviations: Deviations, on_flat: NDArray[np.bool_]) -> float:
+    """How near to a corner of a blunt edge a foot on a side may belong to a point of its flat, or the other way round.
+
+    At a corner of 40 degrees and more it is less than three times how far the flat itself is off.
+    """
+    on_flat = on_flat & ~deviations.at_vertex & np.isfinite(deviations.deviation_mm)
+    if nominal.trailing != "blunt" or not on_flat.any():
+        return 0.0
+    return 3.0 * float(np.median(np.abs(deviations.deviation_mm[on_flat])))
+
+
+def _end_at_tail(
+    section: AirfoilSection, nominal: AirfoilSection, deviations: Deviations, ends: tuple[float, float], corner_mm: float
+) -> TailEnd:
+    """The drawn section with its trailing edge where the points (m,) end; places are raw, whatever the sides were drawn from.
+
+    corner_mm : nearer to a corner than this it is not known whether a point is of the flat
+    """
+    places = deviations.foot_mm + deviations.normal * deviations.deviation_mm[:, None]
+    station = _unwrap(nominal, deviations.station_mm, ends[0])
+    nose = float(_unwrap(nominal, nominal.curve.station_mm(nominal.nose), ends[0])[0])
+    on = np.where(station > ends[1], ON_FLAT, np.where(station <= nose, ON_FIRST, ON_LAST))
+    flat_to = ends[0] + nominal.curve.length_mm - corner_mm
+    unclear = (on == ON_FLAT) & ((station < ends[1] + corner_mm) | (station > flat_to))
+    on = np.where(deviations.at_vertex | deviations.beyond_end | unclear, ON_NONE, on)
+    known = np.isfinite(places).all(axis=1)
+    return end_at_points(section, places[known], on[known].astype(np.int8))
 
 
 def _station_range(nominal: AirfoilSection) -> tuple[float, float]:
@@ -229,15 +270,27 @@ def _find_unseen(station: Array, ends: tuple[float, float], gap_max_mm: float, i
     return stretches
 
 
-def _move_outline(nominal: AirfoilSection, spline: "BSpline", start: float) -> AirfoilSection:
-    """The section whose outline is the nominal one moved along its normals by the spline of deviations over stations."""
+def _drawn_range(station: Array, ends: tuple[float, float], spacing: float) -> tuple[float, float]:
+    """Between which stations the spline stands on points (m,): up to an end from less than half a knot, and not into what is unmeasured."""
+    first, last = float(station[0]), float(station[-1])
+    return first if first - ends[0] > spacing / 2 else ends[0], last if ends[1] - last > spacing / 2 else ends[1]
+
+
+def _move_outline(
+    nominal: AirfoilSection, spline: "BSpline", start: float, within: tuple[float, float] = (-np.inf, np.inf)
+) -> AirfoilSection:
+    """The section whose outline is the nominal one moved along its normals by the spline of deviations over stations.
+
+    within : the stations between which the spline holds; beyond them an outline with ends has the deviation from there
+    """
     from scipy.interpolate import make_interp_spline  # noqa: PLC0415
 
     u = _without_close_pairs(nominal.parameter)
     u = np.sort(np.concatenate([u, (u[1:] + u[:-1]) / 2]))
     station = _stations(nominal, u, start)  # a spline over the station does not feel how the nominal is parametrised
     point, _, _, inward = nominal.frame(u)
-    moved = point + (nominal.outward * nominal.inward * spline(station))[:, None] * inward
+    at = station if nominal.trailing == "round" else np.clip(station, *within)
+    moved = point + (nominal.outward * nominal.inward * spline(at))[:, None] * inward
     nose = float(_stations(nominal, nominal.parameter, start)[nominal.nose_sample])
     if nominal.trailing == "round":
         moved[-1] = moved[0]

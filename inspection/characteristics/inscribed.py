@@ -22,7 +22,7 @@ _NARROWEST_DEG = 30.0  # contacts that a centre sees closer together than this t
 _END_ROUNDS = 8  # narrowing of the place at which the camber line can be followed no farther, 16-fold each
 _TANGENT = 1e-6  # cosine between the radius to a contact and the outline there: more is a search that did not settle
 _AS_LARGE = 1e-9  # of a radius: circles that differ by less are equal
-_OSCULATING = 1e-6  # radius times curvature of the outline, short of one: along an arc all circles are one, and touch it anywhere
+_OSCULATING = 2e-2  # radius times curvature of the outline, short of one: along an arc all circles are one, and touch it anywhere
 _INSIDE = 1e-7  # of the section's length: a place that lies this deep in a circle is taken as in it
 
 

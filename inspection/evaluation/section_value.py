@@ -42,7 +42,7 @@ from inspection.limited_fit import register_within
 from inspection.registration import Registration
 from inspection.signed_deviations import deviations
 from inspection.tolerance import decision_words
-from inspection.verdict import Verdict
+from inspection.verdict import Rejection, Verdict
 
 Array = NDArray[np.float64]
 
@@ -134,11 +134,18 @@ class ActualOutlines:
         """The actual section as a characteristic wants it. Raises InspectionError where too few points lie on it."""
         assert asked.section is not None
         if asked.filter not in self._drawn:
-            d = self._basis.deviations_at(self._basis.drawn(self._basis.rows(None)), self._basis.pose)
+            rows = np.concatenate([self._basis.drawn(self._basis.rows(None)), self._beyond_ends()])
+            d = self._basis.deviations_at(rows, self._basis.pose)
             filtered = None if asked.filter is None else filter_deviations(d, self._basis.nominal, asked.filter).waviness_mm.copy()
             actual = draw_actual_section(asked.section, d, filtered, asked.filter, gap_max_mm=self._basis.result.gap_max_mm)
             self._drawn[asked.filter] = actual, Outline(actual.section)
         return self._drawn[asked.filter]
+
+    def _beyond_ends(self) -> NDArray[np.int64]:
+        """Rows (k,) of the points beyond an open end, in an order of their own: they have no verdict, but tell where the part ends."""
+        rows = np.flatnonzero(self._basis.result.rejection == Rejection.BEYOND_END)
+        points = self._basis.result.section_at(rows)
+        return rows[np.lexsort((points[:, 1], points[:, 0]))]
 
     def best_fit(self) -> Registration:
         """The best fit of all points, from the pose of the run on."""
