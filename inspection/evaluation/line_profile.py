@@ -121,8 +121,8 @@ def judge_profile_so_far(asked: LineProfile, basis: Basis) -> CharacteristicResu
     placed = place_so_far(asked, basis, few)
     asked = replace(asked, uncertainty_mm=uncertainty_of(asked, basis, few, placed))
     seen = _see(asked, basis, rows, placed.pose)
-    stays = asked.region is None or basis.terms.known_pose is not None
-    proven = seen.beyond > 0 and placed.is_known and stays and asked.filter is None and not basis.terms.reject_outliers
+    stays = placed.is_known and asked.fit in _DECIDED and (asked.region is None or basis.terms.known_pose is not None)
+    proven = seen.beyond > 0 and stays and asked.filter is None and not basis.terms.reject_outliers
     verdict = Verdict.NONCONFORM if proven else Verdict.UNCERTAIN
     if seen.worst is None:
         seen = replace(seen, limits=(float(asked.zone.lower_mm.min()), float(asked.zone.upper_mm.max())), consumption=math.nan)

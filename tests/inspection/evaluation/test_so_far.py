@@ -11,6 +11,7 @@ from inspection import (
     Characteristic,
     CharacteristicFit,
     CharacteristicResult,
+    Freedoms,
     LineProfile,
     LiveInspection,
     Outline,
@@ -18,7 +19,9 @@ from inspection import (
     Region,
     RigidTransform,
     SectionCharacteristic,
+    StatedUncertainty,
     ToleranceZone,
+    UncertaintyBudget,
     VaryingZone,
     Verdict,
     WholeProfile,
@@ -122,3 +125,32 @@ def test_few_points_tell_of_a_long_scan() -> None:
         assert scan is not None
         assert len(scan.points_mm) <= 4096
     assert so_far(live)["profile"].deviation == pytest.approx(-0.3, abs=1e-6)
+
+
+@pytest.mark.parametrize("stated", [None, UncertaintyBudget(0.002, 0.002, 1e-5, 0.001)])
+@pytest.mark.parametrize("out_mm", [0.004, 0.03])
+def test_u_and_locked_fits_are_no_less_doubtful_on_the_way_than_at_the_end(stated: UncertaintyBudget | None, out_mm: float) -> None:
+    """A point out by less than U is no proof, and neither is one that is out at a fit with a locked motion: more points still move it."""
+    locked = Freedoms.about((40.0, 0.0), ("y", "rotation"))
+    lines: list[Characteristic] = [
+        LineProfile("none", zone(), fit="none", datum=POSE),
+        LineProfile("datum", zone(), region=AT_DEFECT, fit="datum", datum=POSE),
+        LineProfile("locked", zone(), fit="best-fit", freedoms=locked, datum=POSE),
+    ]
+    own_mm = 0.0 if stated else 0.01
+    live = LiveInspection(
+        NOMINAL,
+        ToleranceZone(-0.05, 0.05, own_mm),
+        datum=POSE,
+        fit="none",
+        uncertainty=StatedUncertainty(stated) if stated else None,
+        characteristics=lines,
+    )
+    scan, red = points(0.05 + out_mm), set[str]()
+    for part in np.array_split(scan, 8):
+        live.add(part)
+        red |= {name for name, one in so_far(live).items() if one.verdict is Verdict.NONCONFORM}
+    end = by_name(live.finish().characteristics)
+    assert red <= {name for name, one in end.items() if one.verdict is Verdict.NONCONFORM}
+    assert red == ({"none", "datum"} if out_mm > 0.02 else set())
+    assert all(one.uncertainty > 0.004 for one in so_far(live).values())
