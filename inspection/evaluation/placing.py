@@ -29,7 +29,8 @@ _GAP_SHARE = 1e-3  # of the zone's width: by so much the proof of a minimum zone
 _GAP_SHARE_REGION = 1e-2  # of a region, which fits nearly as well in many other places of the profile
 _GAP_MM = 1e-5
 _GAP_CONSUMPTION = 0.02  # of the zone, for the proof of a least consumption
-_MOST_BOXES = 200_000
+_MOST_BOXES = 200_000  # of a proof, before it is given up
+_MOST_BOXES_CONSUMPTION = 8_000  # each costs more, and where the zone is far wider than the part needs they are very many
 _FEWEST_POINTS = 4  # of a fit: one more than there are freedoms
 
 
@@ -151,7 +152,7 @@ def _certify(basis: Basis, points: Array, start: Registration, middle_mm: float,
 def _certify_consumption(asked: LineProfile, basis: Basis, points: Array, least: ConsumptionFit, rows: Rows) -> ConsumptionCertificate:
     """The least consumption of points (k, 2) near a fit, and what is proven of every other placement; its rows are those of the run."""
     tip = basis.terms.tip_radius_mm
-    proof = certify_consumption(points, basis.nominal, asked.zone, least, tip, gap=_GAP_CONSUMPTION, most_boxes=_MOST_BOXES)
+    proof = certify_consumption(points, basis.nominal, asked.zone, least, tip, gap=_GAP_CONSUMPTION, most_boxes=_MOST_BOXES_CONSUMPTION)
     order = np.argsort(rows[proof.fit.active])
     active, station = rows[proof.fit.active][order], proof.fit.active_station_mm[order]
     fit = replace(proof.fit, active=active, active_station_mm=station, multipliers=proof.fit.multipliers[order])
