@@ -5,14 +5,15 @@ drawn is drawn here, where an error can be told, and looks the same.
 """
 
 import os
+import pickle
 import shutil
 import signal
+import subprocess
+import sys
 import tempfile
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, closing, suppress
-from multiprocessing import get_context
-from multiprocessing.connection import Connection
 from pathlib import Path
 from queue import SimpleQueue
 from threading import Semaphore
@@ -26,6 +27,8 @@ if TYPE_CHECKING:  # whoever only starts a process loads no matplotlib
 
 _MOST_PROCESSES = 4  # each holds a hundred megabytes
 _WAITING = 2  # pictures for each process, so that a stack of thousands does not fill the memory with them
+_CHILD = "import sys; sys.path.append(sys.argv[1]); from cmmlink.report.picture_processes import serve; serve()"
+_DRAWN, _FAILED = b"+", b"-"
 
 Drawing = Future[Path | None]
 """A picture that may come from another process: its file, or None."""
@@ -122,39 +125,45 @@ class _Beside:
 
 
 class _Process:
-    """A process that draws what comes through its pipe."""
+    """A process that draws what comes through its pipe. It knows nothing of the program that started it, least of all its main script."""
 
     def __init__(self) -> None:
-        context = get_context("spawn")
-        self._pipe, theirs = context.Pipe()
-        self._child = context.Process(target=serve, args=(theirs,), daemon=True)
-        with closing(theirs):
-            self._child.start()
+        command = [sys.executable, "-P", "-c", _CHILD, str(Path(__file__).resolve().parents[2])]
+        self._child = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
 
     def draw(self, content: PictureContent, path: Path) -> bool:
         """Draw a picture, and wait until it is done. False where that failed."""
+        assert self._child.stdin is not None
+        assert self._child.stdout is not None
         try:
-            self._pipe.send((content, path))
-            return bool(self._pipe.recv())
-        except (OSError, EOFError):  # it was ended
+            pickle.dump((content, path), self._child.stdin)
+            self._child.stdin.flush()
+            return self._child.stdout.read(1) == _DRAWN
+        except OSError:  # it was ended
             return False
 
     def close(self) -> None:
         self._child.kill()
-        self._child.join()
-        self._pipe.close()
+        self._child.wait()
+        for pipe in (self._child.stdin, self._child.stdout):
+            assert pipe is not None
+            with suppress(OSError):  # what was still to be sent has no receiver any more
+                pipe.close()
 
 
-def serve(pipe: "Connection[bool, tuple[PictureContent, Path]]") -> None:
+def serve() -> None:
     """Run as the other process: draw what comes, until the pipe closes. Ctrl-C is the business of the one that waits for the pictures."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    asked, told = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what libraries print must not get among the answers
     from cmmlink.report.picture import ProfilePictures  # noqa: PLC0415 - only the process that draws loads matplotlib
 
     pictures = ProfilePictures()
     with suppress(EOFError, OSError):
         while True:
-            content, path = pipe.recv()
-            pipe.send(_is_drawn(pictures, content, path))
+            content, path = pickle.load(asked)
+            told.write(_DRAWN if _is_drawn(pictures, content, path) else _FAILED)
+            told.flush()
 
 
 def _is_drawn(pictures: "ProfilePictures", content: PictureContent, path: Path) -> bool:

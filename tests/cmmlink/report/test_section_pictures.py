@@ -1,6 +1,8 @@
 """Pictures of sections drawn by other processes: the same ones, and all of them whatever becomes of a process."""
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -12,6 +14,26 @@ from cmmlink.report.picture_processes import Pictures, _Process
 from cmmlink.report.section_pictures import SectionPictures
 from inspection import InspectionResult, NominalProfile
 from tests.cmmlink.judged_oval import bumped, inspect_oval
+
+ROOT = Path(__file__).resolve().parents[3]
+UNGUARDED = """
+import sys
+from pathlib import Path
+from cmmlink.report import Pictures
+from cmmlink.report.picture_content import content_of
+from inspection import LiveInspection, RigidTransform, ToleranceZone, discretize
+from tests.inspection import profiles
+
+print("run", flush=True)
+profile = discretize(profiles.p3(), samples=400)
+live = LiveInspection(profile, ToleranceZone(-0.05, 0.05), datum=RigidTransform.identity())
+live.add(profile.points_mm)
+content = content_of(live.finish(), profile, "part")
+with Pictures() as pictures:
+    pictures.start(1)
+    pictures.write(pictures.begin(content), lambda: content, Path(sys.argv[1]))
+print((pictures.drawn_beside, pictures.drawn_here))
+"""
 
 
 def section(profile: NominalProfile, result: InspectionResult | None, height_mm: float) -> Any:
@@ -74,7 +96,7 @@ def test_what_a_process_that_was_ended_has_not_drawn_is_drawn_here(sections: lis
             of_sections.begin(each)
         assert len(drawn(of_sections, sections, tmp_path)) == 3
     assert (pictures.drawn_beside, pictures.drawn_here) == (0, 3)
-    assert not begun[0]._child.is_alive()
+    assert begun[0]._child.returncode is not None
 
 
 def test_few_sections_and_one_core_are_not_worth_a_process(
@@ -96,4 +118,15 @@ def test_the_processes_are_gone_when_the_pictures_are_no_longer_wanted(sections:
         of_sections.expect(16)
         of_sections.begin(sections[0])  # and nobody waits for it
     assert len(begun) == 2
-    assert not any(process._child.exitcode is None for process in begun)
+    assert not any(process._child.returncode is None for process in begun)
+
+
+def test_a_script_without_a_guard_is_not_run_again_by_the_process_that_draws(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(UNGUARDED, encoding="utf-8")
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    ended = subprocess.run(
+        [sys.executable, script, tmp_path / "a.png"], cwd=ROOT, env=environment, capture_output=True, text=True, check=False
+    )
+    assert (ended.stdout, ended.stderr) == ("run\n(1, 0)\n", "")
+    assert (tmp_path / "a.png").stat().st_size > 10_000
