@@ -18,10 +18,19 @@ import numpy as np
 from cmmlink.characteristics import notes_on_zone
 from cmmlink.errors import PlanError
 from cmmlink.events import Ending, RunStarted
-from cmmlink.from_plan import asked_of, check_fixed_place, discretize_file, load_from, notes_on_temperature, run_started, zone_of
+from cmmlink.from_plan import (
+    asked_of,
+    check_fixed_place,
+    discretize_file,
+    load_from,
+    notes_on_temperature,
+    profile_of,
+    run_started,
+    zone_of,
+)
 from cmmlink.outline import outline_of
 from cmmlink.pipeline import RunOutcome
-from cmmlink.plan import CtPlan, Discretisation
+from cmmlink.plan import CtPlan, Discretisation, Plan
 from cmmlink.record import PATIENCE_S, RecordReference, open_to_record
 from cmmlink.result_folder import folder_of
 from cmmlink.result_json import result_json
@@ -45,12 +54,13 @@ from drivers.surface import (
     Open3DProcess,
     SurfaceMesh,
     SurfaceSection,
+    axes_of,
     cut_surface,
     height_range_mm,
     read_obj,
     read_stl,
 )
-from inspection import Characteristic, NominalProfile, StackCharacteristicResult, Verdict
+from inspection import Characteristic, NominalProfile, SectionPlane, StackCharacteristicResult, Verdict
 
 _log = logging.getLogger(__name__)
 
@@ -274,8 +284,11 @@ class _Profiles:
         self._profiles: dict[Path, NominalProfile] = {}
         self._asked: dict[Path, tuple[Characteristic, ...]] = {}
         self.notes: list[str] = []
-        for path in (plan.nominal.file, *self._own.values()):
-            self._load(path)
+        self._in_space: set[Path] = set()
+        where = plan.sections
+        self._load(plan.nominal.file, where.heights_mm[0] if where.heights_mm else where.from_mm or 0.0)
+        for height, path in self._own.items():
+            self._load(path, height)
 
     @property
     def shortest_mm(self) -> float:
@@ -287,13 +300,21 @@ class _Profiles:
         path = near[0] if near else self._plan.nominal.file
         return path, self._profiles[path]
 
-    def asked(self, path: Path) -> tuple[Characteristic, ...]:
-        """The characteristics of the plan for the nominal in a file."""
-        return self._asked[path]
+    def of(self, section: Plan) -> tuple[NominalProfile, tuple[Characteristic, ...]]:
+        """The nominal of one section, and its characteristics; a solid is cut anew, and a curve in space has the section's coordinates."""
+        path = section.nominal.file
+        if path not in self._in_space:
+            return self._profiles[path], self._asked[path]
+        profile = profile_of(section)
+        return profile, asked_of(self._plan, profile)
 
-    def _load(self, path: Path) -> None:
-        nominal = self._plan.nominal
-        file = load_from(nominal, path)
+    def _load(self, path: Path, height_mm: float) -> None:
+        nominal, axes = self._plan.nominal, axes_of(self._plan.sections.normal)
+        file = load_from(nominal, path, SectionPlane(height_mm * axes.normal, axes.x, axes.normal))
+        if file.cut or file.plane is not None:
+            self._in_space.add(path)
+        if file.cut:
+            self.notes.append(f"{path.name}: a solid, which is cut at every section; its notes are of {height_mm:g} mm")
         self.notes += [f"{path.name}: {note}" for note in file.notes]
         self._profiles[path] = discretize_file(file, path, nominal, Discretisation())
         self._asked[path] = asked_of(self._plan, self._profiles[path])
@@ -353,9 +374,10 @@ def _inspect(
     stack: "_Stack", number: int, cut: SurfaceSection, record: StackRecord | None, clock: Callable[[], float], stop: threading.Event
 ) -> SectionOutcome:
     """Send one section through the pipeline. An outline that cannot be this profile is refused before anything is fitted."""
-    plan, (path, profile) = stack.plan, stack.profiles.at(cut.asked_mm)
-    outline, asked = outline_of(cut, profile), stack.profiles.asked(path)
+    plan, (path, _) = stack.plan, stack.profiles.at(cut.asked_mm)
     section, surface = plan_of_section(plan, cut, path), plan.mesh.file.name
+    profile, asked = stack.profiles.of(section)
+    outline = outline_of(cut, profile)
     chosen = choose_outline(outline, section, profile, asked, profile.length_mm / _LEAST_POINTS, surface, clock=clock, stop=stop)
     warnings = [*cut.warnings, *outline.notes, *_beside(cut, chosen.contours)]
     if count_points(chosen.judged) > count_points(chosen.contours):

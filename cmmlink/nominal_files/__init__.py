@@ -39,6 +39,7 @@ class NominalFile:
     notes         : what was assumed or left out, for the reader of the file
     layers        : the layers of a drawing that the curve is drawn on
     plane         : the plane of a curve that a drawing has in space; None for one that is drawn in x and y
+    cut           : whether it is the section of a solid, and another one in another plane
     """
 
     curve: NurbsCurve
@@ -46,6 +47,7 @@ class NominalFile:
     notes: tuple[str, ...]
     layers: tuple[str, ...] = ()
     plane: SectionPlane | None = None
+    cut: bool = False
 
 
 class NominalFormat(Protocol):
@@ -127,7 +129,7 @@ def _drawn(
     drawing = reader.draw(path, section)
     asked = mm_per(unit) if unit else None if scale == 1.0 else scale
     found = nominal_of(drawing, Choice(layer, curve), asked, closed, section)
-    return NominalFile(found.curve, drawing.source_format, found.notes, found.layers, found.plane)
+    return NominalFile(found.curve, drawing.source_format, found.notes, found.layers, found.plane, drawing.cut)
 
 
 def known_suffixes() -> list[str]:

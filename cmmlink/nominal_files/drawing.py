@@ -33,6 +33,7 @@ class Drawing:
     mm_per_unit   : None where the file states no unit
     unit          : how the file states its unit, in words
     has_layers    : whether curves can be told apart by the layer that they are drawn on
+    cut           : whether the curves are the section of a solid by the plane that was asked for
     notes         : what was left out or assumed when it was read
     """
 
@@ -41,6 +42,7 @@ class Drawing:
     mm_per_unit: float | None
     unit: str
     has_layers: bool = True
+    cut: bool = False
     notes: tuple[str, ...] = ()
 
 
@@ -76,10 +78,12 @@ def nominal_of(drawing: Drawing, choice: Choice, scale: float | None, closed: bo
     """
     pieces = _on_layer(drawing, choice.layer)
     factor, unit_note = _factor(drawing, scale)
+    if drawing.cut and drawing.mm_per_unit not in (None, factor):
+        raise NominalError(f"the unit of a solid that is cut is that of its file ({drawing.unit}); expected no other unit and no scale")
     found = chains_of([_scaled(piece, factor) for piece in pieces])
     chain = _chosen(found, choice, closed, drawing.has_layers)
     _refuse_gap(chain, closed)
-    curve, plane, notes = _flat_curve(chain, found.joint, closed, section)
+    curve, plane, notes = _flat_curve(chain, found.joint, closed, section, drawing.cut)
     layers = tuple(chain.layers) if drawing.has_layers else ()
     said = [unit_note, *drawing.notes, *found.notes, *_on_choice(found, chain, layers), *notes]
     return Found(curve, plane, layers, tuple(said))
@@ -108,7 +112,8 @@ def _on_layer(drawing: Drawing, layer: str | None) -> list[Piece]:
     if not chosen:
         layers = sorted({piece.layer for piece in drawing.pieces})
         shown = ", ".join(layers[:_SHOWN]) + (f" and {len(layers) - _SHOWN} more" if len(layers) > _SHOWN else "")
-        raise NominalError(f"no curve is drawn on a layer {layer}; expected one of {shown}")
+        left_out = "; ".join(drawing.notes)
+        raise NominalError(f"no curve is drawn on a layer {layer}; expected one of {shown}{f' ({left_out})' if left_out else ''}")
     return chosen
 
 
@@ -178,14 +183,14 @@ def _refuse_gap(chain: Chain, closed: bool | None) -> None:
 
 
 def _flat_curve(
-    chain: Chain, joint: float, closed: bool | None, section: SectionPlane | None
+    chain: Chain, joint: float, closed: bool | None, section: SectionPlane | None, cut: bool
 ) -> tuple[NurbsCurve, SectionPlane | None, list[str]]:
     """The chain as one curve in its plane, closed ones counter-clockwise from the joint of the greatest x, and what is said of it."""
     pieces = list(chain.pieces)
     points = np.vstack([piece.points for piece in pieces])
     size = float(np.ptp(points, axis=0).max())
     _require_size(points, size)
-    plane, notes = _plane_of(points, size, section)
+    plane, notes = (section, []) if cut and section is not None else _plane_of(points, size, section)
     if chain.closed:
         if _turns_right(pieces, plane):
             pieces = [reverse(piece) for piece in reversed(pieces)]

@@ -1,7 +1,5 @@
 """What Open CASCADE reads of a file, as a drawing: drawn curves, or the section of solids and surfaces by a plane."""
 
-import hashlib
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -9,12 +7,11 @@ import numpy as np
 from cmmlink.nominal_files.chains import counted_names
 from cmmlink.nominal_files.drawing import Drawing, words_of_plane
 from cmmlink.nominal_files.pieces import Piece
-from drivers import CadError, read_bytes
+from drivers import CadError
 from drivers.cad import CadCurves, Kind, read_cad
 from inspection import NominalError, SectionPlane
 
 _XY = ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-Vector = tuple[float, ...]
 
 
 def drawing_by_kernel(
@@ -23,18 +20,12 @@ def drawing_by_kernel(
     """The curves of a file in its own unit; faces are cut by the plane that was asked for, or by that of x and y. Raises NominalError."""
     origin, normal = _XY if section is None else (tuple(section.origin_mm.tolist()), tuple(section.normal.tolist()))
     try:
-        read = _read(str(path), hashlib.sha256(read_bytes(path)).hexdigest(), kind, origin, normal)
+        read = read_cad(path, kind, origin, normal)
     except CadError as error:
         raise NominalError(str(error)) from None
     to_unit = np.array([1 / (mm_per_unit or 1.0)] * 3 + [1.0])
     pieces = [Piece(curve.degree, curve.poles * to_unit, curve.knots, name=f"edge {i}") for i, curve in enumerate(read.curves, 1)]
-    return Drawing(tuple(pieces), source_format, mm_per_unit, unit, has_layers=False, notes=tuple(_notes(read, section)))
-
-
-@lru_cache(maxsize=4)  # a run asks for its nominal several times, and the kernel takes seconds; the content decides
-def _read(path: str, content: str, kind: Kind, origin: Vector, normal: Vector) -> CadCurves:
-    del content
-    return read_cad(Path(path), kind, origin, normal)
+    return Drawing(tuple(pieces), source_format, mm_per_unit, unit, has_layers=False, cut=read.cut, notes=tuple(_notes(read, section)))
 
 
 def _notes(read: CadCurves, section: SectionPlane | None) -> list[str]:

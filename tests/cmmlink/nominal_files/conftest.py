@@ -28,7 +28,6 @@ def occt_process(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPa
 @pytest.fixture
 def occt(occt_process: OcctProcess, monkeypatch: pytest.MonkeyPatch) -> OcctProcess:
     """Let nominal files be read by that one process."""
-    solids._read.cache_clear()
     monkeypatch.setattr(solids, "read_cad", occt_process.read)
     return occt_process
 

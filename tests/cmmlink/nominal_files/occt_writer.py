@@ -9,7 +9,13 @@ from typing import Any
 from OCP.BRep import BRep_Builder
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakeWire
-from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder, BRepPrimAPI_MakePrism, BRepPrimAPI_MakeTorus
+from OCP.BRepPrimAPI import (
+    BRepPrimAPI_MakeBox,
+    BRepPrimAPI_MakeCone,
+    BRepPrimAPI_MakeCylinder,
+    BRepPrimAPI_MakePrism,
+    BRepPrimAPI_MakeTorus,
+)
 from OCP.Geom import Geom_BSplineCurve
 from OCP.gp import gp_Ax1, gp_Ax2, gp_Circ, gp_Dir, gp_Elips, gp_Pnt, gp_Trsf, gp_Vec
 from OCP.IGESControl import IGESControl_Controller, IGESControl_Writer
@@ -104,6 +110,7 @@ def main(folder: Path) -> None:
     prism = BRepPrimAPI_MakePrism(BRepBuilderAPI_MakeFace(wire()).Face(), gp_Vec(0, 0, 50)).Shape()
     write_step(prism, folder / "prism.step")
     write_iges([part], folder / "part.igs")
+    write_step(BRepPrimAPI_MakeCone(20.0, 15.0, 20.0).Shape(), folder / "cone.step")
     assembly, builder = TopoDS_Compound(), BRep_Builder()
     builder.MakeCompound(assembly)
     builder.Add(assembly, prism.Moved(moved()))

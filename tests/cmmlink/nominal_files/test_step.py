@@ -12,11 +12,13 @@ import pytest
 from cmmlink.nominal_files import NominalFile, load_nominal
 from drivers import CadError
 from drivers.cad import OcctProcess
-from inspection import NominalError, SectionPlane, deviations, discretize
+from inspection import NominalError, SectionPlane, Verdict, deviations, discretize
+from tests.cmmlink.blade import inspect, plan_of
 from tests.cmmlink.nominal_files.conftest import ROOT
 from tests.cmmlink.nominal_files.iges_text import iges, wire_entities
 from tests.cmmlink.nominal_files.test_dxf import draw_wire, new, saved
 from tests.cmmlink.nominal_files.wire import TRUTH, require_wire
+from tests.drivers.surface.meshes import binary_stl, tube, write
 
 UNIT_WORDS = {"MM": "mm", "INCH": "inch", "M": "m"}
 TORUS = (30.0, 8.0)
@@ -158,3 +160,29 @@ def test_a_process_that_is_killed_at_work_costs_a_message_and_is_started_again(o
         occt.read(pipe, "step", (0, 0, 0), (0, 0, 1))
     killer.join()
     require_wire(load_nominal(cad_files / "wire-AP203-MM.step").curve)
+
+
+@pytest.mark.usefixtures("occt")
+def test_the_coordinates_of_a_section_are_those_of_its_plane_and_its_unit_is_that_of_the_file(cad_files: Path) -> None:
+    """The torus is cut where z is 0, in axes whose x is the y of the part: its outer circle lies about (0, 3) there."""
+    circle = load_nominal(cad_files / "torus.step", curve=1, section=plane((3, 0, 0), (0, 0, 1), (0, 1, 0))).curve
+    x, y = (circle.point(np.linspace(*circle.domain, 200)) - [0, 3]).T
+    np.testing.assert_allclose(np.hypot(x, y), sum(TORUS), atol=2e-8)
+    with pytest.raises(NominalError, match=r"the unit of a solid that is cut is that of its file \(inch\)"):
+        load_nominal(cad_files / "part.step", unit="mm", curve=1, section=plane((0, 0, 10), (0, 0, 1)))
+
+
+@pytest.mark.usefixtures("occt")
+def test_every_section_of_a_surface_is_held_against_the_section_of_the_solid_at_its_height(cad_files: Path, tmp_path: Path) -> None:
+    """A cone from radius 20 to 15 over 20 mm, whose surface stands off by 0.02 mm everywhere: one circle would not do for three heights."""
+    turn = np.linspace(0, 2 * np.pi, 721)[:-1]
+    triangles = tube(np.column_stack([np.cos(turn), np.sin(turn)]), np.linspace(0.0, 20.0, 5))
+    triangles[:, :, :2] *= 20.02 - 0.25 * triangles[:, :, 2:]
+    surface = write(tmp_path / "cone.stl", binary_stl(triangles))
+    stack = inspect(plan_of(surface, cad_files / "cone.step", {"heights_mm": [2.0, 10.0, 18.0]}, registration={"fit": "none"}))
+    assert stack.verdict == Verdict.CONFORM
+    for section in stack.sections:
+        assert section.run.result is not None
+        assert section.profile.length_mm == pytest.approx(2 * np.pi * (20 - 0.25 * section.slice.height_mm), abs=1e-9)
+        assert section.run.result.deviation_mm == pytest.approx(0.02, abs=1e-3)
+    assert any("a solid, which is cut at every section" in note for note in stack.notes)
