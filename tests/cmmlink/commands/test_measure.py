@@ -81,7 +81,7 @@ def test_a_device_that_is_not_there_is_a_device_failure_and_proves_nothing(nomin
 def test_check_says_what_would_be_run(nominal: Path) -> None:
     ended = cmmlink("check", write_plan(nominal))
     assert (ended.code, ended.err) == (0, "")
-    first, rule, room, nominal_line, *_ = ended.out.splitlines()
+    first, room, nominal_line, rule, *_ = ended.out.splitlines()
     assert first.endswith("can be run: oval, zone -0.05 .. +0.05 mm, file points.csv")
     assert rule == "decision rule: U not stated: simple acceptance"
     assert "room for" in room
