@@ -12,7 +12,7 @@ from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
 from cmmlink.report.heading import draw_heading, fix_labels, save_picture
-from cmmlink.report.picture_content import ABOVE, LOOKS, PictureContent, content_of
+from cmmlink.report.picture_content import ABOVE, LOOKS, DrawnRegion, PictureContent, content_of
 from inspection import ToleranceZone
 
 if TYPE_CHECKING:  # a process that only draws loads nothing of what judges
@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 # Everything has its place beforehand: to find places for labels of unknown size takes longer than to draw the picture.
 _PLACES = {"height_ratios": (3, 2), "left": 0.09, "right": 0.905, "bottom": 0.08, "top": 0.92, "hspace": 0.32}
 _NOMINAL, _BAND, _OPEN = "#3a3f45", "#dfe7ee", "#f3e3c2"
+_REGION, _MOST_LETTERS = "#5b4490", 40  # of the name of a region
 _NEAR_AN_EDGE = 0.18  # of the width: half a label
 
 
@@ -72,10 +73,24 @@ def _draw_profile(axes: Axes, content: PictureContent) -> None:
         axes.add_collection(PathCollection([whiskers], facecolors="none", edgecolors=look.colour, linewidths=0.7))
     if content.worst is not None:
         axes.plot(*content.worst.tip_mm, "o", ms=9, mfc="none", mec=ABOVE, mew=1.5)
+    for region in content.regions:
+        _draw_region(axes, region, content)
+    if len(content.places_mm):
+        axes.plot(*content.places_mm.T, "x", ms=6, color=_REGION, mew=1.2)
     axes.set_aspect("equal")
     axes.autoscale_view()
     axes.set(xlabel="x (mm)", ylabel="y (mm)")
     axes.set_title(f"deviations magnified {factor:g} times, tolerance band shaded", y=1.0)
+
+
+def _draw_region(axes: Axes, region: DrawnRegion, content: PictureContent) -> None:
+    axes.plot(*region.line_mm.T, color=_REGION, lw=1.2)
+    if not len(region.line_mm):
+        return
+    name = region.name if len(region.name) <= _MOST_LETTERS else f"{region.name[: _MOST_LETTERS - 3]}..."
+    middle, left, width = region.line_mm[len(region.line_mm) // 2], content.nominal_mm[:, 0].min(), np.ptp(content.nominal_mm[:, 0])
+    side = side_of_label(float((middle[0] - left) / width))
+    axes.annotate(name, middle, (0, 4), textcoords="offset points", ha=side, fontsize=8, color=_REGION, parse_math=False)
 
 
 def _draw_strip(axes: Axes, content: PictureContent) -> None:

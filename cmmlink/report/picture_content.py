@@ -22,6 +22,7 @@ Rows = NDArray[np.int64]
 
 GOOD, UNPROVEN, ABOVE, BELOW = "#2a7fa5", "#a16207", "#c2410c", "#6d28d9"
 _BAND_SHARE = 0.06  # of the part's size: how wide the magnified tolerance band is drawn
+_LANE_SHARE = 0.015  # of the part's size: how far the lines of regions are apart
 _MOST_WHISKERS = 1500
 _MOST_POINTS = 65536  # in the strip: more would take minutes and show no more
 
@@ -65,6 +66,14 @@ class Worst:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class DrawnRegion:
+    """The region of a characteristic, as a line (r, 2) beside the band."""
+
+    name: str
+    line_mm: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class PictureContent:
     """Everything that the picture of a profile shows.
 
@@ -77,6 +86,8 @@ class PictureContent:
     magnification : how many times as large deviations are drawn on the profile
     shown         : the points of each of `LOOKS`
     worst         : None where nothing was judged
+    regions       : of the characteristics that are of a part of the profile
+    places_mm     : (p, 2) places that values of characteristics were found at
     heading, basis, foot : what stands above the picture, above the strip, and small at the foot
     """
 
@@ -89,6 +100,8 @@ class PictureContent:
     magnification: float
     shown: tuple[Shown, ...]
     worst: Worst | None
+    regions: tuple[DrawnRegion, ...]
+    places_mm: Array
     heading: str
     basis: str
     foot: str
@@ -117,6 +130,8 @@ def content_of(
         factor,
         _shown(result, telling, factor),
         _worst(result, factor),
+        _regions(result, nominal, factor),
+        np.array([place[1:] for found in result.characteristics for place in found.places_mm]).reshape(-1, 2),
         headline_on_picture(result, title, ending),
         f"{basis}\n{result.zone.decision_rule}{shaded}",
         said,
@@ -142,6 +157,19 @@ def _uncertainty_along(result: "InspectionResult") -> Array:
         return np.empty((0, 2))
     rows = found.telling_places()
     return np.column_stack([found.station_mm[rows], found.expanded_mm[rows]])
+
+
+def _regions(result: "InspectionResult", nominal: "NominalProfile", factor: float) -> tuple[DrawnRegion, ...]:
+    """The regions of the characteristics, each in a lane of its own outside the magnified band."""
+    found = [(one.name, one.region) for one in result.characteristics if one.region is not None]
+    lane_mm, drawn = _LANE_SHARE * float(np.hypot(*np.ptp(nominal.points_mm, axis=0))), []
+    for lane, (name, region) in enumerate(found, 1):
+        along = np.mod(nominal.station_mm - region.from_mm, nominal.length_mm)
+        order = np.argsort(along, kind="stable")
+        rows = order[along[order] <= np.mod(region.to_mm - region.from_mm, nominal.length_mm)]
+        away = factor * result.zone.upper_mm + lane * lane_mm
+        drawn.append(DrawnRegion(name, (nominal.points_mm + away * nominal.outward * nominal.normal)[rows]))
+    return tuple(drawn)
 
 
 def _shown(result: "InspectionResult", telling: Rows, factor: float) -> tuple[Shown, ...]:

@@ -1,6 +1,7 @@
 """The picture of a profile: its band, its whiskers, and points drawn by their verdicts."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ from matplotlib.image import imread
 
 from cmmlink.report.picture import ProfilePictures, names_of_limits, side_of_label, write_picture
 from cmmlink.report.picture_content import content_of, headline_on_picture, magnification
-from inspection import NominalProfile, ToleranceZone
+from inspection import NominalProfile, Region, ToleranceZone
 from tests.cmmlink.judged_oval import bumped, inspect_oval
 
 
@@ -42,6 +43,24 @@ def test_points_nearer_to_a_limit_than_the_uncertainty_are_drawn_neither_good_no
     write_picture(inspect_oval(profile, deviation_mm), profile, "oval", tmp_path / "a.png")
     assert pixels_of(tmp_path / "a.png", UNPROVEN) > 1000
     assert pixels_of(tmp_path / "a.png", GOOD) == pixels_of(tmp_path / "a.png", BELOW) == 0
+
+
+def test_regions_are_drawn_beside_the_band_and_places_where_values_were_found(profile: NominalProfile, tmp_path: Path) -> None:
+    result, path = inspect_oval(profile, 0.02), tmp_path / "regions.png"
+    (whole,) = result.characteristics
+    seam = replace(whole, name="over the seam", region=Region(0.9 * profile.length_mm, 0.1 * profile.length_mm))
+    place = replace(whole, name="chord", places_mm=(("leading", 1.0, 2.0),))
+    content = content_of(replace(result, characteristics=(whole, seam, place)), profile, "oval")
+    (region,) = content.regions
+    beside = np.hypot(*(region.line_mm[:, None] - profile.points_mm[None]).transpose(2, 0, 1))
+    shares = profile.station_mm[beside.argmin(axis=1)] / profile.length_mm
+    assert ((shares > 0.88) | (shares < 0.12)).all()
+    assert beside.min() > content.magnification * result.zone.upper_mm, "outside the magnified band"
+    assert content.places_mm.tolist() == [[1.0, 2.0]]
+    ProfilePictures().write(content, path)
+    write_picture(result, profile, "oval", tmp_path / "none.png")
+    assert pixels_of(path, "#5b4490") > 100
+    assert pixels_of(tmp_path / "none.png", "#5b4490") == 0
 
 
 def test_the_label_of_the_worst_point_stays_inside_the_drawing_at_either_end() -> None:
