@@ -29,7 +29,7 @@ _GAP_SHARE = 1e-3  # of the zone's width: by so much the proof of a minimum zone
 _GAP_SHARE_REGION = 1e-2  # of a region, which fits nearly as well in many other places of the profile
 _GAP_MM = 1e-5
 _GAP_CONSUMPTION = 0.02  # of the zone, for the proof of a least consumption
-_MOST_BOXES = 200_000  # of a proof, before it is given up
+_MOST_BOXES = 50_000  # of a proof, before it is given up: the printed zones need a third of them
 _MOST_BOXES_CONSUMPTION = 8_000  # each costs more, and where the zone is far wider than the part needs they are very many
 _FEWEST_POINTS = 4  # of a fit: one more than there are freedoms
 
