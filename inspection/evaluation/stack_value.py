@@ -83,7 +83,7 @@ def _judge(
         for one, is_proven, guard in zip(deviation.tolist(), proven.tolist(), guards.tolist(), strict=True)
     ]
     verdict = max(verdicts) if lost is None else max(*verdicts, Verdict.UNCERTAIN)
-    worst = _worst(deviation, verdicts, asked)
+    worst = _worst(deviation, uncertainty, verdicts, asked)
     asked, added = replace(asked, uncertainty=float(np.nan_to_num(uncertainty[worst]))), not asked.uncertainty and uncertainty[worst] > 0
     heights = [section.height_mm for section in sections] if len(verdicts) == len(sections) else []
     at = heights[worst] if heights else math.nan
@@ -172,9 +172,11 @@ def _limit_reason(
     return Reason("out-of-tolerance", f"{told}.")
 
 
-def _worst(deviation: Array, verdicts: Sequence[Verdict], asked: StackCharacteristic) -> int:
-    """Which value is shown: the one that goes farthest, of those with the worst verdict if they have one."""
-    beyond = np.nan_to_num(np.maximum(asked.lower - deviation, deviation - asked.upper), nan=-np.inf, neginf=-1e300)
+def _worst(deviation: Array, uncertainty: Array, verdicts: Sequence[Verdict], asked: StackCharacteristic) -> int:
+    """Which value is shown: the one that may go farthest, of those with the worst verdict if they have one."""
+    beyond = np.nan_to_num(uncertainty) + np.nan_to_num(
+        np.maximum(asked.lower - deviation, deviation - asked.upper), nan=-np.inf, neginf=-1e300
+    )
     worst = np.array([verdict == max(verdicts) for verdict in verdicts]) & np.isfinite(deviation)
     return int(np.where(worst if worst.any() else np.isfinite(deviation), beyond, -np.inf).argmax())
 

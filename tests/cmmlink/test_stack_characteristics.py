@@ -224,3 +224,20 @@ def test_a_stack_of_one_section_is_refused_and_so_are_heights_without_a_section(
         judged(tmp_path, spline, straight(spline), [TWIST], sections={"heights_mm": (2.0,)})
     with pytest.raises(PlanError, match="no section is at reference_mm 3; the nearest is at 2 mm"):
         judged(tmp_path, spline, straight(spline), [{**TWIST, "reference_mm": 3}], sections={"every_mm": 2.0, "from_mm": 2.0, "to_mm": 8.0})
+
+
+def test_a_budget_gives_every_characteristic_of_the_stack_its_u(tmp_path: Path, spline: BSpline) -> None:
+    """Those of the sections, which follow from the budget, added up; a twist less certain than its tolerance is not proven."""
+    taper = {"name": "taper", "type": "taper", "of": "thickness", "method": "inscribed", "lower": -0.1, "upper": 0.1}
+    budget = {"repeatability_mm": 0.002, "mpe": "4 + L/100 um"}
+    stack = judged(tmp_path, spline, straight(spline), [*ALL[:1], *ALL[4:7], taper], uncertainty=budget)
+    found = {one.found.name: one.found for one in stack.characteristics}
+    assert all(one.uncertainty > 0 and "added as if" in one.notes[-1] for one in found.values())
+    assert {one.verdict for one in found.values()} == {Verdict.CONFORM}
+    narrow = {**TWIST, "lower_deg": -0.5 * found["twist"].uncertainty, "upper_deg": 0.5 * found["twist"].uncertainty}
+    (twist,) = judged(tmp_path, spline, straight(spline), [narrow], uncertainty=budget).characteristics
+    assert twist.found.verdict is Verdict.UNCERTAIN
+    (simple,) = judged(tmp_path, spline, straight(spline), [narrow], uncertainty=budget, decision_rule="simple").characteristics
+    assert simple.found.verdict is Verdict.CONFORM
+    assert {section.run.result.zone.rule for section in stack.sections if section.run.result} == {"iso-14253-1"}
+    assert all(section.result_json()["uncertainty"]["used_mm"] > 0.004 for section in stack.sections)
