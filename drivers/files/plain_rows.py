@@ -5,7 +5,6 @@ refused: such a file is read with care (text_table).
 """
 
 from collections.abc import Callable, Iterator
-from itertools import islice
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -30,14 +29,14 @@ def read_plain_rows(file: BinaryIO, delimiter: str | None, decimal: str, room: R
 
     Raises ValueError, which names the line, where anything else than such rows is in it.
     """
-    lines = iter(_Lines(file, delimiter, decimal, first_line))
-    values = _parse(list(islice(lines, _ROWS_AT_ONCE)), delimiter, first_line)
+    lines = _Lines(file, delimiter, decimal, first_line)
+    values = _parse(lines.take(_ROWS_AT_ONCE), delimiter, first_line)
     count = len(values)
     if count < _ROWS_AT_ONCE:
         return values
     begun, values = values, room((count + _most_lines(file) + 1, values.shape[1]), np.float64)
     values[:count] = begun
-    while rows := list(islice(lines, _ROWS_AT_ONCE)):
+    while rows := lines.take(_ROWS_AT_ONCE):
         values[count : count + len(rows)] = _parse(rows, delimiter, first_line + count, values.shape[1])
         count += len(rows)
     return values[:count]
@@ -86,22 +85,30 @@ class _Lines:
     def __init__(self, file: BinaryIO, delimiter: str | None, decimal: str, first_line: int) -> None:
         self._file, self._decimal, self._next_line = file, decimal.encode(), first_line
         self._signs = _SIGNS + self._decimal + (delimiter or "\t").encode()
+        self._coming, self._ready = self._pieces(), list[str]()
 
-    def __iter__(self) -> Iterator[str]:
+    def take(self, count: int) -> list[str]:
+        """The next lines, so many or all that are left."""
+        while len(self._ready) < count and (lines := next(self._coming, None)) is not None:
+            self._ready += lines
+        taken, self._ready = self._ready[:count], self._ready[count:]
+        return taken
+
+    def _pieces(self) -> Iterator[list[str]]:
         begun = b""  # a line whose end is still to come
         while chunk := self._file.read(_CHUNK):
             if chunk.translate(None, self._signs) or len(begun) > _CHUNK:
                 self._refuse(begun + chunk)
             whole, end, begun = (begun + chunk).rpartition(b"\n")
-            yield from self._lines(whole + end)
-        yield from self._lines(begun.rstrip(b"\r"))
+            yield self._lines(whole + end)
+        yield self._lines(begun.rstrip(b"\r"))
 
-    def _lines(self, chunk: bytes) -> Iterator[str]:
+    def _lines(self, chunk: bytes) -> list[str]:
         if chunk.count(b"\r") != chunk.count(b"\r\n"):
             self._refuse(chunk)
         lines = chunk.replace(self._decimal, b".").decode("ascii").splitlines()
-        yield from lines
         self._next_line += len(lines)
+        return lines
 
     def _refuse(self, chunk: bytes) -> None:
         """Raise ValueError for the first line of a chunk that is not of plain numbers, or ends in another way than the others."""

@@ -47,7 +47,7 @@ class Work(Counter[str]):
             self["rows fitted"] += (found.steps + 1) * len(fit.weights)
             return found
 
-        def lines(own: Any, chunk: bytes) -> Iterator[str]:
+        def lines(own: Any, chunk: bytes) -> list[str]:
             self["bytes read"] += len(chunk)
             return read(own, chunk)
 

@@ -164,3 +164,25 @@ def test_a_long_file_takes_no_more_memory_than_its_numbers() -> None:
         peaks.append(tracemalloc.get_traced_memory()[1] - 16 * count)
         tracemalloc.stop()
     assert peaks[2] < 0.5 * 16 * rows[2] + 2e6
+
+
+def test_lines_are_taken_as_often_as_asked_whatever_the_pieces_that_are_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    """So many or all that are left, in order; a piece of the file is turned into lines once."""
+    monkeypatch.setattr(plain_rows, "_CHUNK", 64)
+    text = b"".join(b"%d,%d\r\n" % (i, i * i) for i in range(500))
+    lines, turned = plain_rows._Lines(io.BytesIO(text), ",", ".", 1), 0
+    own = lines._lines
+
+    def count(chunk: bytes) -> list[str]:
+        nonlocal turned
+        turned += len(chunk)
+        return own(chunk)
+
+    monkeypatch.setattr(lines, "_lines", count)
+    taken: list[str] = []
+    for size in (1, 7, 100, 3, 380, 50, 50):
+        rows = lines.take(size)
+        assert len(rows) == min(size, 500 - len(taken))
+        taken += rows
+    assert taken == text.decode().split()
+    assert turned == len(text)
