@@ -96,11 +96,10 @@ def test_points_that_are_not_numbers_are_refused() -> None:
 def test_a_coarse_pose_does_not_depend_on_how_many_heads_take_turns(name: str) -> None:
     """Of three heads that take turns, every third point is of one: a score of every so many points would look at a part of the profile."""
     nominal, heads = nominal_of(name), np.arange(1599).reshape(3, -1).T.ravel()
-    for seed in range(3):
-        rng = np.random.default_rng(seed)
-        u = np.sort(rng.uniform(*nominal.curve.domain, 1599))
-        form = 0.1 * np.sin(6 * np.pi * (u - u[0]) / (u[-1] - u[0]) + seed)
-        points = profiles.rotated(profiles.offset_points(nominal.curve, u, form + rng.normal(0, 0.05, 1599)), 33.0, (5.0, 7.0))
-        orders = (np.arange(1599), heads, np.roll(heads, 1), np.roll(heads, 2))
-        poses = [register_coarse(points[order], nominal).nominal_from_section for order in orders]
-        assert len({(pose.rotation_rad, *pose.translation_mm.tolist()) for pose in poses}) == 1
+    rng = np.random.default_rng(0)
+    u = np.sort(rng.uniform(*nominal.curve.domain, 1599))
+    form = 0.1 * np.sin(6 * np.pi * (u - u[0]) / (u[-1] - u[0]))
+    points = profiles.rotated(profiles.offset_points(nominal.curve, u, form + rng.normal(0, 0.05, 1599)), 33.0, (5.0, 7.0))
+    orders = (np.arange(1599), heads, np.roll(heads, 1), np.roll(heads, 2))
+    poses = [register_coarse(points[order], nominal).nominal_from_section for order in orders]
+    assert len({(pose.rotation_rad, *pose.translation_mm.tolist()) for pose in poses}) == 1
