@@ -92,9 +92,12 @@ def _without_copies(pieces: list[Piece], joint: float, size: float, notes: list[
         return pieces
     from scipy.spatial import cKDTree  # noqa: PLC0415 - a file of points is read without it
 
-    signature = np.array([[piece.length, *piece.centroid] for piece in pieces])
-    dropped: set[int] = set()
-    for first, second in sorted(cKDTree(signature).query_pairs(_ALIKE * size)):
+    first_of: dict[tuple[bytes, bytes], int] = {}  # copies to the last bit need no closer look: a drawing may hold thousands
+    alike = [first_of.setdefault((piece.poles.tobytes(), piece.knots.tobytes()), i) for i, piece in enumerate(pieces)]
+    dropped = {i for i, first in enumerate(alike) if first != i}
+    single = np.array([i for i in range(len(pieces)) if i not in dropped])
+    signature = np.array([[pieces[i].length, *pieces[i].centroid] for i in single])
+    for first, second in single[np.array(sorted(cKDTree(signature).query_pairs(_ALIKE * size)), dtype=np.int64).reshape(-1, 2)].tolist():
         if not {first, second} & dropped and _lies_on(pieces[second], pieces[first], joint):
             dropped.add(second)
     if dropped:
