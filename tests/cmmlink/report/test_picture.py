@@ -11,8 +11,9 @@ from matplotlib.image import imread
 
 from cmmlink.report.picture import ProfilePictures, names_of_limits, side_of_label, write_picture
 from cmmlink.report.picture_content import content_of, headline_on_picture, magnification
-from inspection import NominalProfile, Region, ToleranceZone
+from inspection import LiveInspection, NominalProfile, Region, RigidTransform, StatedUncertainty, ToleranceZone, UncertaintyBudget
 from tests.cmmlink.judged_oval import bumped, inspect_oval
+from tests.cmmlink.oval_part import oval_points
 
 
 def pixels_of(path: Path, colour: str) -> int:
@@ -99,3 +100,18 @@ def test_pictures_on_one_figure_are_those_on_a_new_one_each(profile: NominalProf
         pictures.write(content_of(result, profile, f"part {number}", "complete", said), tmp_path / "one.png")
         write_picture(result, profile, f"part {number}", tmp_path / "new.png", "complete", said)
         np.testing.assert_array_equal(imread(tmp_path / "one.png"), imread(tmp_path / "new.png"))
+
+
+def test_the_u_of_each_station_is_shaded_around_the_limits_where_a_budget_was_stated(profile: NominalProfile, tmp_path: Path) -> None:
+    """As far as each U goes: twice the budget, twice the shade. By simple acceptance U does not count, and nothing is shaded."""
+    shaded = {}
+    for name, u_mm in (("none", 0.0), ("one", 0.003), ("two", 0.006), ("simple", 0.006)):
+        stated = StatedUncertainty(UncertaintyBudget(tip_radius_mm=u_mm)) if u_mm else None
+        zone = ToleranceZone(-0.05, 0.07, rule="simple" if name == "simple" else "iso-14253-1")
+        live = LiveInspection(profile, zone, datum=RigidTransform.identity(), uncertainty=stated)
+        live.add(oval_points(0.0))
+        write_picture(live.finish(), profile, "oval", tmp_path / "a.png")
+        shaded[name] = pixels_of(tmp_path / "a.png", "#f3e3c2")
+    assert max(shaded["none"], shaded["simple"]) < 300  # smoothed edges of other colours
+    assert shaded["one"] > 3000
+    assert shaded["two"] == pytest.approx(2 * shaded["one"], rel=0.25)
