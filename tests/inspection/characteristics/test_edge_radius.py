@@ -1,3 +1,9 @@
+"""Radii of edges: closed forms, an independent fit, and what has none.
+
+The published least-squares data of NIST (StRD) hold no circles, and no public set of circles or lines was found to take instead: so arcs,
+ellipses and a library's minimiser are the truth here.
+"""
+
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
