@@ -8,11 +8,12 @@ from datetime import datetime
 import numpy as np
 import pytest
 
-from cmmlink.events import Arrived, Counts, Judged, ProvenOut, RunFinished, RunStarted
+from cmmlink.events import Arrived, Counts, Evaluated, Judged, ProvenOut, RunFinished, RunStarted
 from cmmlink.extremes import Extremes, PointsVersion
 from cmmlink.run_view import RunContext, RunView
 from drivers import Arrival, LinkDown, LinkUp, PointBatch, ScanClosed, ScanOpened
 from inspection import LiveUpdate, NominalProfile, NurbsCurve, State, ToleranceZone, discretize
+from tests.cmmlink.test_characteristic_rows import CHORD, OUT, PROVEN
 
 UNSEEN = PointsVersion(-1, 0)
 NOON = datetime(2026, 11, 22, 12)
@@ -26,10 +27,10 @@ def profile() -> NominalProfile:
 class Played:
     """A view whose clock and events the test plays."""
 
-    def __init__(self, profile: NominalProfile) -> None:
+    def __init__(self, profile: NominalProfile, base: int | None = 0) -> None:
         self.now_s = 100.0
         self.profile = profile
-        context = RunContext("7", "blade.yaml", profile, ToleranceZone(-0.05, 0.05, 0.01), 0.95, 5000, NOON)
+        context = RunContext("7", "blade.yaml", profile, ToleranceZone(-0.05, 0.05, 0.01), 0.95, 5000, NOON, base=base)
         self.view = RunView(context, lambda: self.now_s, lambda: NOON)
         self.view(RunStarted("blade", "B-1", "Ada", "COM3", False))
 
@@ -126,6 +127,32 @@ def test_red_is_said_only_of_what_is_proven(played: Played) -> None:
     assert told.why == "no placement of the first 3 points passes"
     played.judge(0, [0.0, 0.01, -0.03, 0.0])
     assert played.view.state().verdict == told, "more points cannot undo a proof"
+
+
+def test_the_verdict_names_the_characteristic_that_it_comes_from(played: Played) -> None:
+    played.arrive(ScanOpened("scanner", "S-9", 4))
+    played.judge(0, [0.0, 0.01])
+    told = []
+    for chord in (CHORD, OUT, PROVEN):
+        played.view(Evaluated(played.now_s, (replace(CHORD, name="contour"), chord), None))
+        verdict = played.view.state().verdict
+        told.append((verdict.word, verdict.shape, verdict.of))
+    assert told == [("NOT PROVEN", "not-proven", ""), ("LOOKS OUT", "not-proven", "chord"), ("NOT CONFORM", "not-conform", "chord")]
+    played.view(Evaluated(played.now_s, (replace(CHORD, name="contour"), OUT), None))
+    played.view(ProvenOut(played.now_s, 2))
+    assert [row.word for row in played.view.characteristics.rows] == ["NOT CONFORM", "LOOKS OUT"]
+    assert played.view.state().verdict.of == "contour"
+
+
+def test_points_out_prove_nothing_where_no_characteristic_need_fail_by_them(profile: NominalProfile) -> None:
+    """As where the first profile is judged through a filter, which may take the points in."""
+    played = Played(profile, base=None)
+    played.arrive(ScanOpened("scanner", "S-9", 4))
+    played.view(Evaluated(played.now_s, (CHORD, CHORD), None))
+    played.judge(0, [0.0, 0.2], "settled")
+    played.view(ProvenOut(played.now_s, 2))
+    assert (played.view.state().verdict.word, played.view.state().verdict.shape) == ("LOOKS OUT", "not-proven")
+    assert [row.word for row in played.view.characteristics.rows] == ["so far", "so far"]
 
 
 def test_with_a_known_pose_a_point_that_is_out_is_proof(played: Played) -> None:

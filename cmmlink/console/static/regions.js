@@ -62,8 +62,9 @@ export const roomOf = (regions, text) => (regions.length ? LANE_PX * Math.max(..
 export function drawRegions(pen, profile) {
   const { regions, chosen, zone, drawnAt, seen } = profile;
   const inOrder = [...regions].sort((one, other) => Number(other.row === chosen) - Number(one.row === chosen));
+  const { height, text, width } = profile.sheet;
   /** @type {Box[]} */
-  const boxes = [];
+  const boxes = [[0, height - 2.4 * text, 0.3 * width, height]]; // there stands the ruler
   for (const { row, lane } of inOrder) {
     const isChosen = row === chosen, distance = drawnAt * zone.upper_mm + (FROM_LIMIT_PX + LANE_PX * lane) / seen.scale;
     pen.strokeStyle = isChosen ? INK.chosen : INK.region;
