@@ -12,7 +12,10 @@ from pathlib import Path
 
 PLACEHOLDERS = ("part", "serial", "run")
 _PLACEHOLDER = re.compile(r"\{(\w*)\}")
-_OF_A_RUN = ("result.json", "deviations.csv", "uncertainty.csv", "profile.png", "sections.csv", "stack.png")
+_OF_A_RUN = (
+    "result.json", "deviations.csv", "characteristics.csv", "zone.json", "uncertainty.csv", "profile.png", "profile.svg", "report.pdf",
+    "sections.csv", "stack.png",
+)  # fmt: skip
 _SECTIONS = "section-*_*mm"
 _LONGEST_NAME = 80
 _RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)  # names of devices on Windows

@@ -478,6 +478,13 @@ class Exported(_Json):
     )
 
 
+class Reported(_Json):
+    """The answer of `report`."""
+
+    run: str = Field(description="the id of the run")
+    file: str = Field(description="the PDF file that was written")
+
+
 class Alteration(_Json):
     """The first record that is not as it was written."""
 

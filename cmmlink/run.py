@@ -38,6 +38,7 @@ class FinishedRun:
     began : date and time of day, with its zone
     """
 
+    plan: Plan
     profile: NominalProfile
     started: RunStarted
     outcome: RunOutcome
@@ -138,4 +139,4 @@ def carry_out(
     evidence = recorder.evidence if recorder else None
     if evidence is not None:
         _log.info("recorded in %s as run %s, chain %s, plan %s", records, evidence.run, evidence.chain_sha256, evidence.plan_sha256)
-    return FinishedRun(profile, started, outcome, evidence, began)
+    return FinishedRun(plan, profile, started, outcome, evidence, began)

@@ -50,6 +50,7 @@ def plan_of_section(plan: CtPlan, cut: SurfaceSection, nominal: Path) -> Plan:
         end_allowance_mm=plan.end_allowance_mm,
         allow=plan.allow,
         out=None,
+        report=plan.report,
     )
 
 

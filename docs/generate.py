@@ -24,6 +24,7 @@ from cmmlink.result_keys import (
     Measured,
     Recorded,
     Replayed,
+    Reported,
     Runs,
     Shown,
     StackInspected,
@@ -117,6 +118,7 @@ OBJECTS: tuple[tuple[str, type[BaseModel], type[BaseModel] | None], ...] = (
     ("`runs`", Runs, None),
     ("`show`, and `run.json` of `export`", Shown, None),
     ("`export`", Exported, None),
+    ("`report`", Reported, None),
     ("`verify`", Verified, None),
     ("`verify-zone`", ZonesVerified, None),
 )

@@ -18,6 +18,7 @@ from cmmlink.commands.exit_codes import DEVICE_FAILED, NO_RECORD, STOPPED, UNUSA
 from cmmlink.commands.measure import demo, inspect, run
 from cmmlink.commands.proofs import verify_zone
 from cmmlink.commands.records import export, replay, runs, show, verify
+from cmmlink.commands.report import report
 from cmmlink.commands.setup import check, doctor, list_ports, nominal, prepare, simulate
 from cmmlink.commands.surfaces import ManyHeights, ct
 from cmmlink.errors import PlanError, RunError, StoreError
@@ -48,6 +49,7 @@ app.command(add_help_option=False, context_settings={"allow_extra_args": True, "
 app.command()(runs)
 app.command()(show)
 app.command()(export)
+app.command()(report)
 app.command()(replay)
 app.command()(verify)
 app.command("verify-zone")(verify_zone)

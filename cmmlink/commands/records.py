@@ -134,9 +134,10 @@ def replay(
     document |= {"notes": list(again.notes)}
     document |= {"changed": [asdict(change) for change in again.changed], "differs": [asdict(change) for change in again.differs]}
     if out is not None:
-        from cmmlink.report import write_results
+        from cmmlink.report import input_of_replay, write_results
 
-        write_results(out, document, again.outcome.result, again.profile, f"{recorded.header['part']}, run {recorded.run} replayed")
+        title, report = f"{recorded.header['part']}, run {recorded.run} replayed", input_of_replay(again, document, recorded)
+        write_results(out, document, again.outcome.result, again.profile, title, report=report)
     if as_json:
         print_json(document)
     else:

@@ -7,6 +7,8 @@ if TYPE_CHECKING:
     from cmmlink.plan.cutters import CutterName
     from cmmlink.plan.deciding import PROFILE, Deciding
     from cmmlink.plan.own_maps import map_of
+    from cmmlink.plan.papers import LanguageName, PaperName
+    from cmmlink.plan.report import ReportSettings
     from cmmlink.plan.scan import (
         Datum,
         Device,
@@ -32,6 +34,8 @@ else:
     _PLACES = {
         "cmmlink.plan.deciding": ("PROFILE", "Deciding"),
         "cmmlink.plan.own_maps": ("map_of",),
+        "cmmlink.plan.papers": ("LanguageName", "PaperName"),
+        "cmmlink.plan.report": ("ReportSettings",),
         "cmmlink.plan.scan": (
             "Datum",
             "Device",
@@ -71,14 +75,17 @@ __all__ = [
     "Device",
     "Discretisation",
     "FileDevice",
+    "LanguageName",
     "ModbusDevice",
     "Nominal",
     "NominalAt",
+    "PaperName",
     "Part",
     "Place",
     "Plan",
     "Positive",
     "Registration",
+    "ReportSettings",
     "Section",
     "SerialDevice",
     "Settings",

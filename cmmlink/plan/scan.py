@@ -15,6 +15,7 @@ from pydantic import AfterValidator, Field, ValidationInfo, field_validator, mod
 from cmmlink.buffer import CAPACITY_POINTS
 from cmmlink.errors import PlanError, YamlError
 from cmmlink.plan.deciding import Deciding
+from cmmlink.plan.report import REPORT, ReportSettings
 from cmmlink.plan.yaml_model import Positive, Settings, Text, line_of, read_model
 from cmmlink.result_folder import check_placeholders
 from drivers import AxisName, PointFileError, UnitName, device_address, read_text, shipped_maps
@@ -281,6 +282,7 @@ class Plan(Deciding):
     discretisation: Discretisation = Field(default=Discretisation(), description="how finely the nominal is sampled")
     buffer_points: int = Field(default=CAPACITY_POINTS, ge=1, description="how many points may wait between the device and the inspection")
     out: ResultFolder | None = Field(default=Path("results/{part}/{serial}_{run}"), description=OUT)
+    report: ReportSettings = Field(default=ReportSettings(), description=REPORT)
     records: Path | None = Field(default=None, description=RECORDS)
 
     def with_address(self, address: str) -> "Plan":
@@ -334,5 +336,6 @@ def _with_paths_from(folder: Path, plan: Plan) -> Plan:
             "device": device,
             "out": folder / plan.out if plan.out else None,
             "records": folder / plan.records if plan.records else None,
+            "report": plan.report.with_path_from(folder),
         }
     )

@@ -12,6 +12,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from cmmlink.errors import PlanError, YamlError
 from cmmlink.plan.cutters import CutterName
 from cmmlink.plan.deciding import Deciding, check_names
+from cmmlink.plan.report import REPORT, ReportSettings
 from cmmlink.plan.scan import OUT, RECORDS, Nominal, Part, Registration, ResultFolder, Unit
 from cmmlink.plan.stack_characteristics import AskedOfStack
 from cmmlink.plan.yaml_model import Positive, Settings, read_model
@@ -93,6 +94,7 @@ class CtPlan(Deciding):
         default=(), description="what is evaluated of all sections together, each with a verdict of its own; the part has the worst of all"
     )
     out: ResultFolder | None = Field(default=None, description=OUT)
+    report: ReportSettings = Field(default=ReportSettings(), description=REPORT)
     records: Path | None = Field(default=None, description=RECORDS)
 
     @field_validator("stack_characteristics")
@@ -128,5 +130,6 @@ def load_ct_plan(path: Path) -> CtPlan:
             "sections": plan.sections.model_copy(update={"nominal_at": own}),
             "out": folder / plan.out if plan.out else None,
             "records": folder / plan.records if plan.records else None,
+            "report": plan.report.with_path_from(folder),
         }
     )

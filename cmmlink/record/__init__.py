@@ -23,7 +23,7 @@ if TYPE_CHECKING:
         recorded_result,
         recorded_run,
     )
-    from cmmlink.record.recorder import QUEUE_BYTES, Recorder, RecordReference, RunInputs
+    from cmmlink.record.recorder import QUEUE_BYTES, Recorder, RecordReference, RunInputs, software
     from cmmlink.record.replay import Change, Replay, recorded_plan, recorded_profile, replay_run
     from cmmlink.record.station_lock import PATIENCE_S
     from cmmlink.record.store import FILE_NAME, Store
@@ -51,7 +51,7 @@ else:
             "recorded_result",
             "recorded_run",
         ),
-        "cmmlink.record.recorder": ("QUEUE_BYTES", "Recorder", "RecordReference", "RunInputs"),
+        "cmmlink.record.recorder": ("QUEUE_BYTES", "Recorder", "RecordReference", "RunInputs", "software"),
         "cmmlink.record.replay": ("Change", "Replay", "recorded_plan", "recorded_profile", "replay_run"),
         "cmmlink.record.station_lock": ("PATIENCE_S",),
         "cmmlink.record.store": ("FILE_NAME", "Store"),
@@ -92,5 +92,6 @@ __all__ = [
     "recorded_result",
     "recorded_run",
     "replay_run",
+    "software",
     "unpack_judged",
 ]

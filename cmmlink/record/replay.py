@@ -43,12 +43,14 @@ class Change:
 class Replay:
     """The outcome of a replay.
 
+    plan      : what was evaluated, with what was changed in it
     changed   : settings and software that are not those of the recorded run
     differs   : values of the result that are not as recorded
     identical : to the last bit of every deviation; None where the recorded run has no result to compare with
     notes     : what was assumed about nominal and points when they were recorded
     """
 
+    plan: Plan
     outcome: RunOutcome
     profile: NominalProfile
     result_json: dict[str, Any]
@@ -100,7 +102,7 @@ def replay_run(
     changes = (*_settings_changed(plan, changed), *_software_changed(recorded.header["software"]))
     differs = _differences(recorded.result, replayed) if not identical else ()
     notes = (*started.notes, *density_notes(density_of(stations_of(outcome.result), profile.length_mm), profile.length_mm))
-    return Replay(outcome, profile, replayed, changes, differs, identical, notes)
+    return Replay(changed, outcome, profile, replayed, changes, differs, identical, notes)
 
 
 class _Reading:

@@ -8,7 +8,10 @@ TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer 
 if TYPE_CHECKING:
     from cmmlink.report.folder import prepare, write_results, write_run
     from cmmlink.report.nominal_picture import write_nominal_picture
+    from cmmlink.report.pdf import write_report
     from cmmlink.report.picture_processes import Pictures, processes_here
+    from cmmlink.report.recorded_report import input_of_replay, input_on_record
+    from cmmlink.report.report_input import ReportInput, with_settings
     from cmmlink.report.section_pictures import SectionPictures
     from cmmlink.report.stack_folder import write_stack
     from cmmlink.report.terminal import STYLE_OF, STYLES, LiveTable, print_characteristics, print_summary
@@ -19,6 +22,9 @@ else:
         "cmmlink.report.folder": ("prepare", "write_results", "write_run"),
         "cmmlink.report.picture_processes": ("Pictures", "processes_here"),
         "cmmlink.report.nominal_picture": ("write_nominal_picture",),
+        "cmmlink.report.pdf": ("write_report",),
+        "cmmlink.report.recorded_report": ("input_of_replay", "input_on_record"),
+        "cmmlink.report.report_input": ("ReportInput", "with_settings"),
         "cmmlink.report.section_pictures": ("SectionPictures",),
         "cmmlink.report.stack_folder": ("write_stack",),
         "cmmlink.report.terminal": ("STYLE_OF", "STYLES", "LiveTable", "print_characteristics", "print_summary"),
@@ -32,12 +38,17 @@ __all__ = [
     "STYLE_OF",
     "LiveTable",
     "Pictures",
+    "ReportInput",
     "SectionPictures",
+    "input_of_replay",
+    "input_on_record",
     "prepare",
     "print_characteristics",
     "print_summary",
     "processes_here",
+    "with_settings",
     "write_nominal_picture",
+    "write_report",
     "write_results",
     "write_run",
     "write_stack",

@@ -4,6 +4,8 @@ import json
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +13,11 @@ from cmmlink.characteristics import is_short_form
 from cmmlink.characteristics_csv import write_characteristics
 from cmmlink.deviations_csv import write_deviations
 from cmmlink.errors import PlanError
+from cmmlink.report.judged_scan import scan_of
 from cmmlink.report.picture_content import content_of
-from cmmlink.report.picture_processes import Pictures
-from cmmlink.result_files import new_files
+from cmmlink.report.picture_processes import Pictures, Sheet
+from cmmlink.report.report_input import ReportInput, input_of, places_in, regions_in
+from cmmlink.result_files import NewFiles, new_files
 from cmmlink.result_folder import fixed_part, make_room
 from cmmlink.run import FinishedRun
 from cmmlink.uncertainty_tables import write_uncertainty
@@ -44,8 +48,11 @@ def write_results(
     profile: NominalProfile,
     title: str,
     pictures: Pictures | None = None,
+    report: ReportInput | None = None,
 ) -> list[str]:
-    """Write result.json and, when points were judged, deviations.csv and profile.png. Returns their names; raises PlanError.
+    """Write result.json and, when points were judged, deviations.csv and the picture. Returns their names; raises PlanError.
+
+    report : what report.pdf is made of, without what its drawings show; it is written whether points were judged or not. None writes none
 
     Of a plan with characteristics there is characteristics.csv as well, and zone.json where one of them is a minimum zone.
     Where a budget was stated, uncertainty.csv is written as well.
@@ -54,21 +61,37 @@ def write_results(
 
     What an earlier run left there is moved aside, into a folder of its own; the new files take its place together.
     """
+    pictures, drawn = pictures or Pictures(), result is not None and result.judged > 0
     with _or_refuse(folder), new_files(folder, make_room) as files:
         files("result.json").write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
-        if result is not None and result.judged:
-            ending, pictures = document.get("ending", "complete"), pictures or Pictures()
-            content = content_of(result, profile, title, ending, _said_at_foot(document))
-            drawing = pictures.begin(content)
-            write_deviations(result.blocks(), files("deviations.csv"), ending)
-            if not is_short_form(result.characteristics):
-                write_characteristics(result.characteristics, files("characteristics.csv"))
-            if (zones := zone_document(document, profile)) is not None:
-                files("zone.json").write_text(json.dumps(zones, indent=2) + "\n", encoding="utf-8")
-            if result.uncertainty is not None:
-                write_uncertainty(result.uncertainty, files("uncertainty.csv"))
-            pictures.write(drawing, lambda: content, files("profile.png"))
+        content = None
+        if result is not None and drawn:
+            ending, regions = document.get("ending", "complete"), regions_in(document)
+            content = content_of(scan_of(result), profile, title, ending, _said_at_foot(document), regions, places_in(document))
+        asked: list[tuple[str, Sheet]] = [(name, content) for name in ("profile.png", "profile.svg") if content is not None]
+        if report is not None:
+            asked.append(("report.pdf", replace(report, content=content)))
+        begun = [(name, sheet, pictures.begin(sheet, Path(name).suffix)) for name, sheet in asked]
+        if result is not None and drawn:
+            _write_tables(result, document, profile, files)
+        for name, sheet, drawing in begun:
+            pictures.write(drawing, partial(_give, sheet), files(name))
     return files.names
+
+
+def _give(sheet: Sheet) -> Sheet:
+    return sheet
+
+
+def _write_tables(result: InspectionResult, document: dict[str, Any], profile: NominalProfile, files: NewFiles) -> None:
+    """Write the points and whatever else was found of a result."""
+    write_deviations(result.blocks(), files("deviations.csv"), document.get("ending", "complete"))
+    if not is_short_form(result.characteristics):
+        write_characteristics(result.characteristics, files("characteristics.csv"))
+    if (zones := zone_document(document, profile)) is not None:
+        files("zone.json").write_text(json.dumps(zones, indent=2) + "\n", encoding="utf-8")
+    if result.uncertainty is not None:
+        write_uncertainty(result.uncertainty, files("uncertainty.csv"))
 
 
 def _said_at_foot(document: dict[str, Any]) -> str:
@@ -79,7 +102,8 @@ def _said_at_foot(document: dict[str, Any]) -> str:
 
 def write_run(folder: Path, run: FinishedRun, pictures: Pictures | None = None) -> list[str]:
     """Write the files of a finished run, as `FinishedRun.folder_of` names its folder. Returns their names; raises PlanError."""
-    return write_results(folder, run.result_json(), run.outcome.result, run.profile, run.title, pictures)
+    report = input_of(run)
+    return write_results(folder, dict(report.document), run.outcome.result, run.profile, run.title, pictures, report)
 
 
 @contextmanager

@@ -8,7 +8,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_BESIDE_PT, _BELOW_PT = 57.0, 20.0  # of the labels from their axes
 _PACKED = 2  # of 9: a tenth larger than where they are packed harder, in two thirds of the time
 _LONGEST_TITLE = 60  # signs that fit beside the longest verdict
 
@@ -18,12 +17,12 @@ def heading_of(title: str, verdict: str) -> str:
     return f"{short_title(title)}    {verdict}"
 
 
-def draw_heading(figure: "Figure", heading: str) -> None:
+def draw_heading(figure: "Figure", heading: str, size: float = 15) -> None:
     """Write the heading. A name is drawn as it is spelled: no sign in it means a formula."""
-    figure.suptitle(heading, fontsize=15, fontweight="bold", parse_math=False)
+    figure.suptitle(heading, fontsize=size, fontweight="bold", parse_math=False)
 
 
-def fix_labels(axes: "Axes") -> None:
+def fix_labels(axes: "Axes", beside_pt: float = 57.0, below_pt: float = 20.0) -> None:
     """Keep the labels of both axes at fixed distances, which leave room for the numbers.
 
     Without it matplotlib lays out every number several times to find the distances.
@@ -31,7 +30,7 @@ def fix_labels(axes: "Axes") -> None:
     from matplotlib.transforms import ScaledTranslation  # noqa: PLC0415 - who only words a heading needs no matplotlib
 
     figure = axes.figure
-    beside, below = (ScaledTranslation(x / 72, y / 72, figure.dpi_scale_trans) for x, y in ((-_BESIDE_PT, 0), (0, -_BELOW_PT)))
+    beside, below = (ScaledTranslation(x / 72, y / 72, figure.dpi_scale_trans) for x, y in ((-beside_pt, 0), (0, -below_pt)))
     axes.yaxis.set_label_coords(0, 0.5, axes.transAxes + beside)
     axes.xaxis.set_label_coords(0.5, 0, axes.transAxes + below)
 
@@ -49,4 +48,7 @@ def save_picture(figure: "Figure", path: Path) -> None:
     """Write the picture. A sign that the font does not have is drawn as a box, and is no reason for a warning."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")
-        figure.savefig(path, pil_kwargs={"compress_level": _PACKED})
+        if path.suffix == ".svg":
+            figure.savefig(path, metadata={"Date": None})
+        else:
+            figure.savefig(path, pil_kwargs={"compress_level": _PACKED})

@@ -4,6 +4,7 @@ Verdicts are those of the result, and they show by mark as well as by colour: a 
 one down is out below it, a diamond is not proven either way.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -11,20 +12,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmmlink.report.heading import heading_of
+from cmmlink.report.judged_scan import JudgedScan, unmeasured_stretches
+from cmmlink.report.speech import Speech
 from cmmlink.words import headline_of
 from inspection import ToleranceZone, Verdict, telling_rows
 
 if TYPE_CHECKING:  # a process that only draws loads nothing of what judges
-    from inspection import InspectionResult, JudgedRows, NominalProfile
+    from inspection import JudgedRows, NominalProfile
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 GOOD, UNPROVEN, ABOVE, BELOW = "#2a7fa5", "#a16207", "#c2410c", "#6d28d9"
 _BAND_SHARE = 0.06  # of the part's size: how wide the magnified tolerance band is drawn
-_LANE_SHARE = 0.015  # of the part's size: how far the lines of regions are apart
 _MOST_WHISKERS = 1500
-_MOST_POINTS = 65536  # in the strip: more would take minutes and show no more
+_MOST_POINTS = 8192  # in the strip: three to a dot of its width, more show no more
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +59,15 @@ class Shown:
 
 
 @dataclass(frozen=True, slots=True)
+class NamedRegion:
+    """A stretch of the profile that a characteristic judges; `from_mm` is above `to_mm` where it crosses the seam."""
+
+    name: str
+    from_mm: float
+    to_mm: float
+
+
+@dataclass(frozen=True, slots=True)
 class Worst:
     """The point farthest from the middle of the zone: its place in the strip, and the tip of its whisker (x, y)."""
 
@@ -66,19 +77,12 @@ class Worst:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class DrawnRegion:
-    """The region of a characteristic, as a line (r, 2) beside the band."""
-
-    name: str
-    line_mm: Array
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class PictureContent:
     """Everything that the picture of a profile shows.
 
     nominal_mm    : (n, 2) samples of the nominal
     outward       : (n, 2) unit normals there, out of the material
+    station_mm    : (n,) arc length there
     closed        : the nominal ends where it begins
     length_mm     : its length
     zone          : the tolerance zone
@@ -86,13 +90,15 @@ class PictureContent:
     magnification : how many times as large deviations are drawn on the profile
     shown         : the points of each of `LOOKS`
     worst         : None where nothing was judged
-    regions       : of the characteristics that are of a part of the profile
+    unmeasured    : stretches without points, from station to station, each longer than what counts as measured
+    regions       : the named regions of its characteristics
     places_mm     : (p, 2) places that values of characteristics were found at
     heading, basis, foot : what stands above the picture, above the strip, and small at the foot
     """
 
     nominal_mm: Array
     outward: Array
+    station_mm: Array
     closed: bool
     length_mm: float
     zone: ToleranceZone
@@ -100,7 +106,8 @@ class PictureContent:
     magnification: float
     shown: tuple[Shown, ...]
     worst: Worst | None
-    regions: tuple[DrawnRegion, ...]
+    unmeasured: tuple[tuple[float, float], ...]
+    regions: tuple[NamedRegion, ...]
     places_mm: Array
     heading: str
     basis: str
@@ -108,72 +115,70 @@ class PictureContent:
 
 
 def content_of(
-    result: "InspectionResult", nominal: "NominalProfile", title: str, ending: str = "complete", said: str = ""
+    scan: JudgedScan,
+    nominal: "NominalProfile",
+    title: str,
+    ending: str = "complete",
+    said: str = "",
+    regions: tuple[NamedRegion, ...] = (),
+    places_mm: Sequence[tuple[float, float]] = (),
+    say: Speech | None = None,
 ) -> PictureContent:
-    """What the picture of a result shows.
+    """What the picture of a judged scan shows.
 
     ending : how the run ended
     said   : what stands small at the foot, like which run it was and when it was measured
     """
-    factor = magnification(result, nominal)
-    telling = telling_rows(result.station_mm, result.deviation_mm, nominal.length_mm, _MOST_POINTS // 2)  # the others lie hidden
-    basis = f"coverage {result.coverage:.1%}   fit {result.fit}   method {result.method}   out of tolerance {result.out_of_tolerance}"
-    along = _uncertainty_along(result)
-    shaded = "; shaded around the limits: the U of each station" if len(along) else ""
+    say = say or Speech()
+    factor, closed, length_mm = magnification(scan.zone, nominal), nominal.curve.closed, nominal.length_mm
+    telling = telling_rows(scan.station_mm, scan.deviation_mm, length_mm, _MOST_POINTS // 2)  # the others lie hidden
     return PictureContent(
         nominal.points_mm,
         nominal.outward * nominal.normal,
-        nominal.curve.closed,
-        nominal.length_mm,
-        result.zone,
-        along,
+        nominal.station_mm,
+        closed,
+        length_mm,
+        scan.zone,
+        scan.u_mm,
         factor,
-        _shown(result, telling, factor),
-        _worst(result, factor),
-        _regions(result, nominal, factor),
-        np.array([place[1:] for found in result.characteristics for place in found.places_mm]).reshape(-1, 2),
-        headline_on_picture(result, title, ending),
-        f"{basis}\n{result.zone.decision_rule}{shaded}",
+        _shown(scan, telling, factor),
+        _worst(scan, factor),
+        tuple(unmeasured_stretches(scan.station_mm, length_mm, closed, scan.gap_max_mm)),
+        regions,
+        np.array(places_mm, dtype=np.float64).reshape(-1, 2),
+        headline_on_picture(scan, title, ending),
+        _basis(scan, say),
         said,
     )
 
 
-def headline_on_picture(result: "InspectionResult", title: str, ending: str) -> str:
+def _basis(scan: JudgedScan, say: Speech) -> str:
+    told = say(
+        "coverage {share}   fit {fit}   method {method}   out of tolerance {points}",
+        share=say.number(scan.coverage, ".1%"),
+        fit=say.sentence(scan.fit),
+        method=say.sentence(scan.method),
+        points=scan.out_of_tolerance,
+    )
+    shaded = "; " + say("shaded around the limits: the U of each station") if len(scan.u_mm) else ""
+    return f"{told}\n{say.sentence(scan.zone.decision_rule)}{shaded}"
+
+
+def headline_on_picture(scan: JudgedScan, title: str, ending: str) -> str:
     """What stands above the picture: the part, and the verdict or how early the run ended."""
-    return heading_of(title, headline_of(result.verdict, ending, result.coverage).words)
+    return heading_of(title, headline_of(scan.verdict, ending, scan.coverage).words)
 
 
-def magnification(result: "InspectionResult", nominal: "NominalProfile") -> float:
+def magnification(zone: ToleranceZone, nominal: "NominalProfile") -> float:
     """A round factor (1, 2 or 5 times a power of ten) that draws the tolerance band about 6 % of the part wide."""
-    width = result.zone.upper_mm - result.zone.lower_mm
+    width = zone.upper_mm - zone.lower_mm
     wanted = _BAND_SHARE * float(np.hypot(*np.ptp(nominal.points_mm, axis=0))) / width
     power = 10.0 ** np.floor(np.log10(wanted))
     return float(max(step * power for step in (1, 2, 5) if step * power <= wanted))
 
 
-def _uncertainty_along(result: "InspectionResult") -> Array:
-    found = result.uncertainty
-    if found is None or not result.zone.guard_mm:
-        return np.empty((0, 2))
-    rows = found.telling_places()
-    return np.column_stack([found.station_mm[rows], found.expanded_mm[rows]])
-
-
-def _regions(result: "InspectionResult", nominal: "NominalProfile", factor: float) -> tuple[DrawnRegion, ...]:
-    """The regions of the characteristics, each in a lane of its own outside the magnified band."""
-    found = [(one.name, one.region) for one in result.characteristics if one.region is not None]
-    lane_mm, drawn = _LANE_SHARE * float(np.hypot(*np.ptp(nominal.points_mm, axis=0))), []
-    for lane, (name, region) in enumerate(found, 1):
-        along = np.mod(nominal.station_mm - region.from_mm, nominal.length_mm)
-        order = np.argsort(along, kind="stable")
-        rows = order[along[order] <= np.mod(region.to_mm - region.from_mm, nominal.length_mm)]
-        away = factor * result.zone.upper_mm + lane * lane_mm
-        drawn.append(DrawnRegion(name, (nominal.points_mm + away * nominal.outward * nominal.normal)[rows]))
-    return tuple(drawn)
-
-
-def _shown(result: "InspectionResult", telling: Rows, factor: float) -> tuple[Shown, ...]:
-    strip, drawn, middle = result.rows_at(telling), result.rows_at(_rows_to_draw(result, telling)), result.zone.middle_mm
+def _shown(scan: JudgedScan, telling: Rows, factor: float) -> tuple[Shown, ...]:
+    strip, drawn, middle = scan.rows_at(telling), scan.rows_at(_rows_to_draw(scan, telling)), scan.zone.middle_mm
     tips = drawn.foot_mm + factor * (drawn.actual_mm - drawn.foot_mm)
     looks = [(_has_look(drawn, look, middle), _has_look(strip, look, middle)) for look in LOOKS]
     return tuple(
@@ -181,11 +186,11 @@ def _shown(result: "InspectionResult", telling: Rows, factor: float) -> tuple[Sh
     )
 
 
-def _rows_to_draw(result: "InspectionResult", telling: Rows) -> Rows:
+def _rows_to_draw(scan: JudgedScan, telling: Rows) -> Rows:
     """Rows (k,) of the points to draw: thinned, but with every point out of tolerance and the worst one."""
     kept = telling[:: max(1, len(telling) // _MOST_WHISKERS)]
-    out = telling[result.verdicts[telling] == Verdict.NONCONFORM]
-    worst = [] if result.worst is None else [result.worst]
+    out = telling[scan.verdicts[telling] == Verdict.NONCONFORM]
+    worst = [] if scan.worst is None else [scan.worst]
     return np.unique(np.concatenate([kept, out, worst]).astype(np.int64))
 
 
@@ -198,9 +203,9 @@ def _has_look(rows: "JudgedRows", look: Look, middle_mm: float) -> NDArray[np.bo
     return of_verdict & above if look.side == "above" else of_verdict & ~above
 
 
-def _worst(result: "InspectionResult", factor: float) -> Worst | None:
-    row = result.worst_row
-    if row is None:
+def _worst(scan: JudgedScan, factor: float) -> Worst | None:
+    if scan.worst is None:
         return None
+    row = scan.rows_at(np.array([scan.worst]))
     x, y = row.foot_mm[0] + factor * (row.actual_mm[0] - row.foot_mm[0])
     return Worst(float(row.station_mm[0]), float(row.deviation_mm[0]), (float(x), float(y)))

@@ -21,6 +21,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from cmmlink.report.picture_content import PictureContent
+from cmmlink.report.report_input import ReportInput
 
 if TYPE_CHECKING:  # whoever only starts a process loads no matplotlib
     from cmmlink.report.picture import ProfilePictures
@@ -29,6 +30,9 @@ _MOST_PROCESSES = 4  # each holds a hundred megabytes
 _WAITING = 2  # pictures for each process, so that a stack of thousands does not fill the memory with them
 _CHILD = "import sys; sys.path.append(sys.argv[1]); from cmmlink.report.picture_processes import serve; serve()"
 _DRAWN, _FAILED = b"+", b"-"
+
+Sheet = PictureContent | ReportInput
+"""What is drawn: the picture of a profile, or a report."""
 
 Drawing = Future[Path | None]
 """A picture that may come from another process: its file, or None."""
@@ -58,11 +62,11 @@ class Pictures:
             with suppress(OSError):
                 self._beside = self._opened.enter_context(closing(_Beside(processes)))
 
-    def begin(self, content: PictureContent) -> Drawing:
-        """Let another process draw it, where there is one."""
-        return drawn_by_none() if self._beside is None else self._beside.draw(content)
+    def begin(self, sheet: Sheet, suffix: str = ".png") -> Drawing:
+        """Let another process draw it, where there is one, as a file of that kind."""
+        return drawn_by_none() if self._beside is None else self._beside.draw(sheet, suffix)
 
-    def write(self, drawing: Drawing, content: Callable[[], PictureContent], path: Path) -> None:
+    def write(self, drawing: Drawing, sheet: Callable[[], Sheet], path: Path) -> None:
         """Put a picture that was begun in its place; where nobody has drawn it, draw it here."""
         if (drawn := drawing.result()) is not None:
             shutil.move(drawn, path)
@@ -72,7 +76,7 @@ class Pictures:
             from cmmlink.report.picture import ProfilePictures  # noqa: PLC0415 - it loads matplotlib, half a second
 
             self._own = ProfilePictures()
-        self._own.write(content(), path)
+        _draw(self._own, sheet(), path)
         self.drawn_here += 1
 
 
@@ -104,18 +108,18 @@ class _Beside:
             self._asked = 0
             self._opened = opened.pop_all()
 
-    def draw(self, content: PictureContent) -> Drawing:
+    def draw(self, sheet: Sheet, suffix: str) -> Drawing:
         """Draw in one of the processes, once one is free. Gives the file, None where that failed; waits while too many wait."""
         self._room.acquire()
         self._asked += 1
-        drawing = self._threads.submit(self._draw, content, self._folder / f"{self._asked}.png")
+        drawing = self._threads.submit(self._draw, sheet, self._folder / f"{self._asked}{suffix}")
         drawing.add_done_callback(lambda _: self._room.release())
         return drawing
 
-    def _draw(self, content: PictureContent, path: Path) -> Path | None:
+    def _draw(self, sheet: Sheet, path: Path) -> Path | None:
         process = self._idle.get()
         try:
-            return path if process.draw(content, path) else None
+            return path if process.draw(sheet, path) else None
         finally:
             self._idle.put(process)
 
@@ -131,12 +135,12 @@ class _Process:
         command = [sys.executable, "-P", "-c", _CHILD, str(Path(__file__).resolve().parents[2])]
         self._child = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
 
-    def draw(self, content: PictureContent, path: Path) -> bool:
+    def draw(self, sheet: Sheet, path: Path) -> bool:
         """Draw a picture, and wait until it is done. False where that failed."""
         assert self._child.stdin is not None
         assert self._child.stdout is not None
         try:
-            pickle.dump((content, path), self._child.stdin)
+            pickle.dump((sheet, path), self._child.stdin)
             self._child.stdin.flush()
             return self._child.stdout.read(1) == _DRAWN
         except OSError:  # it was ended
@@ -161,14 +165,23 @@ def serve() -> None:
     pictures = ProfilePictures()
     with suppress(EOFError, OSError):
         while True:
-            content, path = pickle.load(asked)
-            told.write(_DRAWN if _is_drawn(pictures, content, path) else _FAILED)
+            sheet, path = pickle.load(asked)
+            told.write(_DRAWN if _is_drawn(pictures, sheet, path) else _FAILED)
             told.flush()
 
 
-def _is_drawn(pictures: "ProfilePictures", content: PictureContent, path: Path) -> bool:
+def _is_drawn(pictures: "ProfilePictures", sheet: Sheet, path: Path) -> bool:
     try:
-        pictures.write(content, path)
+        _draw(pictures, sheet, path)
     except Exception:  # whatever it is, the process that asked meets it again and tells of it
         return False
     return True
+
+
+def _draw(pictures: "ProfilePictures", sheet: Sheet, path: Path) -> None:
+    if isinstance(sheet, PictureContent):
+        pictures.write(sheet, path)
+        return
+    from cmmlink.report.pdf import write_report  # noqa: PLC0415 - a process that draws pictures alone needs no reportlab
+
+    write_report(sheet, path)

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from cmmlink.report.judged_scan import scan_of
 from cmmlink.report.picture_content import PictureContent, content_of
 from cmmlink.report.picture_processes import Drawing, Pictures, drawn_by_none, processes_here
 
@@ -36,4 +37,4 @@ class SectionPictures:
     def _content_of(self, section: "SectionOutcome") -> PictureContent:
         assert section.run.result is not None
         heading = f"{self._title}, height {section.slice.height_mm:g} mm"
-        return content_of(section.run.result, section.profile, heading, section.run.ending)
+        return content_of(scan_of(section.run.result), section.profile, heading, section.run.ending)

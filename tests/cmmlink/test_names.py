@@ -14,7 +14,9 @@ from cmmlink.console.past_runs import PastRuns
 from cmmlink.events import Counts, RunFinished, RunStarted
 from cmmlink.report import LiveTable, print_summary
 from cmmlink.report.heading import draw_heading, heading_of, save_picture
-from cmmlink.report.picture import write_picture
+from cmmlink.report.judged_scan import scan_of
+from cmmlink.report.picture import ProfilePictures
+from cmmlink.report.picture_content import content_of
 from cmmlink.result_folder import folder_of
 from cmmlink.run_view import RunContext, RunView
 from inspection import NominalProfile, ToleranceZone
@@ -86,8 +88,9 @@ def test_a_part_of_such_a_name_is_measured_recorded_listed_and_drawn(tmp_path: P
 
 
 def test_the_picture_draws_it(profile: NominalProfile, tmp_path: Path) -> None:
-    write_picture(inspect_oval(profile, 0.0), profile, "a$_$ \\frac{ " + "x" * 300, tmp_path / "a.png", said="run $_$")
-    assert imread(tmp_path / "a.png").shape[:2] == (880, 1320)
+    content = content_of(scan_of(inspect_oval(profile, 0.0)), profile, "a$_$ \\frac{ " + "x" * 300, said="run $_$")
+    ProfilePictures().write(content, tmp_path / "a.png")
+    assert imread(tmp_path / "a.png").shape[:2] == (1240, 1420)
 
 
 @pytest.mark.parametrize("sign", ["\\n", "\\x1b[31m", "\\u202e", "\\0"])

@@ -21,6 +21,7 @@ from cmmlink.result_keys import (
     Measured,
     Recorded,
     Replayed,
+    Reported,
     Runs,
     Shown,
     StackInspected,
@@ -99,6 +100,7 @@ def test_records(folder: Path) -> None:
     assert [change["key"] for change in changed["changed"]] == ["tolerance.lower_mm", "tolerance.upper_mm"]
     assert not printed(Verified, "verify", *records)["altered"]
     written = printed(Exported, "export", first, "--out", folder / "exported", *records)["files"]
+    assert Path(printed(Reported, "report", first, "-o", folder / "a.pdf", *records)["file"]).read_bytes().startswith(b"%PDF")
     tables = {Path(name).name: header_of(Path(name)) for name in written if name.endswith(".csv") and "nominal" not in name}
     assert tables == {"points.csv": list(POINT_COLUMNS), "wire.csv": list(WIRE_COLUMNS), "deviations.csv": list(COLUMNS)}
     Shown.model_validate_json((folder / "exported" / "run.json").read_bytes())

@@ -59,5 +59,5 @@ def test_the_commands_of_the_readme_do_what_it_says(monkeypatch: pytest.MonkeyPa
         assert exit_status(command, monkeypatch) == status, f"{command}: {capfd.readouterr()}"
     assert {"inspect", "check", "ct", "runs", "show", "replay", "export", "verify"} <= {command[0] for command in COMMANDS}
     assert "identical to the recorded result" in capfd.readouterr().out
-    assert all((Path("demo-result") / name).is_file() for name in ("deviations.csv", "result.json", "profile.png"))
+    assert all((Path("demo-result") / name).is_file() for name in ("deviations.csv", "result.json", "profile.png", "report.pdf"))
     assert all(Path(name).is_dir() for name in ("result", "sections", "folder"))

@@ -15,6 +15,7 @@ from rich.console import Console
 from cmmlink.console.past_runs import PastRuns
 from cmmlink.deviations_csv import COLUMNS, EARLY_COLUMNS
 from cmmlink.report import print_summary, write_results
+from cmmlink.report.judged_scan import scan_of
 from cmmlink.report.picture_content import headline_on_picture
 from cmmlink.result_json import result_json
 from cmmlink.run_view import RunView
@@ -56,7 +57,7 @@ def test_every_output_says_how_the_run_ended(tmp_path: Path, ending: str) -> Non
     printed = io.StringIO()
     print_summary(Console(file=printed, width=300), result, outcome.counts, "part", outcome.ending)
     assert printed.getvalue().startswith(word + "   part")
-    assert headline_on_picture(result, "part", outcome.ending) == f"part    {word}"
+    assert headline_on_picture(scan_of(result), "part", outcome.ending) == f"part    {word}"
 
     cmmlink("export", "last", "--records", records, "--out", tmp_path / "exported")
     document = result_json(result, outcome.counts) | {"ending": outcome.ending}

@@ -132,7 +132,13 @@ def test_a_fitted_part_is_brought_onto_its_nominal(tmp_path: Path, fit: str) -> 
 
 def test_out_holds_the_results(nominal: Path) -> None:
     ended = inspect_oval(nominal, 0.01, "--out", nominal.parent / "results", "--json")
-    assert sorted(path.name for path in (nominal.parent / "results").iterdir()) == ["deviations.csv", "profile.png", "result.json"]
+    assert sorted(path.name for path in (nominal.parent / "results").iterdir()) == [
+        "deviations.csv",
+        "profile.png",
+        "profile.svg",
+        "report.pdf",
+        "result.json",
+    ]
     assert json.loads((nominal.parent / "results" / "result.json").read_text(encoding="utf-8")) == ended.json()
 
 
@@ -140,5 +146,5 @@ def test_the_summary_says_where_the_files_are(nominal: Path) -> None:
     folder = nominal.parent / "results"
     assert (
         inspect_oval(nominal, 0.01, "--out", folder, "--no-record").out.splitlines()[-1]
-        == f"results in {folder}: result.json, deviations.csv, profile.png"
+        == f"results in {folder}: result.json, deviations.csv, profile.png, profile.svg, report.pdf"
     )

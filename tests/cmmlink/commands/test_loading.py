@@ -14,7 +14,7 @@ from tests.cmmlink.oval_part import oval_points, write_points
 from tests.cmmlink.recorded import Script, record, scan_arrivals
 
 ROOT = Path(__file__).resolve().parents[3]
-DEVICES, PAGE, PICTURES = {"pymodbus", "serial"}, {"starlette", "uvicorn", "websockets", "ssl", "asyncio"}, {"matplotlib"}
+DEVICES, PAGE, PICTURES = {"pymodbus", "serial"}, {"starlette", "uvicorn", "websockets", "ssl", "asyncio"}, {"matplotlib", "reportlab"}
 CAD = {"ezdxf", "OCP"}
 MATHS, PLANS, SPEECH = {"numpy", "scipy", "numba", "llvmlite"}, {"yaml", "cmmlink.plan.scan"}, {"rich"}
 SCIPY = {f"scipy.{part}" for part in ("interpolate", "linalg", "optimize", "sparse", "spatial", "special")}  # a third of a second together
@@ -44,7 +44,7 @@ def loaded_by(*commands: tuple[object, ...]) -> list[tuple[int, str, set[str]]]:
 
 def test_help_version_and_mistakes_load_nothing_heavy() -> None:
     working = ("demo", "run", "inspect", "ct", "nominal", "check", "console", "prepare", "doctor", "ports")
-    commands = (*working, "runs", "show", "export", "replay", "verify")
+    commands = (*working, "runs", "show", "export", "report", "replay", "verify")
     helped = loaded_by(("--version",), ("--help",), *((command, "--help") for command in commands))
     assert [(code, loaded) for code, _, loaded in helped] == [(0, set())] * (2 + len(commands))
     mistaken = loaded_by(("inspcet",), ("inspect", "points.csv"), ("inspect", "points.csv", "--nominal", "n.dat", "--tolerance", "wide", 1))

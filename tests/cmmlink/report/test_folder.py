@@ -19,7 +19,7 @@ def test_a_picture_that_another_process_draws_is_the_same(profile: NominalProfil
     with Pictures() as pictures:
         pictures.start(1)
         names = write_results(tmp_path / "beside", facts, result, profile, "oval", pictures)
-    assert (pictures.drawn_beside, pictures.drawn_here) == (1, 0)
+    assert (pictures.drawn_beside, pictures.drawn_here) == (2, 0)
     assert write_results(tmp_path / "here", facts, result, profile, "oval") == names
     assert all((tmp_path / "beside" / name).read_bytes() == (tmp_path / "here" / name).read_bytes() for name in names)
 
@@ -28,7 +28,9 @@ def test_the_folder_holds_what_it_says(profile: NominalProfile, tmp_path: Path) 
     folder = tmp_path / "a" / "b"
     facts = result_json(inspect_oval(profile, bumped()), Counts())
     written = write_results(folder, facts, inspect_oval(profile, bumped()), profile, "oval")
-    assert sorted(written) == sorted(path.name for path in folder.iterdir()) == ["deviations.csv", "profile.png", "result.json"]
+    assert (
+        sorted(written) == sorted(path.name for path in folder.iterdir()) == ["deviations.csv", "profile.png", "profile.svg", "result.json"]
+    )
     assert json.loads((folder / "result.json").read_text(encoding="utf-8")) == facts
 
 
@@ -44,7 +46,7 @@ def test_the_results_of_another_run_are_moved_aside_and_never_overwritten(profil
     write_results(tmp_path, {"serial_number": "B2", "run": "2"}, inspect_oval(profile, bumped()), profile, "oval")
     (aside,) = (path for path in tmp_path.iterdir() if path.is_dir())
     assert aside.name == "_B_1_20260314-150926-0001"
-    assert sorted(path.name for path in aside.iterdir()) == ["deviations.csv", "profile.png", "result.json"]
+    assert sorted(path.name for path in aside.iterdir()) == ["deviations.csv", "profile.png", "profile.svg", "result.json"]
     assert json.loads((aside / "result.json").read_text(encoding="utf-8")) == first
     assert json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))["run"] == "2"
 

@@ -9,7 +9,9 @@ from typing import Any
 
 import pytest
 
-from cmmlink.report.picture import write_picture
+from cmmlink.report.judged_scan import scan_of
+from cmmlink.report.picture import ProfilePictures
+from cmmlink.report.picture_content import content_of
 from cmmlink.report.picture_processes import Pictures, _Process
 from cmmlink.report.section_pictures import SectionPictures
 from inspection import InspectionResult, NominalProfile
@@ -20,6 +22,7 @@ UNGUARDED = """
 import sys
 from pathlib import Path
 from cmmlink.report import Pictures
+from cmmlink.report.judged_scan import scan_of
 from cmmlink.report.picture_content import content_of
 from inspection import LiveInspection, RigidTransform, ToleranceZone, discretize
 from tests.inspection import profiles
@@ -28,7 +31,7 @@ print("run", flush=True)
 profile = discretize(profiles.p3(), samples=400)
 live = LiveInspection(profile, ToleranceZone(-0.05, 0.05), datum=RigidTransform.identity())
 live.add(profile.points_mm)
-content = content_of(live.finish(), profile, "part")
+content = content_of(scan_of(live.finish()), profile, "part")
 with Pictures() as pictures:
     pictures.start(1)
     pictures.write(pictures.begin(content), lambda: content, Path(sys.argv[1]))
@@ -83,7 +86,8 @@ def test_another_process_draws_the_same_pictures_and_this_one_none(sections: lis
     assert (len(begun), pictures.drawn_beside, pictures.drawn_here) == (1, 3, 0)
     for name, content in beside.items():
         each = sections[int(name[0]) - 1]
-        write_picture(each.run.result, each.profile, f"blade, height {each.slice.height_mm:g} mm", tmp_path / "own.png")
+        own = content_of(scan_of(each.run.result), each.profile, f"blade, height {each.slice.height_mm:g} mm")
+        ProfilePictures().write(own, tmp_path / "own.png")
         assert content == (tmp_path / "own.png").read_bytes()
 
 
