@@ -197,14 +197,16 @@ def _inspect_stack(plan: "CtPlan", output: Output, pictures: bool, no_record: bo
             if folder is not None:
                 with bar.show():
                     done = bar.begin_round("written", len(stack.sections))
-                    write_stack(folder, stack, plan.zone, plan.part.name, pictures=wanted, on_section=done)
+                    write_stack(folder, stack, plan.zone, plan.part.name, plan=plan, pictures=wanted, on_section=done)
         finally:
             if output.as_json:
                 print_json(stack.result_json())
             else:
                 _print_stack(terminal(), stack)
     if folder is not None and not output.as_json:
-        typer.echo(f"results in {folder}: result.json, sections.csv, a folder for each section{', stack.png' if pictures else ''}")
+        typer.echo(
+            f"results in {folder}: result.json, sections.csv, a folder for each section{', stack.png, report.pdf' if pictures else ''}"
+        )
     return EXIT_OF[stack.verdict]
 
 

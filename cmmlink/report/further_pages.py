@@ -7,6 +7,7 @@ from typing import Any
 from matplotlib.figure import Figure
 from reportlab.platypus import Flowable, Spacer
 
+from cmmlink.plan import Plan
 from cmmlink.report.first_page import fit_words, moment_words
 from cmmlink.report.page_parts import (
     BODY,
@@ -168,8 +169,8 @@ def _conditions(report: ReportInput, say: Speech) -> Iterator[tuple[str, str]]:
     yield say("Message"), report.message
     for note in document.get("notes", ()):
         yield say("Assumed"), note
-    tip = say.number(plan.probe.tip_radius_mm, "g")
-    yield say("Probe"), say("tip radius {radius} mm", radius=tip)
+    if isinstance(plan, Plan):
+        yield say("Probe"), say("tip radius {radius} mm", radius=say.number(plan.probe.tip_radius_mm, "g"))
     if document["rule"] is not None:
         yield say("Fit"), fit_words(document, say)
         yield say("Pose, nominal from section"), _pose_words(document["registration"], say)

@@ -1,6 +1,7 @@
 """Draws figures of matplotlib into a PDF as vectors: lines, marks and text stay sharp, and text can be searched and copied."""
 
 from collections.abc import Iterable, Iterator
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -76,6 +77,13 @@ class _Renderer(RendererBase):
         canvas.drawString(0, 0, s)
         canvas.restoreState()
 
+    def draw_quad_mesh(self, gc: Any, master_transform: Any, meshWidth: int, meshHeight: int, coordinates: Any, *more: Any) -> None:
+        colours: Array = np.asarray(more[2], dtype=np.float64).round(3).reshape(meshHeight, meshWidth, 4)
+        corners = master_transform.transform(np.asarray(coordinates).reshape(-1, 2)).reshape(meshHeight + 1, meshWidth + 1, 2)
+        clip = gc.get_clip_rectangle()
+        frame = [] if clip is None else ["{:.3f} {:.3f} {:.3f} {:.3f} re W n".format(*clip.bounds)]
+        self._canvas.addLiteral("\n".join(["q", *frame, *_fields(corners, colours), "Q"]))
+
     def _paint(self, gc: Any, face: Any, operators: str) -> None:
         """Fill and stroke a path, as far as its colours are not transparent."""
         filled = face is not None and (len(face) < 4 or face[3] > 0)
@@ -84,6 +92,17 @@ class _Renderer(RendererBase):
             return
         how = "B" if filled and stroked else "f" if filled else "S"
         self._canvas.addLiteral("\n".join(["q", *_state(gc, face if filled else None), operators, how, "Q"]))
+
+
+def _fields(corners: Array, colours: Array) -> Iterator[str]:
+    """The fields of a grid along the axes, corners (h + 1, w + 1, 2) and colours (h, w, 4): those alike in a row as one rectangle."""
+    for row, line in enumerate(colours):
+        starts = [0, *(np.flatnonzero((line[1:] != line[:-1]).any(axis=1)) + 1).tolist(), len(line)]
+        for start, end in pairwise(starts):
+            (x, y), (right, top) = corners[row, start], corners[row + 1, end]
+            if line[start, 3] > 0:
+                red, green, blue = line[start, :3]
+                yield f"{red:.3f} {green:.3f} {blue:.3f} rg {x:.2f} {y:.2f} {right - x:.2f} {top - y:.2f} re f"
 
 
 def _state(gc: Any, face: Any) -> Iterator[str]:

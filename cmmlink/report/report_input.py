@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from cmmlink.plan import Plan, ReportSettings
+from cmmlink.plan import CtPlan, Plan, ReportSettings
 from cmmlink.report.picture_content import NamedRegion, PictureContent
 from cmmlink.words import Headline, headline_of
 from inspection import Verdict
@@ -25,7 +25,7 @@ class ReportInput:
     """
 
     document: Mapping[str, Any]
-    plan: Plan
+    plan: Plan | CtPlan
     message: str = ""
     content: PictureContent | None = None
 

@@ -12,6 +12,7 @@ from cmmlink.characteristics_json import number
 from cmmlink.csv_rows import Texts, write_rows
 from cmmlink.deviations_csv import write_deviations
 from cmmlink.errors import PlanError
+from cmmlink.plan import CtPlan
 from cmmlink.report.section_pictures import SectionPictures
 from cmmlink.result_files import new_files
 from cmmlink.result_folder import make_room
@@ -62,6 +63,7 @@ def write_stack(
     zone: ToleranceZone,
     title: str,
     *,
+    plan: CtPlan | None = None,
     pictures: SectionPictures | None = None,
     on_section: Callable[[], None] = lambda: None,
 ) -> None:
@@ -69,6 +71,7 @@ def write_stack(
 
     Of a stack with characteristics there are characteristics.csv and, with the value of each section, stack.csv as well.
 
+    plan     : says how report.pdf looks, which is written beside pictures; None writes none
     pictures : draws those of the sections; None where no picture is wanted
     """
     try:
@@ -93,6 +96,10 @@ def write_stack(
                 from cmmlink.report.stack_picture import write_stack_picture  # noqa: PLC0415 - it loads matplotlib, half a second
 
                 write_stack_picture(stack, zone, title, files("stack.png"))
+                if plan is not None:
+                    from cmmlink.report.stack_pdf import write_stack_report  # noqa: PLC0415 - it loads reportlab
+
+                    write_stack_report(stack, plan, zone, files("report.pdf"))
     except OSError as error:
         raise PlanError(f"{folder}: the results cannot be written ({error.strerror}); choose another folder with --out") from None
 

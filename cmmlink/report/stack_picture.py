@@ -8,11 +8,13 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import QuadMesh
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from cmmlink.report.heading import draw_heading, heading_of, save_picture
+from cmmlink.report.speech import Speech
 from cmmlink.report.stack_panels import along_height, draw_panel, words_of
 from cmmlink.stack import SectionOutcome, StackOutcome
 from cmmlink.words import headline_of
@@ -25,34 +27,45 @@ _EMPTY = "#d4d7da"
 
 
 def write_stack_picture(stack: StackOutcome, zone: ToleranceZone, title: str, path: Path) -> None:
-    """Draw the map to a PNG file. Where the nominals differ in length, the abscissa is the share of the length."""
-    sections = sorted(stack.sections, key=lambda section: section.slice.height_mm)
-    lengths = np.array([section.profile.length_mm for section in sections])
-    common = bool(np.ptp(lengths) <= 0.001 * lengths[0])
-    scale = float(lengths[0]) if common else 100.0
+    """Draw the map to a PNG file, and the characteristics of the stack beside it."""
     panels = along_height(stack.characteristics)
     figure = Figure(figsize=(12 + 2.4 * len(panels), 7), dpi=110, layout="constrained")
     axes, *beside = figure.subplots(1, 1 + len(panels), squeeze=False, sharey=True, width_ratios=[4.5, *([1.0] * len(panels))])[0]
     for panel, one in zip(beside, panels, strict=True):
         draw_panel(panel, one)
+    bar = figure.colorbar(draw_map(axes, stack, zone, Speech()), ax=axes, extend="both")
+    draw_bar(bar.ax, zone, Speech())
+    told = [f"{len(stack.sections)} sections; grey: nothing judged", *(words_of(one) for one in stack.characteristics if not one.sections)]
+    axes.set_title("\n".join(told), fontsize=10, parse_math=False)
+    headline = headline_of(stack.verdict, stack.ending, len(stack.sections) / stack.asked)
+    draw_heading(figure, heading_of(title, headline.words))
+    save_picture(figure, path)
+
+
+def draw_map(axes: Axes, stack: StackOutcome, zone: ToleranceZone, say: Speech) -> QuadMesh:
+    """Draw the map. Where the nominals differ in length, the abscissa is the share of the length."""
+    sections = sorted(stack.sections, key=lambda section: section.slice.height_mm)
+    lengths = np.array([section.profile.length_mm for section in sections])
+    common = bool(np.ptp(lengths) <= 0.001 * lengths[0])
+    scale = float(lengths[0]) if common else 100.0
     axes.set_facecolor(_EMPTY)
     half = 0.75 * (zone.upper_mm - zone.lower_mm)
     edges = _edges(np.array([section.slice.height_mm for section in sections]))
     rows = np.stack([_row(section) for section in sections])
     columns = np.linspace(0.0, scale, _COLUMNS + 1)
     colours = Normalize(zone.middle_mm - half, zone.middle_mm + half)
-    shown = axes.pcolormesh(columns, edges, np.ma.masked_invalid(rows), cmap="RdBu_r", norm=colours)
-    bar = figure.colorbar(shown, ax=axes, extend="both", label="deviation (mm), the farthest from the zone's middle in each field")
-    for limit in (zone.lower_mm, zone.upper_mm):
-        bar.ax.axhline(limit, color="black", lw=1.2)
+    shown: QuadMesh = axes.pcolormesh(columns, edges, np.ma.masked_invalid(rows), cmap="RdBu_r", norm=colours)
     _mark(axes, sections, scale)
-    where = "station (mm)" if common else "station (% of the section's length)"
-    axes.set(xlabel=where, ylabel="height along the normal (mm)")
-    told = [f"{len(sections)} sections; grey: nothing judged", *(words_of(one) for one in stack.characteristics if not one.sections)]
-    axes.set_title("\n".join(told), fontsize=10, parse_math=False)
-    headline = headline_of(stack.verdict, stack.ending, len(stack.sections) / stack.asked)
-    draw_heading(figure, heading_of(title, headline.words))
-    save_picture(figure, path)
+    axes.set_xlabel(say("station (mm)") if common else say("station (% of the section's length)"))
+    axes.set_ylabel(say("height along the normal (mm)"))
+    return shown
+
+
+def draw_bar(axes: Axes, zone: ToleranceZone, say: Speech) -> None:
+    """Draw the limits on the bar of colours beside the map, and say what it shows."""
+    axes.set_ylabel(say("deviation (mm), the farthest from the zone's middle in each field"))
+    for limit in (zone.lower_mm, zone.upper_mm):
+        axes.axhline(limit, color="black", lw=1.2)
 
 
 def _row(section: SectionOutcome) -> Array:

@@ -47,7 +47,8 @@ def test_the_command_writes_results_for_the_stack_and_every_section(blade: tuple
     assert [cut["height_mm"] for cut in facts["slices"]] == [5, 10.5, 15]
     assert {"contours", "verdict", "worst", "registration", "stretches", "profile_error_mm", "set_aside"} <= set(facts["slices"][0])
     assert sorted(path.name for path in out.iterdir()) == [
-        "earlier", "result.json", "section-001_5.000mm", "section-002_10.500mm", "section-003_15.000mm", "sections.csv", "stack.png",
+        "earlier", "report.pdf", "result.json", "section-001_5.000mm", "section-002_10.500mm", "section-003_15.000mm", "sections.csv",
+        "stack.png",
     ]  # fmt: skip
     own = out / "section-002_10.500mm"
     assert sorted(path.name for path in own.iterdir()) == ["contours.csv", "deviations.csv", "profile.png"]
