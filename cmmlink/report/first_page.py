@@ -180,16 +180,14 @@ def _facts_of_result(document: Mapping[str, Any], say: Speech) -> Iterator[tuple
 
 
 def fit_words(document: Mapping[str, Any], say: Speech) -> str:
-    """How the pose was found and what decided, and what the deviations went through."""
-    filters = sorted({found["filter"] for found in document["characteristics"]} - {"none"})
+    """How the pose of the run was found and what decided; its deviations are raw, and filters stand with their characteristics."""
     return say(
-        "{fit}, rule {rule}, target {target} mm, weights {weights}; method {method}; filter {filter}",
+        "{fit}, rule {rule}, target {target} mm, weights {weights}; method {method}; raw deviations",
         fit=say.sentence(document["fit"]),
         rule=say.sentence(document["rule"]),
         target=say.number(document["target_mm"], "g"),
         weights=say.sentence(document["weights"]),
         method=document["method"],
-        filter="; ".join(filters) or say("none"),
     )
 
 

@@ -60,8 +60,8 @@ def _row(one: Mapping[str, Any], say: Speech) -> list[Any]:
         (one["value"], ".4f"),
         (one["nominal"], ".4f"),
         (one["deviation"], "+.4f"),
-        (one["lower"], "+g"),
-        (one["upper"], "+g"),
+        (one["lower"], "+.4g"),
+        (one["upper"], "+.4g"),
     ]
     out = out_by(one)
     shape: Shape = SHAPES[one["verdict"]]
@@ -178,6 +178,10 @@ def _conditions(report: ReportInput, say: Speech) -> Iterator[tuple[str, str]]:
             yield say("The part fits as well"), _pose_words(other, say)
         gap = document["largest_gap"]
         yield say("Largest gap"), say("a flat of up to {hidden} mm could hide there", hidden=say.number(gap["could_hide_mm"], ".3g"))
+    for found in document["characteristics"]:
+        if found["certificate"] is not None:
+            for number, line in enumerate(found["certificate"]["words"].splitlines()):
+                yield "" if number else say("Certificate of {name}", name=found["name"]), line
     for reason, count in document["rejected_by_reason"].items():
         yield say("Rejected"), f"{count}: {say.sentence(reason)}"
     yield say("Measured at"), moment_words(document.get("measured_at")) or ""
