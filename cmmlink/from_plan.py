@@ -15,6 +15,7 @@ from cmmlink.errors import PlanError
 from cmmlink.events import RunStarted
 from cmmlink.nominal_files import NominalFile, load_nominal, material_side
 from cmmlink.plan import CtPlan, Discretisation, Nominal, Plan, Section, place_of
+from drivers import PointFileError, read_bytes
 from inspection import (
     Characteristic,
     FitName,
@@ -106,10 +107,8 @@ def _read(nominal: Nominal, section: Section | None, content: bytes) -> NominalF
 
 def _content_of(path: Path) -> bytes | None:
     """What tells the content of a file from any other; None where it cannot be read, of which whoever reads it says why."""
-    with suppress(OSError, ValueError):
-        if path.is_file():
-            with path.open("rb") as file:
-                return hashlib.file_digest(file, "sha256").digest()
+    with suppress(PointFileError):
+        return hashlib.sha256(read_bytes(path)).digest()
     return None
 
 

@@ -48,7 +48,7 @@ BAD: dict[str, tuple[str, str | bytes, str]] = {
     "three blocks": ("a.dat", "t\n" + rows(UPPER) + "\n" + rows(LOWER) + "\n" + rows(LOWER), "line 86: a third block of points begins"),
     "only separators": ("a.dat", "t\n999 999\n999 999\n", "no points between the separators"),
     "wrong counts": ("a.dat", "t\n41. 40.\n\n" + rows(UPPER) + "\n" + rows(LOWER), "line 2: 41 40 is far from the 82 points that follow"),
-    "unknown suffix": ("a.stp", MANY, "no nominal file is known by the suffix '.stp'; expected one of .asc, .csv, .dat"),
+    "unknown suffix": ("a.prt", MANY, "no nominal file is known by the suffix '.prt'; expected one of .asc, .csv, .dat"),
     "no suffix": ("a", MANY, "suffix ''"),
     "yaml key": ("a.yaml", QUARTER + "control_points: []\n", "line 5: control_points is not a known key; did you mean control_points_mm?"),
     "yaml missing": ("a.yaml", QUARTER.replace("degree: 2\n", ""), "degree is missing: expected the degree"),
