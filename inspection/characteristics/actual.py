@@ -6,7 +6,7 @@ it), with knots at a stated distance. The actual place at station s is foot(s) +
 deviations stands beside it, and so do the stretches without a measured point: no value is given that was found in one.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +19,7 @@ from inspection.curve import NurbsCurve
 from inspection.errors import InspectionError
 from inspection.filters import ProfileFilter
 from inspection.first_use import OnFirstUse
+from inspection.rigid import RigidTransform
 from inspection.signed_deviations import Deviations
 
 if TYPE_CHECKING:
@@ -65,6 +66,10 @@ class ActualSection:
     def __post_init__(self) -> None:
         self.unseen_mm.setflags(write=False)
         self.is_unseen.setflags(write=False)
+
+    def moved(self, motion: RigidTransform) -> "ActualSection":
+        """The same section after a rigid motion; its stations stay."""
+        return replace(self, section=self.section.moved(motion))
 
     def unseen_place(self, value: SectionValue) -> str | None:
         """The name of a place of a value that lies where nothing was measured; None where there is none."""

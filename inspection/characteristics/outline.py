@@ -5,7 +5,7 @@ has a corner, or ends in a flat between two corners. On an outline that is smoot
 leading one is the blunter: the one with the smaller curvature (the convention of PC-DMIS Blade, "Nominal File Keywords").
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -15,6 +15,7 @@ from inspection.characteristics.zoom import find_maximum
 from inspection.curve import NurbsCurve
 from inspection.errors import NominalError
 from inspection.nominal import NominalProfile
+from inspection.rigid import RigidTransform, rotate
 
 Array = NDArray[np.float64]
 TrailingEdge = Literal["open", "sharp", "blunt", "round"]
@@ -75,6 +76,12 @@ class AirfoilSection:
         point, first, second = self.curve.derivatives(self._on_outline(u), 2)
         unit = first / np.hypot(first[:, 0], first[:, 1])[:, None]
         return point, first, second, self.inward * np.column_stack([-unit[:, 1], unit[:, 0]])
+
+    def moved(self, motion: RigidTransform) -> "AirfoilSection":
+        """The same section after a rigid motion."""
+        control, curve = motion.apply(self.curve.control_points_mm), self.curve
+        moved = NurbsCurve(curve.degree, control, curve.knots, curve.weights, curve.closed)
+        return replace(self, curve=moved, points_mm=motion.apply(self.points_mm), normal=rotate(self.normal, motion.rotation_rad))
 
     def neighbourhood(self, sample: int) -> tuple[float, float]:
         """The parameters of the samples before and after one of them, so far as there are any; around a round edge there always are."""

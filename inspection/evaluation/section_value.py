@@ -40,6 +40,7 @@ from inspection.freedoms import Freedoms
 from inspection.gaps import Measured
 from inspection.limited_fit import register_within
 from inspection.registration import Registration
+from inspection.rigid import RigidTransform
 from inspection.signed_deviations import deviations
 from inspection.tolerance import decision_words
 from inspection.verdict import Rejection, Verdict
@@ -135,11 +136,24 @@ class ActualOutlines:
         assert asked.section is not None
         if asked.filter not in self._drawn:
             rows = np.concatenate([self._basis.drawn(self._basis.rows(None)), self._beyond_ends()])
-            d = self._basis.deviations_at(rows, self._basis.pose)
+            pose = self._drawn_at()
+            d = self._basis.deviations_at(rows, pose)
             filtered = None if asked.filter is None else filter_deviations(d, self._basis.nominal, asked.filter).waviness_mm.copy()
             actual = draw_actual_section(asked.section, d, filtered, asked.filter, gap_max_mm=self._basis.result.gap_max_mm)
+            actual = actual.moved(self._basis.pose.after(pose.inverse()))
             self._drawn[asked.filter] = actual, Outline(actual.section)
         return self._drawn[asked.filter]
+
+    def _drawn_at(self) -> RigidTransform:
+        """The pose at which the section is drawn: the best fit, wherever the run judged its points.
+
+        The deviations of a part that lies off its datum turn with the normal, within less than a knot around an edge: a spline over the
+        station loses that, and a perfect part would have another radius and chord than its nominal.
+        """
+        if self._basis.result.fit == "best-fit" and self._basis.terms.known_pose is None:
+            return self._basis.pose
+        fit = self.best_fit()
+        return fit.nominal_from_section if fit.converged else self._basis.pose
 
     def _beyond_ends(self) -> NDArray[np.int64]:
         """Rows (k,) of the points beyond an open end, in an order of their own: they have no verdict, but tell where the part ends."""

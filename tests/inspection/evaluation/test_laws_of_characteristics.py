@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from inspection import InspectionResult, LineProfile, Missing, SectionCharacteristic, Verdict
 from inspection.evaluation.region import is_inside
-from tests.inspection.evaluation.asked import COUNT, every_type, form, named, nominal, points_at, run, stations
+from tests.inspection.evaluation.asked import COUNT, DATUM, every_type, form, named, nominal, points_at, run, stations
 from tests.inspection.profiles import Array
 
 SAME = 1e-7
@@ -134,3 +134,14 @@ def test_the_part_has_the_worst_verdict_and_the_reasons_of_the_worst_come_first(
     assert result.verdict is max(verdicts) is Verdict.NONCONFORM
     assert Verdict.CONFORM in verdicts
     assert result.reasons[0].kind == "out-of-tolerance"
+
+
+@pytest.mark.parametrize("off_mm", [(0.25, 0.0), (0.0, 0.3)])
+def test_where_a_part_lies_changes_no_number_of_its_shape(off_mm: tuple[float, float]) -> None:
+    """Off its datum by more than its tolerance, a part has the chord, the edges and the camber that it has on it."""
+    asked = tuple(one for one in every_type() if one.name in ("chord", "angle", "thickness", "edge thickness", "radius", "camber"))
+    there = DATUM.inverse().apply(DATUM.apply(even_scan()) + off_mm)
+    at_datum: dict[str, Any] = {"asked": asked, "fit": "none", "datum": DATUM}
+    here, moved = named(run(even_scan(), **at_datum)), named(run(there, **at_datum))
+    for name, found in here.items():
+        assert moved[name].value == pytest.approx(found.value, abs=1e-5), name
