@@ -6,8 +6,8 @@ it), with knots at a stated distance. The actual place at station s is foot(s) +
 deviations stands beside it, and so do the stretches without a measured point: no value is given that was found in one.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,12 +22,10 @@ from inspection.first_use import OnFirstUse
 from inspection.rigid import RigidTransform
 from inspection.signed_deviations import Deviations
 
-if TYPE_CHECKING:
-    from scipy.interpolate import BSpline
-
 Array = NDArray[np.float64]
 
 _DEGREE = 3
+_EDGE = 0.1  # of the section's length: to either side of a tip, what moves with its edge where edges move as a whole
 _KNOTS = 200  # on the outline, unless their distance is given
 _BETWEEN = 4  # places from knot to knot at which the noise left in the spline is looked at: where points are few it swings between knots
 _GAP_KNOTS = 2.0  # a stretch without points that is longer than this many knot distances is drawn by no point
@@ -101,6 +99,7 @@ def draw_actual_section(
     filtered_by: ProfileFilter | None = None,
     knots_mm: float | None = None,
     gap_max_mm: float | None = None,
+    edges_as_wholes: bool = False,
 ) -> ActualSection:
     """The actual section of m points with their deviations from the nominal's curve.
 
@@ -109,6 +108,8 @@ def draw_actual_section(
     filtered_by : the filter that gave them; no value may hide that it is of filtered points
     knots_mm    : distance of the spline's knots; a two-hundredth of the outline unless given. Finer detail is not drawn
     gap_max_mm  : a stretch without points longer than this is unseen; two knot distances unless given
+    edges_as_wholes : also let every round edge move as a whole, which the spline cannot follow where the radius is below its knots.
+                  Held against the section without it, that tells how well a number is drawn
 
     Raises InspectionError where fewer than eight points are left.
     """
@@ -130,7 +131,7 @@ def draw_actual_section(
     spacing = (end - start) / _KNOTS if knots_mm is None else float(knots_mm)
     if not 0 < spacing < (end - start) / 4:
         raise ValueError(f"the distance of knots must be positive and below a quarter of the outline, not {spacing:g} mm")
-    spline, rms, noise = _draw_deviations(nominal, station, values, (start, end), spacing)
+    spline, rms, noise = _draw_deviations(nominal, station, values, (start, end), spacing, edges_as_wholes)
     unseen = _find_unseen(station, (start, end), _GAP_KNOTS * spacing if gap_max_mm is None else gap_max_mm, nominal.trailing == "round")
     moved = _move_outline(nominal, spline, start, _drawn_range(station, (start, end), spacing))
     tail = None if nominal.trailing == "round" else _end_at_tail(moved, nominal, deviations, (start, end), off)
@@ -223,38 +224,60 @@ def _stations(nominal: AirfoilSection, u: Array, start: float) -> Array:
 
 
 def _draw_deviations(
-    nominal: AirfoilSection, station: Array, values: Array, ends: tuple[float, float], spacing: float
-) -> tuple["BSpline", float, OnFirstUse[Array]]:
+    nominal: AirfoilSection, station: Array, values: Array, ends: tuple[float, float], spacing: float, edges_as_wholes: bool
+) -> tuple[Callable[[Array], Array], float, OnFirstUse[Array]]:
     """The spline of least squares over rising stations (m,), the weighted root mean square of what it leaves, and the noise left in it."""
     from scipy.interpolate import BSpline  # noqa: PLC0415 - it takes half a second, and a plan knows only names of this file
-    from scipy.sparse import csr_array, diags_array  # noqa: PLC0415
+    from scipy.sparse import block_diag, csr_array, diags_array, eye_array, hstack  # noqa: PLC0415
     from scipy.sparse.linalg import spsolve  # noqa: PLC0415
 
     start, end = ends
     count = max(4, round((end - start) / spacing))
     step = (end - start) / count
     knots = start + step * np.arange(-_DEGREE, count + _DEGREE + 1)
-    basis = csr_array(BSpline.design_matrix(np.clip(station, start, np.nextafter(end, start)), knots, _DEGREE))
     is_round = nominal.trailing == "round"
     columns = count if is_round else count + _DEGREE
     fold = csr_array((np.ones(count + _DEGREE), (np.arange(count + _DEGREE), np.arange(count + _DEGREE) % columns)))
-    basis = csr_array(basis @ fold)
+
+    def basis_at(at: Array) -> "csr_array":
+        """What every coefficient does at stations (k,)."""
+        local = csr_array(csr_array(BSpline.design_matrix(np.clip(at, start, np.nextafter(end, start)), knots, _DEGREE)) @ fold)
+        return csr_array(hstack([local, csr_array(_edges_moved(nominal, at, ends))])) if edges_as_wholes else local
+
+    basis = basis_at(station)
     weight = _arc_shares(station, ends, is_round)
     bend = diags_array([1.0, -2.0, 1.0], offsets=[0, 1, 2], shape=(count + _DEGREE - 2, count + _DEGREE)) @ fold
-    normal_matrix = basis.T @ (basis * weight[:, None]) + _BRIDGING * weight.sum() / columns * (bend.T @ bend)
+    smooth = block_diag([bend.T @ bend, eye_array(basis.shape[1] - columns)]) if edges_as_wholes else bend.T @ bend
+    normal_matrix = basis.T @ (basis * weight[:, None]) + _BRIDGING * weight.sum() / columns * smooth
     coefficients = spsolve(normal_matrix.tocsc(), basis.T @ (weight * values))
     rest = values - basis @ coefficients
     rms = float(np.sqrt((weight * rest * rest).sum() / weight.sum()))
 
     def noise() -> Array:
         places = np.linspace(start, np.nextafter(end, start), _KNOTS * _BETWEEN + 1)
-        there = csr_array(BSpline.design_matrix(places, knots, _DEGREE)) @ fold
+        there = basis_at(places)
         gains = np.linalg.solve(normal_matrix.toarray(), there.toarray().T)  # (columns, places) of the values there by sums over the points
         squares = (basis.T @ (basis * np.square(weight)[:, None])).toarray()
         left = np.sqrt(np.maximum(((squares @ gains) * gains).sum(axis=0), 0.0))
         return np.array([left[max(at - _BETWEEN, 0) : at + _BETWEEN + 1].max() for at in range(0, len(places), _BETWEEN)])
 
+    if edges_as_wholes:
+        return lambda at: np.asarray(basis_at(at) @ coefficients), rms, OnFirstUse(noise)
     return BSpline(knots, np.asarray(fold @ coefficients), _DEGREE), rms, OnFirstUse(noise)
+
+
+def _edges_moved(nominal: AirfoilSection, station: Array, ends: tuple[float, float]) -> Array:
+    """Deviations (m, 2) at stations (m,) of an outline whose leading edge moves as a whole by 1 mm along x or y, fading into both sides.
+
+    With a round trailing edge (m, 4), the last two for that one. They follow the normal around an edge, however few knots lie there.
+    """
+    samples = _stations(nominal, nominal.parameter, ends[0])
+    inward = nominal.frame(np.interp(station, samples, nominal.parameter))[3]
+    away = [np.abs(station - samples[nominal.nose_sample])]
+    if nominal.trailing == "round":
+        away.append(np.minimum(station - ends[0], ends[1] - station))
+    shares = [np.maximum(1.0 - np.square(one / (_EDGE * nominal.length_mm)), 0.0) ** 3 for one in away]
+    return np.column_stack([(nominal.outward * nominal.inward * share)[:, None] * inward for share in shares])
 
 
 def _arc_shares(station: Array, ends: tuple[float, float], is_round: bool) -> Array:
@@ -282,7 +305,7 @@ def _drawn_range(station: Array, ends: tuple[float, float], spacing: float) -> t
 
 
 def _move_outline(
-    nominal: AirfoilSection, spline: "BSpline", start: float, within: tuple[float, float] = (-np.inf, np.inf)
+    nominal: AirfoilSection, spline: Callable[[Array], Array], start: float, within: tuple[float, float] = (-np.inf, np.inf)
 ) -> AirfoilSection:
     """The section whose outline is the nominal one moved along its normals by the spline of deviations over stations.
 

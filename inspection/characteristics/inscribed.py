@@ -23,6 +23,8 @@ _END_ROUNDS = 8  # narrowing of the place at which the camber line can be follow
 _TANGENT = 1e-6  # cosine between the radius to a contact and the outline there: more is a search that did not settle
 _AS_LARGE = 1e-9  # of a radius: circles that differ by less are equal
 _OSCULATING = 2e-2  # radius times curvature of the outline, short of one: along an arc all circles are one, and touch it anywhere
+_LONGEST_AT_ROUND = 2.0  # radii of the last circle that the line may be continued by at a round edge; where it is followed it is one
+_FARTHEST_FROM_END = 0.01  # of the outline: where contacts at a trailing edge with ends must have come, one of them at least
 _INSIDE = 1e-7  # of the section's length: a place that lies this deep in a circle is taken as in it
 
 
@@ -153,11 +155,12 @@ def find_camber_line(section: AirfoilSection) -> CamberLine:
     size = np.where(circles.is_whole, circles.radius_mm, -1.0)
     largest = np.flatnonzero(size >= (1 - _AS_LARGE) * size.max())  # many, where both sides are parallel
     best = int(largest[len(largest) // 2])
-    low, high = _run_around(_goes_on(circles), best)
+    run = _run_around(circles, best)
+    low, high = int(run[0]), int(run[-1])
     towards_tail = _last_whole(section, u[low], u[low - 1] if low else section.first)
     towards_nose = _last_whole(section, u[high], u[high + 1] if high + 1 < len(u) else section.nose)
-    found = inscribe_circles(section, np.concatenate([[towards_nose], u[low : high + 1][::-1], [towards_tail]]))
-    return _continue_to_edges(section, found)
+    found = inscribe_circles(section, np.concatenate([[towards_nose], u[run][::-1], [towards_tail]]))
+    return continue_to_edges(section, found)
 
 
 def _goes_on(circles: InscribedCircles) -> NDArray[np.bool_]:
@@ -166,11 +169,16 @@ def _goes_on(circles: InscribedCircles) -> NDArray[np.bool_]:
     return np.asarray(circles.is_whole[:-1] & circles.is_whole[1:] & farther)
 
 
-def _run_around(goes_on: NDArray[np.bool_], at: int) -> tuple[int, int]:
-    """First and last circle of the run through circle `at` in which every one goes on to the next."""
-    stops = np.flatnonzero(~goes_on)
-    before, behind = stops[stops < at], stops[stops >= at]
-    return (int(before[-1]) + 1 if before.size else 0), (int(behind[0]) if behind.size else len(goes_on))
+def _run_around(circles: InscribedCircles, at: int) -> NDArray[np.int64]:
+    """The whole circles (j,) around circle `at` of which every one has both contacts farther along their sides than the one before.
+
+    Between two of them others may touch no other side: those on the flanks of a bump, past which the line goes on.
+    """
+    whole = np.flatnonzero(circles.is_whole)
+    stops = np.flatnonzero(np.diff(circles.v[whole]) * np.diff(circles.u[whole]) > 0)
+    place = int(np.searchsorted(whole, at))
+    before, behind = stops[stops < place], stops[stops >= place]
+    return np.asarray(whole[int(before[-1]) + 1 if before.size else 0 : int(behind[0]) + 1 if behind.size else len(whole)])
 
 
 def _last_whole(section: AirfoilSection, whole: float, beyond: float) -> float:
@@ -185,8 +193,8 @@ def _last_whole(section: AirfoilSection, whole: float, beyond: float) -> float:
     return float(whole)
 
 
-def _continue_to_edges(section: AirfoilSection, circles: InscribedCircles) -> CamberLine:
-    """The line of centres with its two ends continued."""
+def continue_to_edges(section: AirfoilSection, circles: InscribedCircles) -> CamberLine:
+    """The line of centres with its two ends continued. Raises InspectionError where they are not near the edges."""
     along = circles.along()
     if along[0] @ (circles.centre_mm[-1] - circles.centre_mm[0]) < 0:
         along = -along
@@ -195,6 +203,7 @@ def _continue_to_edges(section: AirfoilSection, circles: InscribedCircles) -> Ca
     reach = tail - circles.centre_mm[-1]
     tail_along = reach / np.hypot(*reach) if np.hypot(*reach) > 0 else along[-1]
     lengths = float(np.hypot(*(nose - circles.centre_mm[0]))), float(np.hypot(*reach))
+    _refuse_early_end(section, circles, lengths)
     return CamberLine(
         circles=circles,
         points_mm=np.vstack([nose, circles.centre_mm, tail]),
@@ -208,6 +217,20 @@ def _continue_to_edges(section: AirfoilSection, circles: InscribedCircles) -> Ca
             f"the camber line is continued {way} over the last {lengths[1]:.4g} mm at the trailing edge",
         ),
     )
+
+
+def _refuse_early_end(section: AirfoilSection, circles: InscribedCircles, continued_mm: tuple[float, float]) -> None:
+    """Raise InspectionError where the line was followed to no edge: continued straight from there, it would lead anywhere."""
+    is_short = [length <= _LONGEST_AT_ROUND * circles.radius_mm[end] for length, end in zip(continued_mm, (0, -1), strict=True)]
+    if section.trailing != "round":
+        left = min(circles.u[-1] - section.first, section.last - circles.v[-1])
+        is_short[1] = bool(left <= _FARTHEST_FROM_END * (section.last - section.first))
+    for is_followed, length, edge in zip(is_short, continued_mm, ("leading", "trailing"), strict=True):
+        if not is_followed:
+            raise InspectionError(
+                f"no circle touches both sides over the last {length:.4g} mm before the {edge} edge, so there is no camber line to it: "
+                "the outline is dented or bulges there"
+            )
 
 
 def _leave_between(section: AirfoilSection, centre: Array, direction: Array, low: float, high: float) -> Array:

@@ -62,6 +62,7 @@ PLACED: tuple[SectionKind, ...] = ("chord-angle", "twist", "displacement")  # ki
 _NO_DATUM = "It is counted from a datum (registration.datum): a fit of all freedoms leaves nothing of it."
 _FEWEST_POINTS = 4  # of a fit: one more than there are freedoms
 _TIP_KNOTS = 3.0  # knots of the actual section to either side of a tip, on which its curvature depends
+_OF_DRAWING = 2.0  # times the difference between both ways of drawing edges: what a value is doubted by
 _AXES = {"x": 0, "y": 1, "total": 2}
 
 
@@ -124,25 +125,26 @@ def _measure_of(asked: SectionCharacteristic) -> Callable[[Outline], float] | No
 
 
 class ActualOutlines:
-    """The actual section of a run, drawn once for every filter that is asked for, and the best fit of its points."""
+    """The actual section of a run, drawn once for every filter asked for and either way of edges, and the best fit of its points."""
 
     def __init__(self, basis: Basis) -> None:
         self._basis = basis
-        self._drawn: dict[ProfileFilter | None, tuple[ActualSection, Outline]] = {}
+        self._drawn: dict[tuple[ProfileFilter | None, bool], tuple[ActualSection, Outline]] = {}
         self._fit: Registration | None = None
 
-    def drawn(self, asked: SectionCharacteristic) -> tuple[ActualSection, Outline]:
+    def drawn(self, asked: SectionCharacteristic, edges_as_wholes: bool = False) -> tuple[ActualSection, Outline]:
         """The actual section as a characteristic wants it. Raises InspectionError where too few points lie on it."""
         assert asked.section is not None
-        if asked.filter not in self._drawn:
+        key = asked.filter, edges_as_wholes
+        if key not in self._drawn:
             rows = np.concatenate([self._basis.drawn(self._basis.rows(None)), self._beyond_ends()])
-            pose = self._drawn_at()
+            pose, gap = self._drawn_at(), self._basis.result.gap_max_mm
             d = self._basis.deviations_at(rows, pose)
             filtered = None if asked.filter is None else filter_deviations(d, self._basis.nominal, asked.filter).waviness_mm.copy()
-            actual = draw_actual_section(asked.section, d, filtered, asked.filter, gap_max_mm=self._basis.result.gap_max_mm)
+            actual = draw_actual_section(asked.section, d, filtered, asked.filter, gap_max_mm=gap, edges_as_wholes=edges_as_wholes)
             actual = actual.moved(self._basis.pose.after(pose.inverse()))
-            self._drawn[asked.filter] = actual, Outline(actual.section)
-        return self._drawn[asked.filter]
+            self._drawn[key] = actual, Outline(actual.section)
+        return self._drawn[key]
 
     def _drawn_at(self) -> RigidTransform:
         """The pose at which the section is drawn: the best fit, wherever the run judged its points.
@@ -191,7 +193,8 @@ def judge_value(asked: SectionCharacteristic, basis: Basis, outlines: ActualOutl
     deviation = value.value - asked.nominal_value
     deviation = angle_within_half_a_turn(deviation) if nominal.unit == "deg" else deviation
     measured = _measured(asked, basis, value, actual)
-    points, why = _judge(asked, value, deviation, measured, basis, actual)
+    drawing = 0.0 if actual is None else _doubt_of_drawing(asked, basis, outlines, value)
+    points, why = _judge(asked, value, deviation, drawing, measured, basis, actual)
     conclusion = basis.conclude(points, why, measured, basis.result.judged)
     places = tuple((name, float(x), float(y)) for name, (x, y) in zip(value.place_names, value.places_mm.tolist(), strict=True))
     return replace(
@@ -206,7 +209,7 @@ def judge_value(asked: SectionCharacteristic, basis: Basis, outlines: ActualOutl
         coverage=measured.coverage,
         gap_mm=measured.gap.length_mm,
         places_mm=places,
-        notes=(*value.notes, *(actual.notes[:1] if actual is not None else ()), *how),
+        notes=(*value.notes, *(actual.notes[:1] if actual is not None else ()), *_words_of_drawing(drawing, nominal.unit), *how),
     )
 
 
@@ -234,13 +237,34 @@ def _bare(asked: SectionCharacteristic, nominal: SectionValue, basis: Basis) -> 
     )
 
 
-def _find(asked: SectionCharacteristic, basis: Basis, outlines: ActualOutlines) -> tuple[SectionValue, ActualSection | None]:
+def _doubt_of_drawing(asked: SectionCharacteristic, basis: Basis, outlines: ActualOutlines, value: SectionValue) -> float:
+    """How far the drawn section may mislead about a value, in its unit; infinite where it has none if its edges move as wholes.
+
+    A spline cannot follow an edge whose radius is below its knots: of a part that is too long by 0.2 mm it shows 0.16. Where edges may
+    move as wholes it comes within a fifth of that error, so that twice the difference between both is more than the error.
+    """
+    try:
+        other, _ = _find(asked, basis, outlines, edges_as_wholes=True)
+    except InspectionError:
+        return math.inf
+    off = other.value - value.value
+    return _OF_DRAWING * abs(angle_within_half_a_turn(off) if value.unit == "deg" else off)
+
+
+def _words_of_drawing(doubt: float, unit: str) -> tuple[str, ...]:
+    """How well a value is drawn, in words."""
+    return (f"the drawn section may mislead by {doubt:.2g} {'' if unit == '1' else unit}".rstrip(),) if 0.0 < doubt < math.inf else ()
+
+
+def _find(
+    asked: SectionCharacteristic, basis: Basis, outlines: ActualOutlines, edges_as_wholes: bool = False
+) -> tuple[SectionValue, ActualSection | None]:
     """The actual value, and the drawn section that it was found on; a place or an angle as the datum sees it."""
     if asked.datum is not None and (asked.type == "displacement" or (asked.type == "twist" and asked.method == "best-fit")):
         fit = outlines.best_fit()
         seen = replace(fit, nominal_from_section=fit.nominal_from_section.after(asked.datum.inverse()))
         return (twist_by_fit(seen) if asked.type == "twist" else displacement(seen, asked.place_mm)[_AXES[asked.axis]]), None
-    actual, outline = outlines.drawn(asked)
+    actual, outline = outlines.drawn(asked, edges_as_wholes)
     if asked.type not in PLACED:
         return _MEASURES[asked.type](outline, asked), actual
     assert asked.datum is not None
@@ -281,19 +305,30 @@ def _measured(asked: SectionCharacteristic, basis: Basis, value: SectionValue, a
 
 
 def _judge(
-    asked: SectionCharacteristic, value: SectionValue, deviation: float, measured: Measured, basis: Basis, actual: ActualSection | None
+    asked: SectionCharacteristic,
+    value: SectionValue,
+    deviation: float,
+    drawing: float,
+    measured: Measured,
+    basis: Basis,
+    actual: ActualSection | None,
 ) -> tuple[Verdict, Reason | None]:
-    """The verdict on a value, and its reason; nothing is proven of one that stands on what was not measured."""
+    """The verdict on a value, and its reason; nothing is proven of one that stands on what was not measured, or is drawn too roughly."""
     unseen = actual.unseen_place(value) if actual is not None else None
     if unseen is not None:
         return Verdict.UNCERTAIN, Reason("unseen", f"It was found where nothing was measured ({unseen}); measure that stretch.")
-    verdict, unit = verdict_of(deviation, asked.lower, asked.upper, basis.guard(asked.uncertainty)), value.unit if value.unit != "1" else ""
-    if verdict is Verdict.CONFORM:
+    guard, unit = basis.guard(asked.uncertainty), value.unit if value.unit != "1" else ""
+    verdict = verdict_of(deviation, asked.lower, asked.upper, guard)
+    is_doubted = verdict_of(deviation, asked.lower, asked.upper, guard + drawing) is not verdict
+    if verdict is Verdict.CONFORM and not is_doubted:
         return verdict, None
     limits = f"{_limit(asked.lower)} .. {_limit(asked.upper)} {unit}".rstrip()
     told = f"{value.value:.6g} {unit}, {deviation:+.4g} from the nominal {asked.nominal_value:.6g}; {limits} are allowed"
     if verdict is Verdict.UNCERTAIN:
         return verdict, Reason("within-uncertainty", f"It is {told}: nearer to a limit than U = {asked.uncertainty:g} {unit}.")
+    if is_doubted:
+        words = f"It is {told}: nearer to a limit than the {drawing:.2g} {unit} by which the section that was drawn may mislead".rstrip()
+        return Verdict.UNCERTAIN, Reason("within-uncertainty", f"{words}; measure its edges more densely.")
     if measured.gap.length_mm > basis.terms.limits.gap_max_mm * (1 + 1e-9):
         return Verdict.UNCERTAIN, Reason("unseen", f"It is {told}; a part of what it depends on was not measured.")
     return verdict, Reason("out-of-tolerance", f"It is {told}.")

@@ -25,7 +25,7 @@ from cmmlink.console.refused import Refused
 from cmmlink.console.server import ConsoleServer
 from cmmlink.console.station import Station
 from drivers.source import PointBatch
-from tests.cmmlink.console.played import Device, opened, setup_of, write_plan
+from tests.cmmlink.console.played import UNREAD, Device, opened, setup_of, write_plan
 
 TOKEN = "a-token-for-fuzzing-of-32-letters"
 PATIENCE_S = 120.0  # for a busy machine: nothing is asserted of the time
@@ -111,7 +111,7 @@ class Workshop:
     def _page(self) -> Iterator[ClientConnection]:
         """A page in control."""
         place, origin = f"ws://127.0.0.1:{self._server.port}/live", Origin(f"http://127.0.0.1:{self._server.port}")
-        with connect(place, origin=origin, max_queue=1 << 16) as page:  # else the client itself hears no end while it waits to be read
+        with connect(place, origin=origin, max_queue=UNREAD) as page:
             page.send(json.dumps({"token": TOKEN}))
             page.send(json.dumps({"do": "take control", "number": 0}))
             yield page

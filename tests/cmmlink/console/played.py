@@ -19,6 +19,7 @@ from inspection import NominalProfile, RigidTransform, synthetic
 
 Array = NDArray[np.float64]
 
+UNREAD = 1 << 16  # messages that a client holds before it stops listening: a full one hears no end, and waits for ever at its own
 PLAN = """part: {name: blade 7, serial_number: B-0041}
 operator: Ada
 nominal: {file: section.yaml}

@@ -25,7 +25,7 @@ from cmmlink.console.listening import Access
 from cmmlink.console.server import ConsoleServer
 from cmmlink.console.station import Station
 
-from .played import Device, setup_of, write_plan
+from .played import UNREAD, Device, setup_of, write_plan
 
 TOKEN = "a-token-for-this-test-of-32-characters"
 DATA = Path(__file__).parent / "data"
@@ -46,7 +46,7 @@ def served(folder: Path, access: Access | None = None) -> Iterator[ConsoleServer
 @contextmanager
 def page(server: ConsoleServer) -> Iterator[ClientConnection]:
     """A page that is let in and has heard its hello."""
-    with connect(f"ws://127.0.0.1:{server.port}/live", origin=Origin(f"http://127.0.0.1:{server.port}")) as joined:
+    with connect(f"ws://127.0.0.1:{server.port}/live", origin=Origin(f"http://127.0.0.1:{server.port}"), max_queue=UNREAD) as joined:
         joined.send(json.dumps({"token": TOKEN}))
         assert json.loads(joined.recv(timeout=10))["type"] == "hello"
         yield joined
@@ -265,7 +265,7 @@ def test_encrypted_station_is_reached_with_its_certificate_alone(tmp_path: Path,
     with served(tmp_path, access) as server:
         assert server.new_address().startswith(f"https://127.0.0.1:{server.port}/#")
         own = Origin(f"https://127.0.0.1:{server.port}")
-        with connect(f"wss://127.0.0.1:{server.port}/live", ssl=trusting, origin=own) as joined:
+        with connect(f"wss://127.0.0.1:{server.port}/live", ssl=trusting, origin=own, max_queue=UNREAD) as joined:
             joined.send(json.dumps({"token": TOKEN}))
             assert json.loads(joined.recv(timeout=10))["type"] == "hello"
         with half_request(server.port) as plain:

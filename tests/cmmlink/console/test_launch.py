@@ -17,7 +17,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from ..command import cmmlink
-from .played import write_plan
+from .played import UNREAD, write_plan
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="ends the process as Ctrl-C does, which needs POSIX signals")
 
@@ -45,7 +45,7 @@ def told_address(process: subprocess.Popen[str]) -> str:
 def opens(address: str) -> bool:
     """Whether an address opens a page."""
     place, _, code = address.partition("/#")
-    with connect(place.replace("http", "ws", 1) + "/live", origin=Origin(place)) as socket:
+    with connect(place.replace("http", "ws", 1) + "/live", origin=Origin(place), max_queue=UNREAD) as socket:
         socket.send(json.dumps({"once": code}))
         try:
             return bool(json.loads(socket.recv(timeout=20))["type"] == "admitted")

@@ -27,7 +27,7 @@ from cmmlink.from_plan import profile_of
 from cmmlink.plan.scan import load_plan
 from cmmlink.run_view import RunContext, RunView
 
-from .played import Device, setup_of, write_plan
+from .played import UNREAD, Device, setup_of, write_plan
 
 TOKEN = "a-token-for-this-test-of-32-characters"
 HELLO = json.dumps({"token": TOKEN})
@@ -56,7 +56,7 @@ def joined(
 ) -> Iterator[ClientConnection]:
     """A socket with a token sent; without `origin`, one that says it comes from the page."""
     told = f"http://127.0.0.1:{server.port}" if origin == "" else origin
-    with connect(f"ws://127.0.0.1:{server.port}/live", origin=Origin(told) if told else None, **more) as socket:
+    with connect(f"ws://127.0.0.1:{server.port}/live", origin=Origin(told) if told else None, max_queue=UNREAD, **more) as socket:
         socket.send(first)
         yield socket
 
@@ -197,7 +197,7 @@ def test_what_the_system_refuses_in_a_command_is_answered(server: ConsoleServer,
 
 
 def test_a_page_that_floods_the_station_is_closed(server: ConsoleServer) -> None:
-    with joined(server, max_queue=1 << 16) as socket:  # else the client itself hears no end while it waits to be read
+    with joined(server) as socket:
         with suppress(ConnectionClosed):
             for _ in range(2000):
                 socket.send('{"do": "live"}')

@@ -1,0 +1,100 @@
+"""What a drawn section may mislead by: a part of another size is never told better than it is, however roughly its edges are drawn."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.interpolate import make_interp_spline
+
+from inspection import (
+    CharacteristicResult,
+    InspectionError,
+    LiveInspection,
+    NominalProfile,
+    NurbsCurve,
+    Outline,
+    SectionCharacteristic,
+    ToleranceZone,
+    Verdict,
+    discretize,
+    find_airfoil,
+    find_camber_line,
+    with_nominal,
+)
+from inspection.characteristics.inscribed import continue_to_edges, inscribe_circles
+from tests.inspection.profiles import Array, even_in_arc_length, left_normal
+
+POINTS = 1500
+WIDE = ToleranceZone(-2.0, 2.0)
+KINDS = (
+    SectionCharacteristic("chord", "chord", "tangent", -1.0, 1.0),
+    SectionCharacteristic("nose to tail", "chord", "nose-tail", -1.0, 1.0),
+    SectionCharacteristic("thickness", "thickness", "inscribed", -1.0, 1.0),
+    SectionCharacteristic("leading radius", "edge-radius", "circle", -1.0, 1.0),
+    SectionCharacteristic("trailing radius", "edge-radius", "circle", -1.0, 1.0, edge="trailing"),
+    SectionCharacteristic("trailing thickness", "edge-thickness", "tip-arc", -1.0, 1.0, edge="trailing", offset_mm=3.0),
+    SectionCharacteristic("camber", "camber", "inscribed", -1.0, 1.0),
+)
+
+
+@cache
+def blade(scale_x: float = 1.0, scale_y: float = 1.0) -> NominalProfile:
+    """A cambered section 100 mm long whose edges are round, with radii of about 0.7 and 0.3 mm: less than the knots of a drawn section."""
+    turn = np.linspace(0.0, 2 * np.pi, 401)
+    x = (1 + np.cos(turn)) / 2
+    y = 10 * np.sin(turn) * (0.6 * (1 - x) + 0.35 * x + 0.25 * x * (1 - x)) + 16 * x * (1 - x)
+    places = np.column_stack([100 * scale_x * x, scale_y * y])
+    places[-1] = places[0]
+    spline = make_interp_spline(turn, places, k=3, bc_type="periodic")
+    return discretize(NurbsCurve(3, spline.c, spline.t, closed=True), samples=2000)
+
+
+@cache
+def numbers_of(scale_x: float, scale_y: float) -> dict[str, float]:
+    """What every kind gives of a section that was drawn in this size."""
+    outline = Outline(find_airfoil(blade(scale_x, scale_y)))
+    return {one.name: with_nominal(one, lambda: outline).nominal_value for one in KINDS}
+
+
+def judged(points: Array, asked: tuple[SectionCharacteristic, ...]) -> dict[str, CharacteristicResult]:
+    outline = Outline(find_airfoil(blade()))
+    live = LiveInspection(blade(), WIDE, provisional=False, characteristics=[with_nominal(one, lambda: outline) for one in asked])
+    live.add(points)
+    return {one.name: one for one in live.finish(True).characteristics}
+
+
+def points_on(profile: NominalProfile, bump_mm: float = 0.0, at: float = 0.0) -> Array:
+    """Even points (m, 2) on a profile, with a bump at a share of its length."""
+    u = even_in_arc_length(profile.curve, POINTS)
+    off = (np.arange(POINTS) + 0.5) / POINTS - at
+    bump = bump_mm * np.exp(-np.square(off * profile.length_mm / 1.2))
+    return np.asarray(profile.curve.point(u) + bump[:, None] * profile.outward * left_normal(profile.curve, u))
+
+
+@pytest.mark.parametrize("scales", [(1.002, 1.0), (0.998, 1.0), (1.0, 1.03), (1.0, 0.98), (1.003, 1.01)])
+def test_a_part_of_another_size_conforms_to_no_limit_that_it_exceeds_and_fails_none_that_it_keeps(scales: tuple[float, float]) -> None:
+    off = {name: value - numbers_of(1.0, 1.0)[name] for name, value in numbers_of(*scales).items()}
+    told = {one.name: one for one in KINDS if abs(off[one.name]) > 1e-3}
+    points = points_on(blade(*scales))
+    for share, never in ((0.97, Verdict.CONFORM), (1.03, Verdict.NONCONFORM)):
+        limits = {name: share * abs(off[name]) for name in told}
+        found = judged(points, tuple(replace(one, lower=-limits[name], upper=limits[name]) for name, one in told.items()))
+        assert not [(name, one.deviation, off[name]) for name, one in found.items() if one.verdict is never]
+
+
+@pytest.mark.parametrize("at", [0.07, 0.12, 0.24, 0.7, 0.88])
+def test_a_bump_changes_no_number_of_what_it_is_not_on(at: float) -> None:
+    """The camber line goes on past the bump, on whichever side: it once ran straight on from there, and the chord was 23 mm too short."""
+    found = judged(points_on(blade(), 0.4, at), KINDS)
+    for name in ("chord", "nose to tail", "trailing radius", "trailing thickness"):
+        assert found[name].deviation == pytest.approx(0.0, abs=0.02), name
+    assert abs(found["camber"].deviation) < 0.3  # half of the bump, where it is on the highest place
+
+
+def test_a_camber_line_that_was_followed_to_no_edge_is_refused() -> None:
+    section = find_airfoil(blade())
+    whole = find_camber_line(section).circles
+    for part, edge in ((slice(60, None), "leading"), (slice(None, -60), "trailing")):
+        with pytest.raises(InspectionError, match=f"no circle touches both sides over the last .* before the {edge} edge"):
+            continue_to_edges(section, inscribe_circles(section, whole.u[part]))
