@@ -85,8 +85,8 @@ def test_a_device_measures_a_thickness_to_within_what_is_stated_over_that_length
 
 
 def test_numbers_measured_anew_with_drawn_errors_scatter_no_more_than_stated() -> None:
-    """Errors of device, tip, temperature and noise together, all points drawn and judged as a run does. 16 draws tell a scatter to 18 %."""
-    count, trials, rng = 400, 16, np.random.default_rng(31)
+    """Errors of device, tip, temperature and noise together, all points drawn and judged as a run does. 24 draws tell a scatter to 15 %."""
+    count, trials, rng = 400, 24, np.random.default_rng(31)
     points = scan("goe404", count, reference_form("goe404", count), 0, (0, 0))
     normal = deviations(points, nominal_of("goe404")).normal
     values, vectors = np.linalg.eigh(covariance_of_field(points, BUDGET))
@@ -97,8 +97,8 @@ def test_numbers_measured_anew_with_drawn_errors_scatter_no_more_than_stated() -
         drawn[i] = [one.value for one in judge(moved, None)]
     stated = np.array([one.uncertainty for one in judge(points, BUDGET)])
     ratio = stated / drawn.std(axis=0, ddof=1)
-    assert (ratio > 0.7).all(), ratio
-    assert (ratio < 2.0).all(), ratio
+    assert (ratio > 0.75).all(), ratio
+    assert (ratio < 1.9).all(), ratio
 
 
 def test_growth_that_was_not_taken_out_is_added_in_full() -> None:
