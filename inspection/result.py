@@ -66,7 +66,6 @@ class InspectionResult:
     minimum_zone_mm   : width of the minimum zone about the middle of the tolerance zone; NaN where it was not needed
     uncertainty       : of the deviations along the profile, None where no budget was stated; the U of `zone` is nowhere smaller
     largest_by_noise_mm : how much the stated noise raises the largest |deviation| on average
-    characteristics   : what was asked for, in its order; the verdict is that of the worst
     numbers           : what was found as well, without a part in the verdict, for what stands on several runs
     """
 
