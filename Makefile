@@ -32,13 +32,14 @@ compiled: .venv/test-installed
 	$(BIN)/python -m tests.benchmarks.warm_up
 
 # The lowest versions that pyproject.toml allows, on Python 3.11 and without the extras, must pass the fast tests: the first case of
-# every test of the three packages, and of what uses a library in the application: plans, nominal files, reports, record, a command, the server.
+# every test of the three packages but of what evaluates characteristics, which uses no library itself, and of what uses one in the application:
+# plans, nominal files, reports, record, a command, the server.
 LOWEST_PYTHON ?= python3.11
 OF_LIBRARIES := plan nominal_files report record/test_recorder.py commands/test_inspect.py console/test_server.py
 lowest: .venv/lowest/installed
 	.venv/lowest/bin/python -m tests.benchmarks.warm_up
 	.venv/lowest/bin/python -m pytest $(AT_ONCE) --first-case tests/inspection tests/drivers tests/simulators $(OF_LIBRARIES:%=tests/cmmlink/%) \
-		--ignore=tests/inspection/kernels/test_compiling.py
+		--ignore=tests/inspection/kernels/test_compiling.py --ignore=tests/inspection/evaluation
 
 # For every system of the README the versions of constraints.txt must exist as wheels.
 platforms: .venv/test-installed
