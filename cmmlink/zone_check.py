@@ -50,8 +50,10 @@ def check_zones(document: Mapping[str, Any]) -> tuple[ZoneCheck, ...]:
     try:
         curve = _Polygon(document["nominal"])
         return tuple(_check(zone, curve) for zone in document["zones"])
-    except (KeyError, TypeError, IndexError) as error:
-        raise ValueError(f"this is no zone.json: {error}") from None
+    except KeyError as error:
+        raise ValueError(f"is no zone.json: {error} is missing; expected the file that a run wrote beside its result") from None
+    except (TypeError, IndexError):
+        raise ValueError("is no zone.json: its values have other types; expected the file that a run wrote beside its result") from None
 
 
 class _Polygon:

@@ -25,9 +25,15 @@ def verify_zone(
     from cmmlink.zone_check import check_zones
 
     try:
-        found = check_zones(json.loads(file.read_bytes()))
-    except (OSError, ValueError) as error:
-        raise PlanError(f"{file}: {getattr(error, 'strerror', None) or error}") from None
+        stated = json.loads(file.read_bytes())
+    except OSError as error:
+        raise PlanError(f"{file}: {error.strerror or error}") from None
+    except (ValueError, RecursionError):  # no text, no JSON, or JSON without end
+        raise PlanError(f"{file}: is no JSON; expected the zone.json that a run wrote beside its result") from None
+    try:
+        found = check_zones(stated)
+    except ValueError as error:
+        raise PlanError(f"{file}: {error}") from None
     sound = all(not zone.problem for zone in found)
     if as_json:
         zones = [{"name": zone.name, "verified": not zone.problem, "problem": zone.problem, "boxes": zone.boxes} for zone in found]
