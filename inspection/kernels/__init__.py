@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from inspection.kernels.growing import GrowingSums
     from inspection.kernels.layout import AT_ONCE, SAMPLE_METHODS
     from inspection.kernels.on_samples import SampleTables
-    from inspection.kernels.pose import NONE_LEFT_OUT, OutlierLimit, PoseEstimate, PoseFit
+    from inspection.kernels.outliers import OutlierLimit
+    from inspection.kernels.pose import NONE_LEFT_OUT, PoseEstimate, PoseFit
     from inspection.kernels.projection import Turned, project, project_on_samples, project_outward
     from inspection.kernels.rows import JUDGED_AS, NONE_TAKEN, TALLY, Columns, Judgement, Places, Taken, judge_few_rows, judge_rows, take_in
     from inspection.kernels.side_by_side import fit_compiled_beside
@@ -35,7 +36,8 @@ else:
         "inspection.kernels.growing": ("GrowingSums",),
         "inspection.kernels.layout": ("AT_ONCE", "SAMPLE_METHODS"),
         "inspection.kernels.on_samples": ("SampleTables",),
-        "inspection.kernels.pose": ("NONE_LEFT_OUT", "OutlierLimit", "PoseEstimate", "PoseFit"),
+        "inspection.kernels.outliers": ("OutlierLimit",),
+        "inspection.kernels.pose": ("NONE_LEFT_OUT", "PoseEstimate", "PoseFit"),
         "inspection.kernels.projection": ("Turned", "project", "project_on_samples", "project_outward"),
         "inspection.kernels.rows": (
             "JUDGED_AS",

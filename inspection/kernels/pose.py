@@ -1,4 +1,4 @@
-"""The fine registration: Gauss-Newton on the pose of points, and their outliers by Tukey's weights."""
+"""The fine registration: Gauss-Newton on the pose of points, with or without gross outliers among them."""
 
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -8,18 +8,18 @@ from numpy.typing import NDArray
 
 from inspection.kernels.blocks import CurveTables, search_code
 from inspection.kernels.compiling import inner_kernel, kernel
-from inspection.kernels.feet import Marks, Room, empty_feet, feet_between, flatten, share_out
-from inspection.kernels.layout import AT_ONCE, COUNT, OPEN_END, SLOPE_TURN, SLOPE_X, SLOPE_Y, SQUARE, SQUARE_BEFORE, SUMS
+from inspection.kernels.feet import Marks, Room, empty_feet, flatten, share_out
+from inspection.kernels.layout import AT_ONCE, COUNT, SLOPE_TURN, SLOPE_X, SLOPE_Y, SQUARE, SQUARE_BEFORE, SUMS
 from inspection.kernels.normal_equations import fill_covariance, newton_step
-from inspection.kernels.on_samples import NO_PROJECTION, SampleTables, project_by, projection_of
-from inspection.kernels.pose_sums import add_up, centre_of, evaluate, move_pose, place_points, span_of
+from inspection.kernels.on_samples import NO_PROJECTION, SampleTables, projection_of
+from inspection.kernels.outliers import MANY, TO_COME, OutlierFit, OutlierLimit, limit_of, mark_outliers, median_near, share_of_tukey
+from inspection.kernels.pose_sums import add_up, centre_of, evaluate, move_pose, span_of
 
 Array = NDArray[np.float64]
 Pose = tuple[float, float, float]  # rotation about the origin in rad, then shift in mm (x, y)
 
 NONE_LEFT_OUT: Marks = np.empty(0, dtype=np.uint8)
 _NO_WEIGHING: Array = np.empty(0)
-MANY = 1 << 20  # points from which on a median is counted out, without a copy of them
 _STANDSTILL_MM = 1e-9  # Gauss-Newton ends when no point moves further
 _HALVINGS = 12
 _HOVERING_STEPS = 3  # after them points that come and go at an open end in small steps are left out: no pose suits both
@@ -27,14 +27,11 @@ _HOVERING_MM = 0.01
 _STANDSTILL_TO_COME_MM = 1e-12  # it ends as well when the step after this one moves none further, however slowly steps fall
 _PASSES = 4  # near the least mean square two are enough
 _WEIGHED_PASSES = 12
-_TO_COME = 2.0  # all steps from here on together, as a multiple of one that is at most half as long as the one before
-_AROUND_MEDIAN = 0.05  # share of a median within which the next one is expected
 
 
 # Not literals: to the compiler each of those has a type of its own, and what it is given to is compiled once more.
 _KNOWN: Any = np.bool_(True)
 _NOT_KNOWN: Any = np.bool_(False)
-_FIRST_ROW: Any = np.int64(0)
 
 
 class PoseEstimate(NamedTuple):
@@ -54,34 +51,6 @@ class PoseEstimate(NamedTuple):
     mean_square: float
     centre_mm: Array
     covariance: Array
-
-
-class OutlierLimit(NamedTuple):
-    """The deviation from which on a point is an outlier.
-
-    mads       : farther than so many median absolute deviations
-    least_mm   : and farther than this, however small the deviations of the others are
-    settled_mm : the fit by Tukey's weights has settled when it moves no point further
-    """
-
-    mads: float
-    least_mm: float
-    settled_mm: float
-
-
-class OutlierFit(NamedTuple):
-    """A fit by Tukey's weights.
-
-    found    : (m,) which points are outliers
-    pose     : rotation about the origin in rad, then shift in mm (x, y)
-    limit_mm : a point as far off is an outlier
-    settled  : the last step moved no point further than the limit of the fit says
-    """
-
-    found: NDArray[np.bool_]
-    pose: Pose
-    limit_mm: float
-    settled: bool
 
 
 class PoseFit:
@@ -165,7 +134,7 @@ class PoseFit:
         m = len(self.weights)
         found, off, state = self._room((m,), np.bool_), self._room((m,), np.float64), np.array([*pose, np.inf])
         found[:] = False
-        settled = _find_outliers(self._problem, self._projection, self._memory, state, limit, most_steps, found, off)
+        settled = mark_outliers(self._problem, self._projection, self._memory, state, limit, most_steps, found, off)
         return OutlierFit(found, tuple(state[:3].tolist()), float(state[3]), settled)
 
     def find_outliers_nearby(self, near: OutlierFit, limit: OutlierLimit) -> OutlierFit | None:
@@ -174,12 +143,12 @@ class PoseFit:
         pose, limit_mm, last_mm = near.pose, near.limit_mm, np.inf
         for _ in range(_WEIGHED_PASSES):
             sums = self._pass(pose, takes_part, takes_part, limit_mm, off)
-            share = _share_of_tukey(float(self.weights.sum()), float(np.sqrt(self.weights).sum()))
+            share = share_of_tukey(float(self.weights.sum()), float(np.sqrt(self.weights).sum()))
             next_pose, moved_mm, _ = _next_pose(pose, self._span, sums, share)
             if not sums[COUNT] > 0.0 or not np.isfinite(moved_mm):
                 return None
-            next_mm = _limit_mm(limit, _median_near(off, limit_mm / limit.mads))
-            to_come = _TO_COME * (moved_mm + abs(next_mm - limit_mm)) if moved_mm <= last_mm / 2 else np.inf
+            next_mm = limit_of(limit, median_near(off, limit_mm / limit.mads))
+            to_come = TO_COME * (moved_mm + abs(next_mm - limit_mm)) if moved_mm <= last_mm / 2 else np.inf
             if moved_mm <= limit.settled_mm or not np.any(np.abs(off - next_mm) <= to_come):
                 return OutlierFit(off >= next_mm, pose, next_mm, True)
             pose, limit_mm, last_mm = next_pose, next_mm, moved_mm
@@ -210,24 +179,6 @@ def _first_rows(left_out: Marks, m: int) -> NDArray[np.int64]:
     return np.concatenate(chosen)
 
 
-def _limit_mm(limit: OutlierLimit, median_mm: float) -> float:
-    return max(limit.mads * median_mm, limit.least_mm, _STANDSTILL_MM)
-
-
-def _median_near(values: Array, guess: float) -> float:
-    """The median of the values that are numbers, of which only those around a guess are ordered where the guess is a good one."""
-    low, high = guess * (1.0 - _AROUND_MEDIAN), guess * (1.0 + _AROUND_MEDIAN)
-    inside = values[(values >= low) & (values <= high)]
-    below, above = np.count_nonzero(values < low), np.count_nonzero(values > high)
-    count = below + len(inside) + above
-    if not count:
-        return np.inf
-    ranks = np.array([(count - 1) // 2, count // 2]) - below
-    if ranks[0] < 0 or ranks[1] >= len(inside):
-        return float(np.nanmedian(values))
-    return float(np.partition(inside, ranks)[ranks].mean())
-
-
 def compile_fit(outliers: bool = False) -> None:
     """Compile the search and the fit, or load them, as `PoseFit` takes them. No point is settled, so none is projected.
 
@@ -243,7 +194,7 @@ def compile_fit(outliers: bool = False) -> None:
     _next_pose((0.0, 0.0, 0.0), span, np.zeros(SUMS), 1.0)
     if outliers:
         limit, found = OutlierLimit(1.0, 0.0, 0.0), np.empty(0, dtype=np.bool_)
-        _find_outliers(problem, NO_PROJECTION, memory, np.zeros(4), limit, 0, found, none)
+        mark_outliers(problem, NO_PROJECTION, memory, np.zeros(4), limit, 0, found, none)
 
 
 @kernel
@@ -302,110 +253,3 @@ def _report(sums: Any, pose: Any, span: Any, state: Any, covariance: Any) -> Non
     state[3] = sums[SQUARE] / sums[COUNT] if sums[COUNT] > 0.0 else np.inf
     state[4], state[5] = centre_of(pose, span)
     fill_covariance(sums, span[2], sums[SQUARE] / max(sums[COUNT] - 3.0, 1.0), covariance)
-
-
-@kernel
-def _find_outliers(problem: Any, projection: Any, memory: Any, state: Any, wanted: Any, most_steps: int, found: Any, off: Any) -> bool:
-    """Make weighted steps, the weights following from the deviations at every pose, and mark the points beyond the limit.
-
-    It ends where no step to come can change which points these are. Moves the state (4,), a pose and the limit, and returns whether it
-    ended before the steps did.
-    """
-    weights = problem[2]
-    takes_part, _, moved, feet = memory
-    m, sums, last = len(weights), np.empty(SUMS), np.inf
-    span, pose, before = span_of(problem[0], problem[1], m), (state[0], state[1], state[2]), state[3]
-    for _ in range(most_steps):
-        count = _look_at_distances(problem, projection, pose, moved, takes_part, feet, off)
-        limit = np.inf
-        if count > 0:
-            limit = max(wanted.mads * _median(off, takes_part), wanted.least_mm, _STANDSTILL_MM)
-        weight = root = 0.0
-        for i in range(m):
-            share = off[i] / limit
-            near = 1.0 - share * share if off[i] < limit else 0.0
-            weights[i] = near * near
-            found[i] = off[i] >= limit and takes_part[i] > 0
-            weight += weights[i]
-            root += near
-        evaluate(problem, projection, pose, span, moved, takes_part, takes_part, feet, _KNOWN, sums)
-        step, share = newton_step(sums, span[2]), _share_of_tukey(weight, root)
-        pose = move_pose(pose, span, step, share)
-        state[0], state[1], state[2] = pose
-        state[3] = limit
-        to_come = _TO_COME * (share * step[3] + abs(limit - before)) if share * step[3] <= last / 2.0 else np.inf
-        if share * step[3] <= wanted.settled_mm or not _is_any_within(off, takes_part, limit, to_come):
-            return count > 0
-        before, last = limit, share * step[3]
-    return False
-
-
-@kernel
-def _share_of_tukey(weight: float, root: float) -> float:
-    """By how much a step with Tukey's weights falls short, from the sums of the weights and of their roots.
-
-    The derivative of w(e) e is less than w(e). The ratio of their sums, which is that of the step to Newton's where the
-    deviations have nothing to do with place, makes half the steps.
-    """
-    slope = 5.0 * weight - 4.0 * root
-    return weight / slope if slope > 0.5 * weight else 1.0
-
-
-@inner_kernel
-def _is_any_within(off: Any, takes_part: Any, limit: float, reach: float) -> bool:
-    """Whether a point that takes part is as close to the limit."""
-    found = False
-    for i in range(len(off)):
-        found |= takes_part[i] > 0 and abs(off[i] - limit) <= reach
-    return found
-
-
-@inner_kernel
-def _look_at_distances(problem: Any, projection: Any, pose: Any, moved: Any, takes_part: Any, feet: Any, off: Any) -> int:
-    """Enter how far each point is from the target, and which take part, at a pose. Returns how many do."""
-    points, left_out, weights, reals, integers, outward, tip = problem
-    m, row, count = len(weights), _FIRST_ROW, 0
-    for begin in range(0, m, len(feet.vertex)):
-        stop = min(begin + len(feet.vertex), m)
-        row = place_points(points, left_out, row, stop - begin, pose, moved)
-        project_by(projection, moved[: 2 * (stop - begin)], reals, integers, feet_between(feet, _FIRST_ROW, stop - begin))
-        for j in range(stop - begin):
-            off[begin + j] = abs(outward * feet.distance_mm[j] - tip)
-            takes_part[begin + j] = feet.vertex[j] != OPEN_END
-            count += takes_part[begin + j]
-    return count
-
-
-@inner_kernel
-def _median(off: Any, takes_part: Any) -> float:
-    """The median of the values of points that take part; of many it is counted out, which takes no copy of them."""
-    count = 0
-    for i in range(len(off)):
-        count += takes_part[i] > 0
-    if count == 0:
-        return np.inf
-    if count > MANY:
-        return 0.5 * (_value_of_rank(off, takes_part, (count - 1) // 2) + _value_of_rank(off, takes_part, count // 2))
-    chosen, at = np.empty(count), 0
-    for i in range(len(off)):
-        if takes_part[i] > 0:
-            chosen[at] = off[i]
-            at += 1
-    return float(np.median(chosen))
-
-
-@inner_kernel
-def _value_of_rank(values: Any, takes_part: Any, rank: int) -> float:
-    """The value with so many smaller or equal ones before it, of values that are not negative: their bits are ordered like themselves."""
-    bits, tally, found = values.view(np.int64), np.empty(1 << 16, dtype=np.int64), np.zeros(1, dtype=np.int64)
-    for shift in (48, 32, 16, 0):
-        tally[:] = 0
-        for i in range(len(bits)):
-            if takes_part[i] > 0 and bits[i] >> shift >> 16 == found[0]:
-                tally[(bits[i] >> shift) & 0xFFFF] += 1
-        digit = 0
-        while rank >= tally[digit]:
-            rank -= tally[digit]
-            digit += 1
-        found[0] = found[0] << 16 | digit
-    return float(found.view(np.float64)[0])

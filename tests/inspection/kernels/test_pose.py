@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from inspection import RigidTransform, discretize, fine, register_fine
 from inspection.cloud import Cloud
-from inspection.kernels import OutlierLimit, PoseFit, pose, project
-from inspection.kernels.pose import _median_near
+from inspection.kernels import OutlierLimit, PoseFit, project
+from inspection.kernels.outliers import MANY
 from tests.inspection import profiles
 from tests.inspection.profiles import Array, nominal_of
 
@@ -97,23 +97,10 @@ def test_few_points_that_do_not_say_where_all_belong_are_not_followed(monkeypatc
     assert not asked  # a rotation that noise alone determines: it stays where the start put it
 
 
-@pytest.mark.parametrize("guess", [0.5, 1.0, 1.04, 3.0, 1e-9])
-@pytest.mark.parametrize("count", [1, 2, 7, 1000, 1001])
-def test_a_median_does_not_depend_on_its_guess(count: int, guess: float) -> None:
-    values = np.abs(np.random.default_rng(count).normal(0, 1, count))
-    values[: count // 3] = np.nan  # points that take no part
-    wanted = float(np.median(values[~np.isnan(values)]))
-    assert _median_near(values, guess * wanted) == wanted
-
-
-def test_no_values_have_no_median() -> None:
-    assert _median_near(np.full(4, np.nan), 1.0) == np.inf
-
-
 @pytest.mark.parametrize("more", [1, 2])
 def test_the_median_of_very_many_points_is_exact(more: int) -> None:
     """A choice of the points in their order would give another limit in another order."""
-    nominal, count = nominal_of("P3"), pose.MANY + more
+    nominal, count = nominal_of("P3"), MANY + more
     points = np.repeat(scan("P3"), -(-count // COUNT), axis=0)[:count] + np.random.default_rng(8).normal(0, 0.01, (count, 2))
     fit = PoseFit(points, nominal.grid, None, "exact", nominal.outward, 0.0)
     found = fit.find_outliers(NUMBERS, OutlierLimit(6.0, 0.0, 1e-6), 1)

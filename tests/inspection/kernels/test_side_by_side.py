@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from inspection.kernels import OutlierLimit, PoseFit, pose, side_by_side
+from inspection.kernels.outliers import mark_outliers
 from inspection.kernels.pose_sums import add_up
 from inspection.kernels.side_by_side import fit_compiled_beside
 from tests.inspection import profiles
@@ -80,7 +81,7 @@ def test_where_no_process_can_be_started_this_one_goes_on(monkeypatch: pytest.Mo
 
 def test_nothing_is_left_to_compile_for_a_fit_once_it_was_compiled_without_a_point() -> None:
     pose.compile_fit(outliers=True)
-    kernels: list[Any] = [pose._settle_pose, pose._find_outliers, pose._next_pose, add_up]
+    kernels: list[Any] = [pose._settle_pose, mark_outliers, pose._next_pose, add_up]
     compiled = [len(kernel.signatures) for kernel in kernels]
     nominal = profiles.nominal_of("P3", 500)
     fit = PoseFit(nominal.points_mm + 0.01, nominal.grid, None, "exact", nominal.outward, 0.0)
