@@ -61,6 +61,7 @@ class ZoneLimits:
 class RunState:
     """Everything that is shown of a run in numbers and words, as it was at one moment.
 
+    run           : its id in the records; empty where it is not kept there, or is not over
     kind          : a run that is measured, or what poses as none: a replay, a run from the records, a section of a surface
     notes         : what was assumed about the nominal and the points
     began         : when the points were measured: date, time of day and offset from UTC
@@ -73,6 +74,7 @@ class RunState:
     """
 
     number: str
+    run: str
     kind: RunKind
     plan: str
     part: str

@@ -106,7 +106,7 @@ class RunView:
         self._coverage, self._coverage_s = 0.0, -math.inf
         self._ended: Ended | None = None
         self._notes: tuple[str, ...] = ()
-        self._failure = self._remark = ""
+        self._failure = self._remark = self._run = ""
         self._published = self._snapshot()
 
     def __call__(self, event: Event) -> None:
@@ -149,6 +149,12 @@ class RunView:
         """Set what the operator should read beside the verdict."""
         with self._lock:
             self._remark = words
+            self._publish()
+
+    def name_record(self, run: str) -> None:
+        """Note under which id the records keep the run, now that it is over."""
+        with self._lock:
+            self._run = run
             self._publish()
 
     def end_soon(self) -> None:
@@ -284,6 +290,7 @@ class RunView:
         context, started, counts, ended, zone = self.context, self._started, self._counts, self._ended, self.context.zone
         return RunState(
             number=context.number,
+            run=self._run,
             kind=context.kind,
             plan=context.plan,
             part=started.part,

@@ -3,7 +3,7 @@
 import shutil
 import tempfile
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from functools import partial
@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from cmmlink.console.protocol import RunRow
+from cmmlink.console.report_process import make_report
 from cmmlink.endings import Ended
 from cmmlink.errors import StoreError
 from cmmlink.events import Counts, RunStarted, Sink
@@ -115,6 +116,17 @@ class PastRuns:
             run = find_run(store, run)
             export_files(store, run, Path(files))
             return Path(shutil.make_archive(str(folder / "run"), "zip", files))
+
+    def report_run(self, run: str, folder: Path, settings: Mapping[str, str]) -> Path:
+        """Write the report of one run as a PDF into a folder. Raises StoreError, RunError.
+
+        settings : options of `cmmlink report` without their dashes
+        """
+        with open_to_read(self.folder, self.now, close_interrupted=False) as store:
+            run = find_run(store, run)
+        file = folder / "report.pdf"
+        make_report(self.folder, run, file, settings)
+        return file
 
 
 def _key(entry: dict[str, Any]) -> tuple[str, str]:

@@ -55,6 +55,8 @@ def measure(job: Job, view: RunView, checked: CheckedPlan, setup: StationSetup, 
             shown=True,
         )
         job.detach()
+    if finished.evidence is not None:
+        view.name_record(finished.evidence.run)
     try:
         setup.write(plan, finished)
     except PlanError as error:

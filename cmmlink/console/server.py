@@ -13,10 +13,11 @@ import json
 import logging
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, replace
 from importlib import resources
-from typing import Any
+from pathlib import Path
+from typing import Any, get_args
 
 import anyio.to_thread
 import uvicorn
@@ -52,8 +53,9 @@ from cmmlink.console.protocol import (
     json_of,
 )
 from cmmlink.console.refused import Refused, without_folders, words_of
-from cmmlink.console.run_archive import RunArchives
+from cmmlink.console.run_file import RunFiles
 from cmmlink.console.station import Station
+from cmmlink.plan import LanguageName, PaperName
 from cmmlink.run_state import RunState
 
 _log = logging.getLogger(__name__)
@@ -67,6 +69,7 @@ _EXPORT_S = 3600.0
 _MOST_COMMANDS = 200  # a page may send within a second
 _TOO_MANY_COMMANDS = 1008  # close code
 _BROKEN_DOWN = 1011  # close code: the page connects again and is sent everything
+_LOOKS = {"language": get_args(LanguageName), "paper": get_args(PaperName)}  # of a report, as far as a page chooses them
 _MEDIA = {
     "html": "text/html; charset=utf-8",
     "css": "text/css; charset=utf-8",
@@ -93,7 +96,7 @@ class ConsoleServer:
         self._socket, self.remote = listen_at(self._access)
         self.port: int = self._socket.getsockname()[1]
         self._pages: list[OpenPage] = []
-        self._archives = RunArchives(station.export_run)
+        self._files = RunFiles()
         self._controller: OpenPage | None = None
         self._seen = 0
         self._ever = threading.Event()
@@ -166,6 +169,7 @@ class ConsoleServer:
             routes=[
                 Route("/", lambda _: _file_response(files["index.html"])),
                 Route("/export/{run}", self._export),
+                Route("/report/{run}", self._report),
                 Route("/{name}", lambda request: _file_response(files.get(request.path_params["name"]))),
                 WebSocketRoute("/live", self._live),
             ]
@@ -173,10 +177,19 @@ class ConsoleServer:
         return Guard(app, self._access.host.strip(), self.port, self.remote)
 
     async def _export(self, request: Request) -> Response:
+        run = request.path_params["run"]
+        return await self._send_file(request, lambda folder: self.station.export_run(run, folder), "application/zip")
+
+    async def _report(self, request: Request) -> Response:
+        run, asked = request.path_params["run"], request.query_params
+        settings = {name: asked[name] for name, allowed in _LOOKS.items() if asked.get(name) in allowed}
+        return await self._send_file(request, lambda folder: self.station.report_run(run, folder, settings), "application/pdf")
+
+    async def _send_file(self, request: Request, make: Callable[[Path], Path], media_type: str) -> Response:
         if not self._keys.knows(request.headers.get("authorization", "").removeprefix("Bearer ")):
             return PlainTextResponse("the token is wrong or missing", 401)
         _visitor(request).admit(_EXPORT_S)
-        return await self._archives.answer(request.path_params["run"])
+        return await self._files.answer(make, media_type)
 
     async def _live(self, websocket: WebSocket) -> None:
         """One page, from its token to its end."""

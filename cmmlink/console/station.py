@@ -5,7 +5,7 @@ It knows no page and no device. Commands come in from any thread; each takes as 
 """
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -191,6 +191,7 @@ class Station:
         title = f"Recorded run {recorded.run} of {recorded.began:%Y-%m-%d %H:%M}"
         view = RunView(recorded.context(title, "recorded"), self._setup.clock, lambda: recorded.began)
         view.recall(recorded.started, recorded.ended)
+        view.name_record(recorded.run)
         return view
 
     def open_section(self, index: int) -> RunView:
@@ -207,6 +208,12 @@ class Station:
         records = self._records()
         with answer_errors():
             return records.export_run(run, folder)
+
+    def report_run(self, run: str, folder: Path, settings: Mapping[str, str]) -> Path:
+        """Write the report of a recorded run into a folder; `settings` are those of its look that are not as its plan says."""
+        records = self._records()
+        with answer_errors():
+            return records.report_run(run, folder, settings)
 
     def devices(self) -> list[tuple[str, str]]:
         """Addresses of devices that can be seen now, with a description each."""

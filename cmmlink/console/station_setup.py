@@ -35,6 +35,9 @@ class Records(Protocol):
     def export_run(self, run: str, folder: Path) -> Path:
         """Write one run as a zip archive into a folder."""
 
+    def report_run(self, run: str, folder: Path, settings: Mapping[str, str]) -> Path:
+        """Write the report of one run into a folder; `settings` are those of its look that are not as its plan says."""
+
 
 @dataclass(frozen=True, slots=True)
 class StationSetup:

@@ -28,6 +28,7 @@ import { CODE_OF } from "./verdicts.js";
  * @property {Worst | null} worst
  * @property {boolean} simulated
  * @property {RunState | null} run where the card is that of a run, its numbers
+ * @property {string} record the id under which the records keep the run; empty where there is none to have a report of
  */
 /**
  * What the station says, as far as it was heard.
@@ -48,7 +49,7 @@ import { CODE_OF } from "./verdicts.js";
 /** @type {Card} */
 const NO_CARD = {
   part: "", serial: "", names: [], word: "", shape: "none", final: false, of: "", why: "", reasons: [], notes: [], phase: "",
-  badge: "", before: "", worst: null, simulated: false, run: null,
+  badge: "", before: "", worst: null, simulated: false, run: null, record: "",
 };
 const PHASES = { preparing: "preparing", starting: "connecting", measuring: "so far", ending: "ending", finished: "" };
 const BADGES = { run: "", section: "SECTION", replay: "REPLAY of", recorded: "RECORDED" };
@@ -80,7 +81,7 @@ function cardOfRun(run) {
   };
   return {
     part, serial, names: [plan, operator], word, shape, final, of, why, reasons, notes, phase: final ? "" : PHASES[run.phase],
-    badge, before: "", worst, simulated, run,
+    badge, before: "", worst, simulated, run, record: run.run,
   };
 }
 
@@ -103,10 +104,11 @@ function cardOfNextPart(run, station) {
  * @returns {Card}
  */
 function cardOfRow(row) {
-  const { part, serial_number: serial, section, word, shape, counted, began, run, simulated } = row;
+  const { part, serial_number: serial, section, word, shape, counted, began, run, simulated, state } = row;
   return {
     ...NO_CARD, part, serial, names: [section, run], word, shape, final: counted, why: "as recorded; O opens the run",
     badge: `RECORDED ${began}`, worst: worstOf(row), simulated,
+    record: state === "running" || state === "damaged" ? "" : run,
   };
 }
 

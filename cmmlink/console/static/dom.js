@@ -17,6 +17,9 @@ export const buttonOf = (id) => elementOf(id, HTMLButtonElement);
 /** @param {string} id */
 export const inputOf = (id) => elementOf(id, HTMLInputElement);
 
+/** @param {string} id */
+export const selectOf = (id) => elementOf(id, HTMLSelectElement);
+
 /**
  * @template {HTMLElement} Kind
  * @param {string} id

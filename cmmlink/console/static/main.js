@@ -4,7 +4,7 @@ import { showAlarms, toggleAlarmList } from "./alarms.js";
 import { cardOf } from "./card.js";
 import { Characteristics } from "./characteristics.js";
 import { CtView } from "./ct.js";
-import { buttonOf, byId, inputOf, put } from "./dom.js";
+import { buttonOf, byId, inputOf, put, selectOf } from "./dom.js";
 import { listen } from "./gestures.js";
 import { History } from "./history.js";
 import { Link, OUT_OF_REACH } from "./link.js";
@@ -52,7 +52,8 @@ const partView = new PartView(ask, start);
 const history = new History({
   open: (run) => askToSee({ do: "open", run }),
   replay: (run) => askToSee({ do: "replay", run }),
-  export: download,
+  export: (run) => download(`/export/${encodeURIComponent(run)}`, `${run}.zip`),
+  report,
 }, rewrite);
 const characteristics = new Characteristics(showChosen);
 /** @type {CharacteristicList} */
@@ -235,15 +236,35 @@ async function start() {
   await ask({ do: "start" });
 }
 
-/** Save the archive of a recorded run. @param {string} run */
-async function download(run) {
+/**
+ * Save the report of a recorded run, which the station makes now, in the language and on the paper that are chosen.
+ * @param {string} run
+ */
+function report(run) {
+  const chosen = ["language", "paper"].map((name) => `${name}=${selectOf(`report-${name}`).value}`);
+  say({ ok: true, message: "making the report \u2026" });
+  return download(`/report/${encodeURIComponent(run)}?${chosen.join("&")}`, `${run}.pdf`);
+}
+
+/** Save the report of the run whose verdict stands at the right. */
+function reportShown() {
+  const { record } = cardOf(heard);
+  if (record) report(record);
+}
+
+/**
+ * Save a file of the station.
+ * @param {string} address
+ * @param {string} name
+ */
+async function download(address, name) {
   try {
-    const answer = await fetch(`/export/${encodeURIComponent(run)}`, { headers: { Authorization: `Bearer ${link.token}` } });
+    const answer = await fetch(address, { headers: { Authorization: `Bearer ${link.token}` } });
     if (!answer.ok) return say({ ok: false, message: await answer.text() });
-    save(await answer.blob(), `${run}.zip`);
-    say({ ok: true, message: `${run}.zip saved` });
+    save(await answer.blob(), name);
+    say({ ok: true, message: `${name} saved` });
   } catch {
-    say({ ok: false, message: `${run}.zip was not saved: ${OUT_OF_REACH}` });
+    say({ ok: false, message: `${name} was not saved: ${OUT_OF_REACH}` });
   }
 }
 
@@ -312,13 +333,13 @@ const KEYS = {
   1: [() => go("live")], 2: [() => go("part")], 3: [() => go("history")], 4: [press("tab-ct")],
   s: [press("start")], e: [press("end")], n: [press("next")], a: [press("acknowledge")], l: [press("alarm-list-button")],
   t: [press("test")], o: [pressIn("history", "open-run"), pressIn("ct", "open-section")], r: [pressIn("history", "replay-run")],
-  x: [pressIn("history", "export-run")], i: [pressIn("ct", "import-ct")], escape: [leave],
+  x: [pressIn("history", "export-run")], p: [reportShown], i: [pressIn("ct", "import-ct")], escape: [leave],
 };
 
 /** @param {KeyboardEvent} event */
 function pressKey(event) {
   const key = event.key.toLowerCase(), acts = KEYS[key];
-  const isTyping = event.target instanceof Element && event.target.matches("input:not([type=range]), textarea");
+  const isTyping = event.target instanceof Element && event.target.matches("input:not([type=range]), textarea, select");
   const isForPage = !isTyping && !event.ctrlKey && !event.metaKey && !event.altKey;
   if (!acts || !(isForPage || key === "escape")) return;
   event.preventDefault();
@@ -329,6 +350,7 @@ document.addEventListener("keydown", pressKey);
 for (const button of viewButtons()) button.addEventListener("click", () => go(button.dataset.go ?? ""));
 buttonOf("another-page").addEventListener("click", invite);
 buttonOf("start").addEventListener("click", start);
+buttonOf("report-shown").addEventListener("click", reportShown);
 buttonOf("end").addEventListener("click", () => ask({ do: "end" }));
 buttonOf("abort").addEventListener("click", () => ask({ do: "abort" }));
 buttonOf("next").addEventListener("click", nextPart);

@@ -36,6 +36,7 @@ export function showRun(heard) {
   byId("kind").hidden = !card.badge;
   put("kind", card.badge);
   showVerdict(card);
+  byId("report").hidden = !card.record;
   showRemarks(card);
   const rule = `${run?.zone.decision_rule ?? ""}${heard.hasBand ? "; shaded around the limits: the U of each station" : ""}`;
   put("rule", rule);

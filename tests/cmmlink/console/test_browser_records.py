@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from playwright.sync_api import Page, expect
+from pypdf import PdfReader
 
 from cmmlink.commands.console import inspect_surface
 from cmmlink.console.ct_import import Section
@@ -19,7 +20,7 @@ from drivers.source import Damaged
 from inspection import NominalProfile, RigidTransform, synthetic
 from tests.drivers.surface.meshes import binary_stl, tube, write
 
-from .conftest import MakeBench
+from .conftest import Bench, MakeBench
 from .played import CLOSED, PLAN, batches, measured, opened
 from .seen import focus, millimetres, overflowing
 
@@ -81,12 +82,34 @@ def test_history_is_listed_opened_replayed_and_exported(make_bench: MakeBench, t
     with page.expect_download() as download:
         page.keyboard.press("x")
     assert download.value.suggested_filename.endswith("-0002.zip")
+    check_report_while_measuring(bench, page, tmp_path)
     page.evaluate("() => { window.fetch = () => Promise.reject(new TypeError('Failed to fetch')); }")  # as where the network is gone
     page.keyboard.press("x")
     expect(page.locator("#said")).to_have_text(re.compile("-0002.zip was not saved: the station cannot be reached"))
     page.keyboard.press("r")
     expect(page.locator("#banners")).to_contain_text("identical to the recorded result, to the last bit")
     expect(page.locator("#verdict-word")).to_have_text("NOT CONFORM")
+
+
+def check_report_while_measuring(bench: Bench, page: Page, folder: Path) -> None:
+    """The report of the chosen run is saved while the next part is measured, and in the language that is chosen."""
+    bench.device.renew()
+    page.keyboard.press("s")
+    expect(page.locator("#verdict-why")).to_contain_text("waiting for points")
+    expect(page.locator("#report")).to_be_hidden()  # at the verdict of a run that is not over
+    page.keyboard.press("3")
+    with page.expect_download() as download:
+        page.locator("#report-run").click()
+    assert download.value.suggested_filename.endswith("-0002.pdf")
+    assert bench.station.running
+    download.value.save_as(folder / "report.pdf")
+    told = "".join(one.extract_text() for one in PdfReader(folder / "report.pdf").pages)
+    assert "NOT CONFORM" in told
+    assert "B-0042" in told
+    page.keyboard.press("Escape")
+    expect(page.locator("#start")).to_be_enabled()
+    expect(page.locator("#runs tr[aria-selected=true]")).to_contain_text("B-0042")
+    expect(page.locator("#report-shown")).to_be_visible()  # at the verdict of the chosen run
 
 
 def test_no_screen_shows_two_opposite_verdicts(make_bench: MakeBench, tmp_path: Path, keep: Keep) -> None:

@@ -1,0 +1,43 @@
+"""The report of a recorded run, made by another process: a scan that goes on at the station keeps its own."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+
+from cmmlink.errors import RunError
+
+_CHILD = (
+    "import os, sys; sys.path.append(sys.argv.pop(1)); getattr(os, 'nice', int)(10); from cmmlink.__main__ import main; sys.exit(main())"
+)
+_BELOW_NORMAL = getattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0)  # Windows has no `nice`
+_LONGEST_S = 300.0  # a report of a million points takes a few seconds
+
+
+def make_report(records: Path, run: str, file: Path, settings: Mapping[str, str]) -> None:
+    """Write the report of a run, which is given by its id, as `cmmlink report` does, with less priority than the station has.
+
+    settings : options of that command without their dashes
+
+    Raises RunError with what the command says where it fails, OSError where no process can be started.
+    """
+    options = [word for name, value in settings.items() for word in (f"--{name}", value)]
+    command = ["report", run, "--records", str(records), "--out", str(file), "--json", *options]
+    child = [sys.executable, "-P", "-c", _CHILD, str(Path(__file__).resolve().parents[2]), *command]
+    try:
+        ended = subprocess.run(
+            child, stdin=subprocess.DEVNULL, capture_output=True, timeout=_LONGEST_S, creationflags=_BELOW_NORMAL, check=False
+        )
+    except subprocess.TimeoutExpired:
+        raise RunError(f"run {run}: its report was not made within {_LONGEST_S:g} s") from None
+    if ended.returncode or not file.is_file():
+        raise RunError(_refusal(ended.stdout) or f"run {run}: its report could not be made; `cmmlink report {run}` says more")
+
+
+def _refusal(answer: bytes) -> str:
+    """What the command says of why it failed; empty where it says nothing."""
+    with suppress(ValueError, KeyError, TypeError):
+        return str(json.loads(answer)["error"]["message"])
+    return ""

@@ -1,0 +1,64 @@
+"""A recorded run on its way to a page, as an archive or a report in a temporary folder that is gone afterwards, however it ends."""
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import anyio.to_thread
+from starlette.responses import FileResponse, PlainTextResponse, Response
+from starlette.types import Receive, Scope, Send
+
+from cmmlink.console.refused import Refused, words_of
+
+_MOST = 4  # at a time
+
+
+class RunFiles:
+    """Makes files of runs for pages. Belongs to the event loop, but for the making itself."""
+
+    def __init__(self) -> None:
+        self._under_way = 0
+
+    async def answer(self, make: Callable[[Path], Path], media_type: str) -> Response:
+        """The answer to a page that asks for a file; `make` writes it into a folder."""
+        if self._under_way >= _MOST:
+            return PlainTextResponse("other runs are being exported; try again when they are done", 503)
+        self._under_way += 1
+        try:
+            file, folder = await anyio.to_thread.run_sync(_make, make)
+        except BaseException as error:
+            self._under_way -= 1
+            if isinstance(error, Refused):
+                return PlainTextResponse(str(error), 404)
+            if isinstance(error, OSError):
+                return PlainTextResponse(words_of(error), 500)
+            raise
+        return _RunFile(file, media_type, folder, self._end)
+
+    def _end(self) -> None:
+        self._under_way -= 1
+
+
+def _make(make: Callable[[Path], Path]) -> tuple[Path, tempfile.TemporaryDirectory[str]]:
+    """Make a file in a folder that is to be cleaned up. Raises Refused, OSError."""
+    folder = tempfile.TemporaryDirectory()
+    try:
+        return make(Path(folder.name)), folder
+    except BaseException:
+        folder.cleanup()
+        raise
+
+
+class _RunFile(FileResponse):
+    """A file that is being sent."""
+
+    def __init__(self, file: Path, media_type: str, folder: tempfile.TemporaryDirectory[str], on_end: Callable[[], None]) -> None:
+        super().__init__(file, media_type=media_type)
+        self._folder, self._on_end = folder, on_end
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        try:
+            await super().__call__(scope, receive, send)
+        finally:
+            self._folder.cleanup()
+            self._on_end()
