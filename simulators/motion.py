@@ -75,18 +75,33 @@ def walk(path_mm: NDArray[np.float64], motion: Motion) -> Walk:
 
 
 def feed_under(path_mm: NDArray[np.float64], motion: Motion) -> Walk:
-    """Feed the part under a one-dimensional sensor at constant speed along x: points (x, y(x), 0) of the open path y over x.
+    """Feed the part under a one-dimensional sensor at constant speed along x: points (x, y(x), 0) of the path.
 
-    Form error, defect and noise act along y, the direction of the beam.
+    The beam runs along y: of a path that turns back, like one around a section, it meets the lowest y first. Form error, defect and
+    noise act along y.
     """
     rng = np.random.default_rng(motion.seed)
-    x, y = path_mm[np.argsort(path_mm[:, 0]), :2].T
+    x = np.array([path_mm[:, 0].min(), path_mm[:, 0].max()])
     step = motion.speed_mm_s / motion.rate_hz
     count = motion.count if motion.count is not None else max(1, math.floor((x[-1] - x[0] - motion.start_mm) / step))
     along = motion.start_mm + step * np.arange(count, dtype=np.float64)
-    height = np.interp(x[0] + along, x, y) + _form_error(along / (x[-1] - x[0]), motion.form_error_mm, rng)
+    height = _lowest(path_mm[:, :2], x[0] + along) + _form_error(along / (x[-1] - x[0]), motion.form_error_mm, rng)
     height += _defect(along, float(x[-1] - x[0]), replace(motion, closed=False)) + rng.normal(0.0, motion.noise_mm, count)
     return Walk(np.arange(count) / motion.rate_hz, np.column_stack([x[0] + along, height, np.zeros(count)]))
+
+
+def _lowest(path_mm: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The lowest y (n,) of a path (k, 2) at each x (n,): over its stretches on which x only rises or only falls."""
+    forward = np.diff(path_mm[:, 0]) > 0
+    turns = np.flatnonzero(forward[1:] != forward[:-1]) + 1
+    lowest = np.full(len(x), np.inf)
+    for first, last in zip([0, *turns], [*turns, len(path_mm) - 1], strict=True):
+        stretch = path_mm[first : last + 1] if forward[first] else path_mm[first : last + 1][::-1]
+        lowest = np.fmin(lowest, np.interp(x, stretch[:, 0], stretch[:, 1], left=np.nan, right=np.nan))
+    beyond = ~np.isfinite(lowest)  # of a scan that is longer than the path
+    order = np.argsort(path_mm[:, 0])
+    lowest[beyond] = np.interp(x[beyond], path_mm[order, 0], path_mm[order, 1])
+    return lowest
 
 
 def read_path(path: Path) -> NDArray[np.float64]:

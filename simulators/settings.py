@@ -43,18 +43,23 @@ Announce = Callable[[str], None]
 Serve = Callable[[SimulatorSettings, Announce], None]
 
 
-def settings_from(arguments: Sequence[str], program: str | None = None) -> SimulatorSettings:
-    """Read the settings from command-line arguments; `program` is how the caller is called, for the help."""
-    parser = _parser(program)
+def settings_from(
+    arguments: Sequence[str], program: str | None = None, default_path: Callable[[], NDArray[np.float64]] | None = None
+) -> SimulatorSettings:
+    """Read the settings from command-line arguments.
+
+    program      : how the caller is called, for the help
+    default_path : gives the path where the arguments name none; without it they have to
+    """
+    parser = _parser(program, needs_path=default_path is None)
     given = {name: value for name, value in vars(parser.parse_args(arguments)).items() if value is not None}
     if "translation_mm" in given:
         given["translation_mm"] = tuple(given["translation_mm"])
     try:
         motion = Motion(**{field.name: given[field.name] for field in fields(Motion) if field.name in given})
         faults = tuple(Fault.parse(text) for text in given["fault"])
-        return SimulatorSettings(
-            given["address"], read_path(given["path"]), motion, faults, not given["unpaced"], given["until_stdin_ends"]
-        )
+        path_mm = default_path() if default_path is not None and "path" not in given else read_path(given["path"])
+        return SimulatorSettings(given["address"], path_mm, motion, faults, not given["unpaced"], given["until_stdin_ends"])
     except FileNotFoundError:
         parser.error(f"{given['path']}: no such file")
     except (ValueError, OSError) as error:
@@ -68,17 +73,18 @@ class _OneLine(argparse.ArgumentParser):
         self.exit(2, f"{self.prog}: {message}; `{self.prog} --help` shows what is allowed\n")
 
 
-def _parser(program: str | None) -> argparse.ArgumentParser:
+def _parser(program: str | None, *, needs_path: bool) -> argparse.ArgumentParser:
     faults = "\n".join(f"  {name:18}{kind.meaning} [{kind.default:g}]" for name, kind in CATALOGUE.items())
     parser = _OneLine(
         prog=program,
-        usage="%(prog)s --address A --path POINTS [OPTIONS]",
+        usage=f"%(prog)s --address A {'--path POINTS' if needs_path else '[--path POINTS]'} [OPTIONS]",
         description="A simulated device that streams one scan; its first line of output is the address it serves.",
         epilog=f"faults, from point number POINT on (up to before STOP), with the value and its default:\n{faults}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--address", required=True, metavar="A", help="pty, or host:port (port 0: any free one)")
-    parser.add_argument("--path", required=True, type=Path, metavar="POINTS", help="points of the path on the part, mm")
+    usual = "" if needs_path else " [the section of the demonstration]"
+    parser.add_argument("--path", required=needs_path, type=Path, metavar="POINTS", help=f"points of the path on the part, mm{usual}")
     parser.add_argument("--fault", action="append", default=[], metavar="NAME[:VALUE][@POINT[-STOP]]", help="may be given several times")
     parser.add_argument("--until-stdin-ends", action="store_true", help="end when standard input does: with whoever started it")
     parser.add_argument("--unpaced", action="store_true", help="as fast as the client takes the points")

@@ -16,6 +16,7 @@ import typer
 from cmmlink.commands.console import serve_console
 from cmmlink.commands.exit_codes import DEVICE_FAILED, NO_RECORD, STOPPED, UNUSABLE, fail, fail_as_asked
 from cmmlink.commands.measure import demo, inspect, run
+from cmmlink.commands.plans import example
 from cmmlink.commands.proofs import verify_zone
 from cmmlink.commands.records import export, replay, runs, show, verify
 from cmmlink.commands.report import report
@@ -40,6 +41,7 @@ app.command()(run)
 app.command()(inspect)
 app.command(cls=ManyHeights)(ct)
 app.command()(nominal)
+app.command()(example)
 app.command()(check)
 app.command("console")(serve_console)
 app.command()(prepare)

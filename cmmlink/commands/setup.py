@@ -187,17 +187,18 @@ def list_ports() -> int:
 
 
 def simulate(context: typer.Context, device: Annotated[str, typer.Argument(metavar="DEVICE")] = "") -> int:
-    """Serve a simulated device."""
+    """Serve a simulated device. Without --path it scans the section of the demonstration."""
+    from cmmlink.demo import section_on_machine
     from simulators import end_with_stdin, known_devices, say, settings_from
 
     known = known_devices()
     if device in ("-h", "--help"):
         typer.echo(textwrap.fill(f"cmmlink simulate DEVICE, one of: {', '.join(sorted(known))}", 80) + "\n")
-        settings_from(["--help"], "cmmlink simulate DEVICE")
+        settings_from(["--help"], "cmmlink simulate DEVICE", section_on_machine)
     if device not in known:
         problem = f"no simulated device is called {device}" if device else "name the device to simulate"
         raise PlanError(f"{problem}; known: {', '.join(sorted(known))}; `cmmlink simulate --help` shows their options")
-    settings = settings_from(context.args, f"cmmlink simulate {device}")
+    settings = settings_from(context.args, f"cmmlink simulate {device}", section_on_machine)
     if settings.bound:
         end_with_stdin()
     try:

@@ -5,8 +5,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from cmmlink.demo.section import nominal_points
 from inspection import NurbsCurve
 
+_LIFTED_MM = 10.0  # so that a distance sensor at y = 0 has the whole section in its range
 _CHORD_ERROR_MM = 1e-5  # between polyline and curve: far below the last digit of any deviation that is shown
 
 
@@ -34,7 +36,16 @@ def part_path(curve: NurbsCurve, points: int = 20_000) -> NDArray[np.float64]:
     return path
 
 
+def section_on_machine() -> NDArray[np.float64]:
+    """Points (k, 2) along the demonstration's section where simulated devices have it: its chord at y = 10 mm."""
+    return np.asarray(part_path(NurbsCurve.interpolate(nominal_points(), closed=True)) + [0.0, _LIFTED_MM])  # noqa: RUF005 - numbers are added
+
+
+def path_csv(path_mm: NDArray[np.float64]) -> str:
+    """Spell points (k, 2) of a path as csv with columns x_mm, y_mm, for a simulated device to read."""
+    return "x_mm,y_mm\n" + "".join(f"{x:.9f},{y:.9f}\n" for x, y in path_mm)
+
+
 def write_part_path(curve: NurbsCurve, path: Path, points: int = 20_000) -> None:
-    """Write `part_path` as csv with columns x_mm, y_mm, for a simulated device to read."""
-    rows = "".join(f"{x:.9f},{y:.9f}\n" for x, y in part_path(curve, points))
-    path.write_text("x_mm,y_mm\n" + rows, encoding="utf-8", newline="\n")
+    """Write `part_path` as csv."""
+    path.write_text(path_csv(part_path(curve, points)), encoding="utf-8", newline="\n")

@@ -6,33 +6,28 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from cmmlink.commands import main
-from cmmlink.demo.section import nominal_points
-from simulators import Motion, walk
-from tests.drivers.surface.meshes import binary_stl, tube, write
+from cmmlink.plan import load_plan
 
 README = (Path(__file__).resolve().parents[2] / "README.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"^```sh\n(.*?)^```", README, re.MULTILINE | re.DOTALL)
-COMMANDS = [shlex.split(line, comments=True)[1:] for line in "".join(BLOCKS).splitlines() if line.startswith("cmmlink ")]
+COMMANDS = [
+    words[1:] if words[0] == "cmmlink" else words
+    for line in "".join(BLOCKS).splitlines()
+    if (words := shlex.split(line, comments=True)) and words[0] in ("cmmlink", "cd")
+]
 FOR_A_DEVICE_OR_A_SCREEN = ("run", "console")
-PLAN = next(text for text in re.findall(r"^```yaml\n(.*?)^```", README, re.MULTILINE | re.DOTALL) if text.startswith("part:"))
+PLANS = [text for text in re.findall(r"^```yaml\n(.*?)^```", README, re.MULTILINE | re.DOTALL) if text.startswith("part:")]
 
 
 @pytest.fixture
 def _measuring_computer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A folder with the files of the README: a blade of 100 mm, ball centres on it, its plan, and a surface of 60 mm."""
+    """A folder for the files of the example, and the user's own folder."""
     monkeypatch.chdir(tmp_path)
     for name in ("XDG_DATA_HOME", "WIN_PD_OVERRIDE_LOCAL_APPDATA"):
         monkeypatch.setenv(name, str(tmp_path / "user"))
-    blade_mm = nominal_points()
-    np.savetxt("blade.dat", blade_mm / 100, fmt="%.9f", header="a blade", comments="")
-    motion = Motion(speed_mm_s=100.0, rate_hz=1000.0, tip_radius_mm=1.0, rotation_deg=30.0, noise_mm=0.001)
-    np.savetxt("points.csv", walk(blade_mm, motion).points_mm[:, :2], delimiter=",", fmt="%.6f")
-    write(Path("part.stl"), binary_stl(tube(0.6 * blade_mm[:-1], np.array([0.0, 10.0]))))
-    Path("plan.yaml").write_text(PLAN, encoding="utf-8")
 
 
 def exit_status(arguments: list[str], monkeypatch: pytest.MonkeyPatch) -> int:
@@ -56,8 +51,17 @@ def test_the_commands_of_the_readme_do_what_it_says(monkeypatch: pytest.MonkeyPa
     assert "`cmmlink demo --defect 0.12@40`" in README
     monkeypatch.setattr("cmmlink.simulated.RATE_HZ", 40_000)  # nobody watches the demonstration
     for command, status in expected_statuses():
+        if command[0] == "cd":
+            monkeypatch.chdir(command[1])
+            continue
         assert exit_status(command, monkeypatch) == status, f"{command}: {capfd.readouterr()}"
-    assert {"inspect", "check", "ct", "runs", "show", "replay", "export", "verify"} <= {command[0] for command in COMMANDS}
+    assert {"example", "inspect", "check", "ct", "runs", "show", "replay", "export", "verify"} <= {command[0] for command in COMMANDS}
     assert "identical to the recorded result" in capfd.readouterr().out
     assert all((Path("demo-result") / name).is_file() for name in ("deviations.csv", "result.json", "profile.png", "report.pdf"))
     assert all(Path(name).is_dir() for name in ("result", "sections", "folder"))
+
+
+@pytest.mark.parametrize("text", PLANS, ids=lambda text: text.splitlines()[0])
+def test_a_plan_of_the_readme_can_be_read(tmp_path: Path, text: str) -> None:
+    (tmp_path / "plan.yaml").write_text(text, encoding="utf-8")
+    assert load_plan(tmp_path / "plan.yaml").part.name

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from simulators.motion import DEFECT_WIDTH_MM, Motion, read_path, walk
+from simulators.motion import DEFECT_WIDTH_MM, Motion, feed_under, read_path, walk
 
 ANGLE = np.linspace(0.0, 2.0 * np.pi, 20_001)
 CIRCLE_MM = 10.0 * np.column_stack([np.cos(ANGLE), np.sin(ANGLE)])
@@ -22,6 +22,13 @@ def test_a_square_is_walked_at_the_given_pace() -> None:
     assert len(scan.points_mm) == 8
     np.testing.assert_allclose(scan.time_s, np.arange(8) / 10.0)
     np.testing.assert_allclose(scan.points_mm[:, :2], [[0, 0], [5, 0], [10, 0], [10, 5], [10, 10], [5, 10], [0, 10], [0, 5]])
+
+
+@pytest.mark.parametrize("path_mm", [CIRCLE_MM, CIRCLE_MM[::-1], np.roll(CIRCLE_MM[:-1], 700, axis=0), CIRCLE_MM[CIRCLE_MM[:, 1] <= 0]])
+def test_a_beam_sees_the_near_side_of_a_path_that_turns_back(path_mm: NDArray[np.float64]) -> None:
+    x, y, _ = feed_under(path_mm, Motion(speed_mm_s=10.0, rate_hz=100.0, start_mm=1.0, count=180)).points_mm.T
+    np.testing.assert_allclose(x, -9.0 + 0.1 * np.arange(180), atol=1e-5)
+    np.testing.assert_allclose(y, -np.sqrt(100.0 - x**2), atol=1e-3)
 
 
 def test_start_and_direction() -> None:

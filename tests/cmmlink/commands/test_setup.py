@@ -3,11 +3,15 @@
 import re
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from cmmlink.demo import section_on_machine
+from simulators import SimulatorSettings, known_devices
+from simulators.motion import feed_under
 from tests.cmmlink.command import Ended, cmmlink
 from tests.cmmlink.oval_part import LENGTH_MM, oval_points, write_points
 
@@ -70,7 +74,7 @@ def test_an_unknown_device_is_named_with_the_known_ones() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ((), "the following arguments are required: --address, --path"),
+        ((), "the following arguments are required: --address"),
         (("--address", "pty", "--path", "no-such.csv"), "no-such.csv: no such file"),
         (("--address", "pty", "--path", "{path}", "--fault", "fire"), "fault 'fire' is none of flip, "),
         (("--address", "pty", "--path", "{path}", "--rate", "0"), "speed 50.0 mm/s and rate 0.0 Hz must be positive"),
@@ -87,6 +91,20 @@ def test_an_address_that_cannot_be_served_is_named(tmp_path: Path) -> None:
     path = write_points(tmp_path / "path.csv", oval_points(0.0))
     message = cmmlink("simulate", "serial", "--address", "nowhere", "--path", path).failed(4)
     assert message.startswith("the simulated device cannot serve nowhere: ")
+
+
+def test_every_simulated_device_has_the_section_of_the_demonstration_without_a_path(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[SimulatorSettings] = []
+    devices = dict.fromkeys(known_devices(), lambda settings, _say: told.append(settings))
+    monkeypatch.setattr("simulators.known_devices", lambda: devices)
+    monkeypatch.setattr("cmmlink.demo.section_on_machine", partial(lambda path: path, section_on_machine()))
+    for device in devices:
+        assert cmmlink("simulate", device, "--address", "127.0.0.1:0").code == 0
+    assert len(told) == len(devices) > 6
+    for settings in told:
+        distances = feed_under(settings.path_mm, settings.motion).points_mm[:, 1]
+        assert distances.min() > 0, "in front of a distance sensor"
+        np.testing.assert_allclose(np.ptp(settings.path_mm, axis=0), [100.0, 13.0], atol=1.0)
 
 
 LEFT_TO_COMPILE = """
