@@ -14,7 +14,6 @@ from inspection.consumption import fit_least_consumption
 from inspection.kernels import Feet
 from inspection.minimum_zone import fit_minimum_zone
 from inspection.nominal import NominalProfile
-from inspection.reach import StationReach
 from inspection.registration import Registration
 from inspection.rigid import RigidTransform
 from inspection.zones import VaryingZone
@@ -80,7 +79,7 @@ class VaryingBand:
 
     def __init__(self, nominal: NominalProfile, zone: VaryingZone, share: float = 1.0) -> None:
         self._zone, self._share = zone, share
-        self._reach = StationReach(nominal.curve)
+        self._reach = nominal.reach.value
         lower, upper = self._of(zone.lower_mm, zone.upper_mm)
         self.narrowest_mm = float((upper - lower).min()) / 2
         self.farthest_mm = float(np.maximum(np.abs(lower), np.abs(upper)).max())

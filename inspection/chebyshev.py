@@ -21,7 +21,8 @@ Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 _MOST_PROGRAMS = 50
-_WORKING_SHARE = 0.3  # of the largest value; the program begins with the points above it and adds those its solution violates
+_WORKING_SHARE = 0.8  # of the largest value; the program begins with the points above it and adds those that its solution violates
+_MOST_JOINING = 128  # of these in a round, the worst: of all points few hold the solution, and each costs time in every program
 _MOST_ROUNDS = 20  # in which points join the few that stand for all
 _ROUND_OFF = 1e-12
 _STANDSTILL_MM = 1e-10
@@ -186,10 +187,12 @@ class _Problem(NamedTuple):
             result = linprog([0] * k + [1], A_ub=A, b_ub=b, bounds=bounds, method="highs")
             solution = np.asarray(result.x)  # the program always has one: q = 0 with t = max |value|
             step, promised = solution[:k], float(solution[k])
-            violated = np.flatnonzero(np.abs(value + J @ step) > promised + _ROUND_OFF * (1 + promised))
-            new = np.setdiff1d(violated, working, assume_unique=True)
+            size = np.abs(value + J @ step)
+            new = np.setdiff1d(np.flatnonzero(size > promised + _ROUND_OFF * (1 + promised)), working, assume_unique=True)
             if not new.size:
                 break
+            if len(new) > _MOST_JOINING:
+                new = new[np.argpartition(size[new], -_MOST_JOINING)[-_MOST_JOINING:]]
             working = np.union1d(working, new)
         multipliers = -result.ineqlin.marginals.reshape(2, -1).sum(axis=0)
         held = np.flatnonzero(multipliers > _MULTIPLIER)

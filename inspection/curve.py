@@ -12,6 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from inspection.b_spline import evaluate_b_spline
 from inspection.errors import NominalError
+from inspection.first_use import OnFirstUse
+from inspection.kernels import spline_derivatives
 
 Array = NDArray[np.float64]
 
@@ -29,7 +31,6 @@ class NurbsCurve:
     knots             : (k + degree + 1,) non-decreasing
     weights           : (k,) positive; None means all one
     closed            : the curve ends where it begins; parameters then wrap around
-    length_mm         : arc length, to 1e-12 relative
     corners           : (c,) parameters at which the tangent turns; the seam of a closed curve counts as its start
 
     Raises NominalError when the arrays do not describe a connected curve of positive length.
@@ -40,11 +41,9 @@ class NurbsCurve:
     knots: Array
     weights: Array | None = None
     closed: bool = False
-    length_mm: float = field(init=False)
     corners: Array = field(init=False)
     _homogeneous: Array = field(init=False, repr=False)  # (k, 3) of w x, w y, w
-    _borders: Array = field(init=False, repr=False)  # (b,) parameters between which Gauss-Legendre is exact to round-off
-    _border_stations_mm: Array = field(init=False, repr=False)  # (b,)
+    _along: "OnFirstUse[tuple[Array, Array]]" = field(init=False, repr=False)  # see `_arc_length_table`: most drawn curves need none
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -55,18 +54,20 @@ class NurbsCurve:
         self._check_arrays()
         put(self, "_homogeneous", np.column_stack([self.control_points_mm * weights[:, None], weights]))
         self._check_geometry()
-        borders, stations = _arc_length_table(self)
-        put(self, "_borders", borders)
-        put(self, "_border_stations_mm", stations)
-        put(self, "length_mm", float(stations[-1]))
+        put(self, "_along", OnFirstUse(lambda: _arc_length_table(self)))
         put(self, "corners", _corners(self))
-        for array in (self.control_points_mm, self.knots, weights, borders, stations, self.corners):
+        for array in (self.control_points_mm, self.knots, weights, self._homogeneous, self.corners):
             array.setflags(write=False)
 
     @property
     def domain(self) -> tuple[float, float]:
         """First and last parameter of the curve."""
         return float(self.knots[self.degree]), float(self.knots[-self.degree - 1])
+
+    @property
+    def length_mm(self) -> float:
+        """Arc length, to 1e-12 relative."""
+        return float(self._along.value[1][-1])
 
     @classmethod
     def interpolate(
@@ -115,6 +116,11 @@ class NurbsCurve:
             result[nu] /= weight[0][:, None]
         return result
 
+    def few_derivatives(self, u: ArrayLike, order: int) -> Array:
+        """The same to the last bit by a compiled loop, for searches that ask for few places again and again."""
+        parameter = self._bring_inside(np.atleast_1d(np.asarray(u, dtype=np.float64)))
+        return spline_derivatives(self.knots, self._homogeneous, self.degree, parameter, order)
+
     def curvature(self, u: ArrayLike) -> Array:
         """Signed curvature (m,) in 1/mm, positive where the curve turns left."""
         _, first, second = self.derivatives(u, 2)
@@ -124,8 +130,9 @@ class NurbsCurve:
     def station_mm(self, u: ArrayLike) -> Array:
         """Arc length (m,) from the start of the curve to the parameters u (m,)."""
         parameter = self._bring_inside(np.atleast_1d(np.asarray(u, dtype=np.float64)))
-        piece = np.clip(np.searchsorted(self._borders, parameter, side="right") - 1, 0, len(self._borders) - 2)
-        return np.asarray(self._border_stations_mm[piece] + _arc_length(self, self._borders[piece], parameter))
+        borders, stations = self._along.value
+        piece = np.clip(np.searchsorted(borders, parameter, side="right") - 1, 0, len(borders) - 2)
+        return np.asarray(stations[piece] + _arc_length(self, borders[piece], parameter))
 
     def _bring_inside(self, u: Array) -> Array:
         """Parameters (m,) wrapped into the domain of a closed curve. Raises ValueError for those outside that of an open one."""
@@ -133,9 +140,9 @@ class NurbsCurve:
         if self.closed:
             return np.where((u >= start) & (u <= end), u, start + np.mod(u - start, end - start))
         slack = 1e-12 * (end - start)
-        if np.any(u < start - slack) or np.any(u > end + slack) or np.any(np.isnan(u)):
+        if not ((u >= start - slack) & (u <= end + slack)).all():
             raise ValueError(f"parameter outside [{start}, {end}] of an open curve: {u.min()} .. {u.max()}")
-        return np.clip(u, start, end)
+        return np.minimum(np.maximum(u, start), end)
 
     def _check_arrays(self) -> None:
         k = len(self.control_points_mm)
@@ -229,10 +236,10 @@ def _arc_length_table(curve: NurbsCurve) -> tuple[Array, Array]:
     done_length.append(whole)
     borders, lengths = np.concatenate(done_left), np.concatenate(done_length)
     order = np.argsort(borders)
-    stations = np.concatenate([[0.0], np.cumsum(lengths[order])])
-    if not stations[-1] > 0:
-        raise NominalError("the curve has no length")
-    return np.append(borders[order], end), stations
+    stations, borders = np.concatenate([[0.0], np.cumsum(lengths[order])]), np.append(borders[order], end)
+    stations.setflags(write=False)
+    borders.setflags(write=False)
+    return borders, stations
 
 
 def _corners(curve: NurbsCurve) -> Array:

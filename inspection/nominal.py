@@ -18,6 +18,7 @@ from inspection.first_use import OnFirstUse
 from inspection.foot_grid import FootGrid, build_foot_grid
 from inspection.kernels import SAMPLE_METHODS
 from inspection.methods import Material, Method
+from inspection.reach import StationReach
 from inspection.sample_table import ProfileSamples, SampleTable, pack_samples
 from inspection.spacing import LocalPoles, space_out
 from inspection.voronoi import site_poles
@@ -44,6 +45,7 @@ class NominalProfile(ProfileSamples):
     hollowness         : the least and the greatest curvature (1/mm) of the samples, positive where the profile is hollow
     grid               : finds the closest point of the curve
     search, packed     : what is looked up on the samples, made when it is first asked for: see `tree` and `sample_table`
+    reach              : which stations the foot of a point may have while the point moves, likewise
     """
 
     curve: NurbsCurve
@@ -53,6 +55,7 @@ class NominalProfile(ProfileSamples):
     grid: FootGrid
     search: "OnFirstUse[cKDTree]"
     packed: OnFirstUse[SampleTable]
+    reach: OnFirstUse[StationReach]
 
     @property
     def tree(self) -> "cKDTree":
@@ -158,6 +161,7 @@ def _profile(curve: NurbsCurve, material: Material, samples: ProfileSamples, pol
         grid=build_foot_grid(curve),
         search=OnFirstUse(lambda: _search_tree(samples.points_mm)),
         packed=OnFirstUse(lambda: pack_samples(samples, curve)),
+        reach=OnFirstUse(lambda: StationReach(curve)),
     )
 
 

@@ -221,13 +221,16 @@ class PlacementSearch:
         moves = np.sqrt(2) * boxes.half + 2 * np.sin(boxes.turn / 2) * reach
         small = np.flatnonzero(moves < _SMALL * self._band.narrowest_mm)
         left = np.ones(len(boxes), dtype=bool)
-        for box in small[np.argsort(boxes.excess[small])][:_FULL_LOOKS].tolist():
-            margin, excess = self._margins(boxes.rows(np.array([box])), arms)
+        first = small[np.argsort(boxes.excess[small])][:_FULL_LOOKS]
+        if not len(first):
+            return boxes, None
+        margins, excesses = self._margins(boxes.rows(first), arms)
+        for box, margin, excess in zip(first.tolist(), margins, excesses, strict=True):
             if excess.max() <= 0 and self._outside(_moved(boxes, box, arms)).max() <= 0:
                 return boxes, (boxes.place[box], float(boxes.angle[box]))
             left[box] = margin.max() <= 0
             if not left[box]:
-                self._finest_mm = min(self._finest_mm, float((excess - margin)[0, margin.argmax()]))
+                self._finest_mm = min(self._finest_mm, float((excess - margin)[margin.argmax()]))
             self._hits.setdefault(int(excess.argmax()), 1)
             boxes.excess[box] = max(boxes.excess[box], float(excess.max()))
         return boxes.rows(left), None

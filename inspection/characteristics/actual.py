@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from inspection.characteristics.outline import AirfoilSection, section_on
+from inspection.characteristics.outline import AirfoilSection, section_on, unwrap
 from inspection.characteristics.section_value import SectionValue
 from inspection.characteristics.tail import ON_FIRST, ON_FLAT, ON_LAST, ON_NONE, TailEnd, end_at_points
 from inspection.curve import NurbsCurve
@@ -30,7 +30,6 @@ _KNOTS = 200  # on the outline, unless their distance is given
 _BETWEEN = 4  # places from knot to knot at which the noise left in the spline is looked at: where points are few it swings between knots
 _GAP_KNOTS = 2.0  # a stretch without points that is longer than this many knot distances is drawn by no point
 _BRIDGING = 1e-10  # weight of smoothness beside that of the points; it acts where there are none
-_CLOSEST = 0.2  # of the steps beside it: over a step shorter than this, round-off would bend the spline
 _ON_OUTLINE = 1e-4  # of the section's length: a place nearer to the outline than this lies on it
 
 
@@ -118,8 +117,8 @@ def draw_actual_section(
     values = deviations.deviation_mm if filtered_mm is None else np.asarray(filtered_mm, dtype=np.float64)
     if values.shape != deviations.deviation_mm.shape:
         raise ValueError(f"expected {len(deviations)} filtered deviations, got shape {values.shape}")
-    start, end = _station_range(nominal)
-    station = _unwrap(nominal, deviations.station_mm, start)
+    start, end = nominal.stations.value.ends
+    station = unwrap(nominal.curve, deviations.station_mm, start)
     used = ~deviations.beyond_end & ~deviations.at_vertex & np.isfinite(values) & (station <= end)
     off = _flat_off_mm(nominal, deviations, station > end)
     used &= (station >= start + off) & (station <= end - off)
@@ -133,7 +132,7 @@ def draw_actual_section(
         raise ValueError(f"the distance of knots must be positive and below a quarter of the outline, not {spacing:g} mm")
     spline, rms, noise = _draw_deviations(nominal, station, values, (start, end), spacing, edges_as_wholes)
     unseen = _find_unseen(station, (start, end), _GAP_KNOTS * spacing if gap_max_mm is None else gap_max_mm, nominal.trailing == "round")
-    moved = _move_outline(nominal, spline, start, _drawn_range(station, (start, end), spacing))
+    moved = _move_outline(nominal, spline, _drawn_range(station, (start, end), spacing))
     tail = None if nominal.trailing == "round" else _end_at_tail(moved, nominal, deviations, (start, end), off)
     section = moved if tail is None else tail.section
     at = section.parameter
@@ -156,9 +155,8 @@ def draw_actual_section(
 
 def knots_on(nominal: AirfoilSection) -> tuple[Array, Array]:
     """Stations (k,) in mm at the distance of the knots of an actual section, from end to end of its outline, and their parameters (k,)."""
-    start, end = _station_range(nominal)
-    stations = np.linspace(start, end, _KNOTS + 1)
-    return stations, np.interp(stations, _stations(nominal, nominal.parameter, start), nominal.parameter)
+    stations = np.linspace(*nominal.stations.value.ends, _KNOTS + 1)
+    return stations, np.interp(stations, nominal.stations.value.at_sample, nominal.parameter)
 
 
 def move_section(nominal: AirfoilSection, station_mm: Array, moved_mm: Array) -> AirfoilSection:
@@ -169,7 +167,7 @@ def move_section(nominal: AirfoilSection, station_mm: Array, moved_mm: Array) ->
         spline = make_interp_spline(station_mm, np.append(moved_mm[:-1], moved_mm[0]), k=_DEGREE, bc_type="periodic")
     else:
         spline = make_interp_spline(station_mm, moved_mm, k=_DEGREE)
-    return _move_outline(nominal, spline, float(station_mm[0]))
+    return _move_outline(nominal, spline)
 
 
 def _flat_off_mm(nominal: AirfoilSection, deviations: Deviations, on_flat: NDArray[np.bool_]) -> float:
@@ -191,36 +189,14 @@ def _end_at_tail(
     corner_mm : nearer to a corner than this it is not known whether a point is of the flat
     """
     places = deviations.foot_mm + deviations.normal * deviations.deviation_mm[:, None]
-    station = _unwrap(nominal, deviations.station_mm, ends[0])
-    nose = float(_unwrap(nominal, nominal.curve.station_mm(nominal.nose), ends[0])[0])
+    station = unwrap(nominal.curve, deviations.station_mm, ends[0])
+    nose = float(unwrap(nominal.curve, nominal.curve.station_mm(nominal.nose), ends[0])[0])
     on = np.where(station > ends[1], ON_FLAT, np.where(station <= nose, ON_FIRST, ON_LAST))
     flat_to = ends[0] + nominal.curve.length_mm - corner_mm
     unclear = (on == ON_FLAT) & ((station < ends[1] + corner_mm) | (station > flat_to))
     on = np.where(deviations.at_vertex | deviations.beyond_end | unclear, ON_NONE, on)
     known = np.isfinite(places).all(axis=1)
     return end_at_points(section, places[known], on[known].astype(np.int8))
-
-
-def _station_range(nominal: AirfoilSection) -> tuple[float, float]:
-    """Stations of both ends of the outline in mm, rising through the seam of a closed curve."""
-    start = float(nominal.curve.station_mm(nominal.first)[0])
-    if nominal.trailing == "round":
-        return start, start + nominal.curve.length_mm
-    end = float(nominal.curve.station_mm(nominal.last)[0])
-    return start, end if end > start else end + nominal.curve.length_mm
-
-
-def _unwrap(nominal: AirfoilSection, station_mm: Array, start: float) -> Array:
-    """Stations (m,) at or above that of the outline's beginning."""
-    return np.where(station_mm < start, station_mm + nominal.curve.length_mm, station_mm) if nominal.curve.closed else station_mm
-
-
-def _stations(nominal: AirfoilSection, u: Array, start: float) -> Array:
-    """Stations (n,) of rising parameters (n,) of the outline, rising through the seam."""
-    found = _unwrap(nominal, nominal.curve.station_mm(u), start)
-    if nominal.curve.closed and found[-1] < found[-2]:  # the end of a full turn has the station of its beginning
-        found[-1] += nominal.curve.length_mm
-    return found
 
 
 def _draw_deviations(
@@ -271,7 +247,7 @@ def _edges_moved(nominal: AirfoilSection, station: Array, ends: tuple[float, flo
 
     With a round trailing edge (m, 4), the last two for that one. They follow the normal around an edge, however few knots lie there.
     """
-    samples = _stations(nominal, nominal.parameter, ends[0])
+    samples = nominal.stations.value.at_sample
     inward = nominal.frame(np.interp(station, samples, nominal.parameter))[3]
     away = [np.abs(station - samples[nominal.nose_sample])]
     if nominal.trailing == "round":
@@ -305,7 +281,7 @@ def _drawn_range(station: Array, ends: tuple[float, float], spacing: float) -> t
 
 
 def _move_outline(
-    nominal: AirfoilSection, spline: Callable[[Array], Array], start: float, within: tuple[float, float] = (-np.inf, np.inf)
+    nominal: AirfoilSection, spline: Callable[[Array], Array], within: tuple[float, float] = (-np.inf, np.inf)
 ) -> AirfoilSection:
     """The section whose outline is the nominal one moved along its normals by the spline of deviations over stations.
 
@@ -313,13 +289,12 @@ def _move_outline(
     """
     from scipy.interpolate import make_interp_spline  # noqa: PLC0415
 
-    u = _without_close_pairs(nominal.parameter)
-    u = np.sort(np.concatenate([u, (u[1:] + u[:-1]) / 2]))
-    station = _stations(nominal, u, start)  # a spline over the station does not feel how the nominal is parametrised
-    point, _, _, inward = nominal.frame(u)
+    along = nominal.stations.value
+    station = along.fine_mm  # a spline over the station does not feel how the nominal is parametrised
+    point, _, _, inward = nominal.frame(along.fine)
     at = station if nominal.trailing == "round" else np.clip(station, *within)
     moved = point + (nominal.outward * nominal.inward * spline(at))[:, None] * inward
-    nose = float(_stations(nominal, nominal.parameter, start)[nominal.nose_sample])
+    nose = float(along.at_sample[nominal.nose_sample])
     if nominal.trailing == "round":
         moved[-1] = moved[0]
         drawn = make_interp_spline(station, moved, k=_DEGREE, bc_type="periodic")
@@ -328,12 +303,3 @@ def _move_outline(
     drawn = make_interp_spline(station, moved, k=_DEGREE)
     curve = NurbsCurve(_DEGREE, drawn.c, drawn.t)
     return section_on(curve, float(station[0]), float(station[-1]), nominal.trailing, nominal.outward, nose)
-
-
-def _without_close_pairs(u: Array) -> Array:
-    """Rising parameters (n,) without those that lie much nearer to the one before than their neighbours do to each other."""
-    step = np.diff(u)
-    beside = np.maximum(np.append(step[1:], 0.0), np.concatenate([[0.0], step[:-1]]))
-    keep = np.concatenate([[True], step >= _CLOSEST * beside])
-    keep[-1] = True
-    return np.asarray(u[keep])

@@ -6,7 +6,7 @@ leading one is the blunter: the one with the smaller curvature (the convention o
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from inspection.characteristics.zoom import find_maximum
 from inspection.curve import NurbsCurve
 from inspection.errors import NominalError
+from inspection.first_use import OnFirstUse
 from inspection.nominal import NominalProfile
 from inspection.rigid import RigidTransform, rotate
 
@@ -26,7 +27,22 @@ _SAMPLES = 1200
 FRONT = 0.1  # of the section's length: how far from the foremost place its nose may lie
 _WIDEST_GAP = 0.2  # of the section's length: an outline that is open wider than this has lost a part, and is no section
 _SCOUT = 2000
+_CLOSEST = 0.2  # of the steps beside it: over a step shorter than this, round-off would bend a spline
 _AS_LARGE = 1e-6  # of a curvature: samples that differ by less lie on one arc
+
+
+class Stations(NamedTuple):
+    """Stations in mm along the curve of a section, rising from its first end through the seam of a closed curve.
+
+    ends        : of both ends; those of a round outline are a whole turn apart
+    at_sample   : (n,) of the samples
+    fine        : (j,) parameters of the samples without very close pairs, and of the middles between them; fine_mm : (j,) their stations
+    """
+
+    ends: tuple[float, float]
+    at_sample: Array
+    fine: Array
+    fine_mm: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,6 +63,7 @@ class AirfoilSection:
     normal        : (n, 2) unit vectors into the section
     nose_sample   : the number of the sample at the nose
     length_mm     : largest distance of two samples, the size of the section
+    stations      : see `Stations`; those of a section that was moved are the same
     """
 
     curve: NurbsCurve
@@ -62,6 +79,7 @@ class AirfoilSection:
     normal: Array = field(repr=False)
     nose_sample: int
     length_mm: float
+    stations: "OnFirstUse[Stations]" = field(repr=False)
 
     def __post_init__(self) -> None:
         for array in (self.parameter, self.points_mm, self.normal):
@@ -69,11 +87,11 @@ class AirfoilSection:
 
     def point(self, u: ArrayLike) -> Array:
         """Points (m, 2) at the parameters u (m,)."""
-        return self.curve.point(self._on_outline(u))
+        return np.asarray(self.curve.few_derivatives(self._on_outline(u), 0)[0])
 
     def frame(self, u: Array) -> tuple[Array, Array, Array, Array]:
         """Point (m, 2), derivative by u (m, 2), second derivative (m, 2) and unit normal into the section (m, 2)."""
-        point, first, second = self.curve.derivatives(self._on_outline(u), 2)
+        point, first, second = self.curve.few_derivatives(self._on_outline(u), 2)
         unit = first / np.hypot(first[:, 0], first[:, 1])[:, None]
         return point, first, second, self.inward * np.column_stack([-unit[:, 1], unit[:, 0]])
 
@@ -171,7 +189,45 @@ def section_on(
         normal=inward * np.column_stack([-tangent[:, 1], tangent[:, 0]]),
         nose_sample=int(np.searchsorted(u, nose)),
         length_mm=length,
+        stations=OnFirstUse(lambda: _stations_on(curve, (first, last), trailing, u)),
     )
+
+
+def _stations_on(curve: NurbsCurve, ends: tuple[float, float], trailing: TrailingEdge, u: Array) -> Stations:
+    """The stations of a section between two parameters of a curve, and those of its samples u (n,)."""
+    start = float(curve.station_mm(ends[0])[0])
+    end = start + curve.length_mm
+    if trailing != "round":
+        end = float(curve.station_mm(ends[1])[0])
+        end = end if end > start else end + curve.length_mm
+    fine = _without_close_pairs(u)
+    fine = np.sort(np.concatenate([fine, (fine[1:] + fine[:-1]) / 2]))
+    found = Stations((start, end), _rising_stations(curve, u, start), fine, _rising_stations(curve, fine, start))
+    for array in found[1:]:
+        array.setflags(write=False)
+    return found
+
+
+def _rising_stations(curve: NurbsCurve, u: Array, start: float) -> Array:
+    """Stations (n,) of rising parameters (n,) of an outline that begins at a station, rising through the seam."""
+    found = unwrap(curve, curve.station_mm(u), start)
+    if curve.closed and found[-1] < found[-2]:  # the end of a full turn has the station of its beginning
+        found[-1] += curve.length_mm
+    return found
+
+
+def unwrap(curve: NurbsCurve, station_mm: Array, start: float) -> Array:
+    """Stations (m,) at or above that of an outline's beginning."""
+    return np.where(station_mm < start, station_mm + curve.length_mm, station_mm) if curve.closed else station_mm
+
+
+def _without_close_pairs(u: Array) -> Array:
+    """Rising parameters (n,) without those that lie much nearer to the one before than their neighbours do to each other."""
+    step = np.diff(u)
+    beside = np.maximum(np.append(step[1:], 0.0), np.concatenate([[0.0], step[:-1]]))
+    keep = np.concatenate([[True], step >= _CLOSEST * beside])
+    keep[-1] = True
+    return np.asarray(u[keep])
 
 
 def _outline_range(curve: NurbsCurve, leading_near: Array | None) -> tuple[float, float, TrailingEdge]:

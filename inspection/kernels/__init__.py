@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from inspection.kernels.projection import Turned, project, project_on_samples, project_outward
     from inspection.kernels.rows import JUDGED_AS, NONE_TAKEN, TALLY, Columns, Judgement, Places, Taken, judge_few_rows, judge_rows, take_in
     from inspection.kernels.side_by_side import fit_compiled_beside
+    from inspection.kernels.splines import spline_derivatives
     from inspection.kernels.thinning import strides
     from inspection.kernels.tree_growing import GrownTree, shortest_tree
 else:
@@ -52,6 +53,7 @@ else:
             "take_in",
         ),
         "inspection.kernels.side_by_side": ("fit_compiled_beside",),
+        "inspection.kernels.splines": ("spline_derivatives",),
         "inspection.kernels.thinning": ("strides",),
         "inspection.kernels.tree_growing": ("GrownTree", "shortest_tree"),
     }
@@ -90,6 +92,7 @@ __all__ = [
     "project_on_samples",
     "project_outward",
     "shortest_tree",
+    "spline_derivatives",
     "strides",
     "take_in",
     "while_compiling",
