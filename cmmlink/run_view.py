@@ -1,20 +1,19 @@
 """The newest state of one run, for whoever shows it: a sink that keeps no history, in constant memory.
 
-The run calls it and goes on at once. After every change the view publishes an immutable `RunState`; readers take the newest
-one whenever they are ready. Nothing is queued and nobody waits, so a slow reader never slows a run.
+The run calls it and goes on at once: what is shown of its points is worked out when somebody looks, many batches together, and not
+at every batch. What looks is given an immutable `RunState`. Nobody waits for another, so a slow reader never slows a run.
 """
 
 import math
 import threading
-from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cmmlink.arrival_rate import ArrivalRate
 from cmmlink.characteristic_rows import Characteristics, characteristics_at_end, characteristics_so_far, names_of, worst_words
 from cmmlink.characteristics import base_row
 from cmmlink.endings import Ended, count_words, reasons_of
@@ -29,9 +28,9 @@ from drivers import Heartbeat, LinkDown, LinkUp, PointBatch, Rejected, ScanClose
 from inspection import LiveUpdate, NominalProfile, ToleranceZone, Verdict, coverage
 
 _COUNTED = ("received", "judged", "rejected", "lost", "damaged_bytes", "rejected_by_reason")
-_RATE_OVER_S = 1.0
-_RATE_STEP_S = 0.05
+_ALIVE_S = 1.0
 _COVERAGE_EVERY_S = 0.25
+_MOST_WAITING = 8192  # points; the run itself sees to them where nobody looks
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,26 +57,12 @@ class RunContext:
         return cls(number, plan_name, profile, zone, coverage_min, plan.buffer_points, began, kind, base_row(plan))
 
 
-class _Received(NamedTuple):
-    """How many points had been received at a moment of the run's clock."""
-
-    time_s: float
-    points: int
-
-
-class _Published(NamedTuple):
-    """A state as it is while nothing comes, and between which two moments the rate of points is to be taken."""
-
-    state: RunState
-    first: _Received
-    last: _Received
-
-
 class RunView:
-    """The newest state of one run, published after every change as an immutable snapshot.
+    """The newest state of one run, as immutable snapshots.
 
     One thread hands over the events of the run, and any thread may read. Guarded by its own lock, which is held only while
-    fields are set and a snapshot is put together; readers do not take it.
+    fields are set and a snapshot is put together. What was judged waits until somebody reads; whoever reads meanwhile is given what
+    was known before.
 
     clock : the run's clock, s; now : the time of day
     """
@@ -85,7 +70,9 @@ class RunView:
     def __init__(self, context: RunContext, clock: Callable[[], float], now: Callable[[], datetime]) -> None:
         self.context = context
         self._clock, self._now = clock, now
-        self._lock = threading.Lock()
+        self._lock, self._catching_up = threading.Lock(), threading.Lock()
+        self._waiting: list[Judged] = []
+        self._waiting_points, self._waiting_at = 0, now()
         self._extremes = Extremes(context.profile.length_mm, context.zone.middle_mm)
         self._started = RunStarted("", "", "", "", False)
         self._phase: Phase = "preparing"
@@ -95,7 +82,7 @@ class RunView:
         self._expected: int | None = None
         self._device_name = ""
         self._arrived = 0
-        self._received: deque[_Received] = deque()
+        self._rate = ArrivalRate()
         self._alive_s = -math.inf
         self._latency_s = math.nan
         self._verdict_at: datetime | None = None
@@ -107,7 +94,7 @@ class RunView:
         self._ended: Ended | None = None
         self._notes: tuple[str, ...] = ()
         self._failure = self._remark = self._run = ""
-        self._published = self._snapshot()
+        self._published = self._state()
 
     def __call__(self, event: Event) -> None:
         """Take one event of the run."""
@@ -139,6 +126,7 @@ class RunView:
 
     def fail(self, message: str) -> None:
         """Note that the run broke off before it could give a result; what arrived without a verdict by then has none."""
+        self._catch_up(wait=True)
         covered = coverage(self._extremes.stations_mm, self.context.profile)
         with self._lock:
             self._failure, self._phase, self._link, self._coverage = message, "finished", "closed", covered
@@ -167,26 +155,29 @@ class RunView:
     @property
     def over(self) -> bool:
         """Whether the run has come to its end."""
-        return self._published.state.phase == "finished"
+        return self._published.phase == "finished"
 
     def state(self) -> RunState:
-        """The newest state. Never blocks. Only the rate and `streaming` depend on the moment of the call."""
-        published, now_s = self._published, self._clock()
-        streaming = published.state.streaming and now_s - self._alive_s < _RATE_OVER_S
-        return replace(published.state, streaming=streaming, rate_per_s=_rate_per_s(published, now_s))
+        """The newest state. Never waits. Only the rate and `streaming` depend on the moment of the call."""
+        self._catch_up()
+        state, now_s = self._published, self._clock()
+        streaming = state.streaming and now_s - self._alive_s < _ALIVE_S
+        return replace(state, streaming=streaming, rate_per_s=0.0 if state.phase == "finished" else self._rate.per_s(now_s))
 
     @property
     def characteristics(self) -> Characteristics:
-        """The newest of the characteristics. Never blocks."""
+        """The newest of the characteristics. Never waits."""
         return self._characteristics
 
     @property
     def newest_points(self) -> PointsVersion:
-        """The version of a reader that has seen all points up to now. Never blocks."""
+        """The version of a reader that has seen all points up to now. Never waits."""
+        self._catch_up()
         return self._extremes.newest
 
     def points_since(self, seen: PointsVersion) -> tuple[ChangedBins, datetime | None]:
         """The bins that changed after what was `seen`, and when the newest verdict in them was given."""
+        self._catch_up()
         verdict_at = self._verdict_at
         return self._extremes.changed_since(seen), verdict_at
 
@@ -216,21 +207,47 @@ class RunView:
             self._publish()
 
     def _take_verdicts(self, event: Judged) -> None:
-        update, counts = event.update, event.counts
-        anew = update.first == 0  # all points were judged once more: what was shown before is void
+        self._rate.note(event.time_s, event.counts.received)
+        with self._lock:
+            if event.update.first == 0:  # all points were judged once more: what was judged before is void
+                self._waiting, self._waiting_points = [], 0
+            self._waiting.append(event)
+            self._waiting_points += len(event.update.deviation_mm)
+            self._waiting_at = self._now()
+            is_full = self._waiting_points > _MOST_WAITING
+        if is_full:
+            self._catch_up(wait=True)
+
+    def _catch_up(self, wait: bool = False) -> None:
+        """See to all that was judged since somebody looked last; not where another thread is at it, unless told to wait for it."""
+        if not (self._waiting or wait) or not self._catching_up.acquire(blocking=wait):
+            return
+        try:
+            with self._lock:
+                events, at = self._waiting, self._waiting_at
+                self._waiting, self._waiting_points = [], 0
+            if events:
+                self._show_verdicts(events, at)
+        finally:
+            self._catching_up.release()
+
+    def _show_verdicts(self, events: Sequence[Judged], at: datetime) -> None:
+        updates, newest = [event.update for event in events], events[-1]
+        anew = updates[0].first == 0
         extremes = self._empty_extremes() if anew else self._extremes
-        extremes.add(update.station_mm, update.deviation_mm, update.foot_mm, update.actual_mm, update.verdicts)
-        verdicts = self.context.zone.verdicts(update.deviation_mm)  # without what the pose can still move: what looks out now
+        columns = ("station_mm", "deviation_mm", "foot_mm", "actual_mm", "verdicts")
+        station, deviation, foot, actual, found = (np.concatenate([getattr(update, name) for update in updates]) for name in columns)
+        extremes.add(station, deviation, foot, actual, found)
+        verdicts = self.context.zone.verdicts(deviation)  # without what the pose can still move: what looks out now
         out = int(np.count_nonzero(verdicts == Verdict.NONCONFORM)) + (0 if anew else self._out)
         covered, covered_s = self._coverage, self._coverage_s
-        if event.time_s - covered_s > _COVERAGE_EVERY_S:
-            covered, covered_s = coverage(extremes.stations_mm, self.context.profile), event.time_s
-        self._note_received(event.time_s, counts.received)
+        if newest.time_s - covered_s > _COVERAGE_EVERY_S:
+            covered, covered_s = coverage(extremes.stations_mm, self.context.profile), newest.time_s
         with self._lock:
             self._extremes, self._out, self._coverage, self._coverage_s = extremes, out, covered, covered_s
-            self._update, self._counts, self._latency_s = update, counts, event.age_s
-            if counts.judged:
-                self._verdict_at = self._now()
+            self._update, self._counts, self._latency_s = newest.update, newest.counts, newest.age_s
+            if newest.counts.judged:
+                self._verdict_at = at
             self._publish()
 
     def _take_proof(self, event: ProvenOut) -> None:
@@ -250,6 +267,7 @@ class RunView:
 
     def _end(self, ended: Ended, counts: Counts) -> None:
         """Replace everything provisional by the result."""
+        self._catch_up(wait=True)
         extremes, places = self._extremes, density_of([], self.context.profile.length_mm)
         if ended.blocks is not None:
             extremes = self._empty_extremes()
@@ -270,21 +288,9 @@ class RunView:
         context = self.context
         return Extremes(context.profile.length_mm, context.zone.middle_mm, self._extremes.generation + 1)
 
-    def _note_received(self, time_s: float, count: int) -> None:
-        if self._received and time_s - self._received[-1].time_s < _RATE_STEP_S:
-            return
-        self._received.append(_Received(time_s, count))
-        while len(self._received) > 2 and time_s - self._received[0].time_s > _RATE_OVER_S:
-            self._received.popleft()
-
     def _publish(self) -> None:
         """Replace the snapshot; called with the lock held."""
-        self._published = self._snapshot()
-
-    def _snapshot(self) -> _Published:
-        first = self._received[0] if self._received else _Received(0.0, 0)
-        last = self._received[-1] if self._received else first
-        return _Published(self._state(), first, last)
+        self._published = self._state()
 
     def _state(self) -> RunState:
         context, started, counts, ended, zone = self.context, self._started, self._counts, self._ended, self.context.zone
@@ -389,14 +395,6 @@ def _settled(counts: Counts, arrived: int) -> Counts:
     left = received - counts.judged - counts.rejected
     reasons = {**counts.rejected_by_reason, **({"not judged": left} if left else {})}
     return replace(counts, received=received, rejected=counts.rejected + left, pending=0, rejected_by_reason=reasons)
-
-
-def _rate_per_s(published: _Published, now_s: float) -> float:
-    """Points per second over the last second; it falls to zero when nothing comes."""
-    first, last = published.first, published.last
-    if published.state.phase == "finished" or last.time_s <= first.time_s:
-        return 0.0
-    return round((last.points - first.points) / max(last.time_s - first.time_s, now_s - last.time_s), 1)
 
 
 def _worst_point(worst: NDArray[np.float64] | None) -> WorstPoint | None:

@@ -179,8 +179,43 @@ def test_state_that_was_given_never_changes(played: Played) -> None:
     assert repr(given) == words != repr(played.view.state())
 
 
-def test_nobody_waits_while_points_are_put_in_their_bins(played: Played, monkeypatch: pytest.MonkeyPatch) -> None:
-    played.judge(0, [0.0, 0.01])
+def test_however_batches_are_cut_and_looked_at_the_same_is_shown(profile: NominalProfile) -> None:
+    deviation = np.random.default_rng(4).normal(0.0, 0.03, 240)
+    shown = []
+    for size, is_looked_at in ((240, False), (7, False), (7, True), (1, False)):
+        played = Played(profile)
+        whole = played.update(0, deviation.tolist(), "settled")
+        for first in range(0, len(deviation), size):
+            rows = slice(first, first + size)
+            arrays = {name: getattr(whole, name)[rows] for name in ("actual_mm", "foot_mm", "station_mm", "deviation_mm", "verdicts")}
+            stop, played.now_s = first + len(arrays["station_mm"]), played.now_s + 1.0
+            update = replace(whole, first=first, stop=stop, **arrays)
+            played.view(Judged(played.now_s, 0.02, update, Counts(received=stop, judged=stop)))
+            if is_looked_at:
+                played.view.state()
+        state, bins = played.view.state(), played.view.points_since(UNSEEN)[0]
+        shown.append((state.judged, state.out_of_tolerance, state.worst, state.coverage, bins.bins.tolist(), bins.extremes.tolist()))
+    assert all(other == shown[0] for other in shown[1:])
+    assert shown[0][1] > 0
+
+
+def test_what_nobody_looks_at_is_seen_to_by_the_run_itself(played: Played, monkeypatch: pytest.MonkeyPatch) -> None:
+    added: list[int] = []
+    add = Extremes.add
+
+    def counted(extremes: Extremes, *columns: np.ndarray) -> None:
+        added.append(len(columns[0]))
+        add(extremes, *columns)
+
+    monkeypatch.setattr(Extremes, "add", counted)
+    for first in range(0, 100_000, 100):
+        played.judge(first, [0.01] * 100)
+    assert max(added) <= 8300
+    assert sum(added) > 90_000
+    assert played.view.state().judged == sum(added) == 100_000
+
+
+def test_a_reader_that_is_late_does_not_show_what_was_before_the_end(played: Played, monkeypatch: pytest.MonkeyPatch) -> None:
     adding, released, add = threading.Event(), threading.Event(), Extremes.add
 
     def slow(extremes: Extremes, *columns: np.ndarray) -> None:
@@ -189,14 +224,39 @@ def test_nobody_waits_while_points_are_put_in_their_bins(played: Played, monkeyp
         add(extremes, *columns)
 
     monkeypatch.setattr(Extremes, "add", slow)
+    played.judge(0, [0.3, 0.0, 0.0])
+    with ThreadPoolExecutor(2) as pool:
+        looked = pool.submit(played.view.state)
+        assert adding.wait(30.0)
+        ended = pool.submit(played.view, RunFinished("complete", None, Counts(received=5, rejected=5), "the points do not fit"))
+        released.set()
+        ended.result(30.0)
+        looked.result(30.0)
+    state = played.view.state()
+    assert (state.phase, state.received, state.judged) == ("finished", 5, 0)
+
+
+def test_nobody_waits_while_points_are_put_in_their_bins(played: Played, monkeypatch: pytest.MonkeyPatch) -> None:
+    played.judge(0, [0.0, 0.01])
+    assert played.view.state().judged == 2
+    adding, released, add = threading.Event(), threading.Event(), Extremes.add
+
+    def slow(extremes: Extremes, *columns: np.ndarray) -> None:
+        adding.set()
+        assert released.wait(60.0)
+        add(extremes, *columns)
+
+    monkeypatch.setattr(Extremes, "add", slow)
+    played.judge(0, [0.3, 0.0, 0.0])
     with ThreadPoolExecutor(1) as pool:
-        judged = pool.submit(played.judge, 0, [0.3, 0.0, 0.0])
+        looked = pool.submit(played.view.state)
         assert adding.wait(30.0)
         state = played.view.state()
         assert (state.judged, state.out_of_tolerance) == (2, 0)
         assert len(played.view.points_since(UNSEEN)[0].bins) == 2
+        played.judge(3, [0.0])
         played.view.end_soon()
         released.set()
-        judged.result(30.0)
-    assert (played.view.state().judged, played.view.state().out_of_tolerance) == (3, 1)
+        assert (looked.result(30.0).judged, looked.result(30.0).out_of_tolerance) == (3, 1)
+    assert (played.view.state().judged, played.view.state().out_of_tolerance) == (4, 1)
     assert played.view.state().phase == "ending"
