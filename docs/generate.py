@@ -19,6 +19,7 @@ from cmmlink.plan.surface import CtPlan
 from cmmlink.record import export
 from cmmlink.report import stack_folder
 from cmmlink.result_keys import (
+    Compared,
     Exported,
     Inspected,
     Measured,
@@ -119,6 +120,7 @@ OBJECTS: tuple[tuple[str, type[BaseModel], type[BaseModel] | None], ...] = (
     ("`show`, and `run.json` of `export`", Shown, None),
     ("`export`", Exported, None),
     ("`report`", Reported, None),
+    ("`compare`", Compared, None),
     ("`verify`", Verified, None),
     ("`verify-zone`", ZonesVerified, None),
 )

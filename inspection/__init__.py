@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from inspection.consumption_proof import certify_consumption
     from inspection.curve import NurbsCurve
     from inspection.curve_check import CurveCheck, Hollow, check_curve
+    from inspection.difference import Course, Difference, difference_along
     from inspection.errors import InspectionError, NominalError, NotMeasured, RegistrationError
     from inspection.evaluation.evaluate import doubt_part, evaluate
     from inspection.evaluation.line_profile import zone_words
@@ -111,6 +112,7 @@ else:
         "inspection.consumption_proof": ("certify_consumption",),
         "inspection.curve": ("NurbsCurve",),
         "inspection.curve_check": ("CurveCheck", "Hollow", "check_curve"),
+        "inspection.difference": ("Course", "Difference", "difference_along"),
         "inspection.errors": ("InspectionError", "NominalError", "NotMeasured", "RegistrationError"),
         "inspection.filters": ("FilteredProfile", "FilterOrder", "ProfileFilter", "filter_profile"),
         "inspection.fine": ("register", "register_fine"),
@@ -193,11 +195,13 @@ __all__ = [
     "ConsumptionCertificate",
     "ConsumptionFit",
     "Contribution",
+    "Course",
     "Crossing",
     "CurveCheck",
     "DecisionRule",
     "DeviationUncertainty",
     "Deviations",
+    "Difference",
     "EdgeRadiusMethod",
     "EdgeThicknessMethod",
     "EvaluationSoFar",
@@ -281,6 +285,7 @@ __all__ = [
     "default_gap_max_mm",
     "deviation_uncertainty",
     "deviations",
+    "difference_along",
     "discretize",
     "displacement",
     "doubt_part",

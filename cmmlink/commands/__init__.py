@@ -13,6 +13,7 @@ from typing import Annotated
 
 import typer
 
+from cmmlink.commands.compare import compare
 from cmmlink.commands.console import serve_console
 from cmmlink.commands.exit_codes import DEVICE_FAILED, NO_RECORD, STOPPED, UNUSABLE, fail, fail_as_asked
 from cmmlink.commands.measure import demo, inspect, run
@@ -52,6 +53,7 @@ app.command()(runs)
 app.command()(show)
 app.command()(export)
 app.command()(report)
+app.command()(compare)
 app.command()(replay)
 app.command()(verify)
 app.command("verify-zone")(verify_zone)

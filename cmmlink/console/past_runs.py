@@ -10,8 +10,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from cmmlink.console.paper_process import make_comparison, make_report
 from cmmlink.console.protocol import RunRow
-from cmmlink.console.report_process import make_report
 from cmmlink.endings import Ended
 from cmmlink.errors import StoreError
 from cmmlink.events import Counts, RunStarted, Sink
@@ -126,6 +126,14 @@ class PastRuns:
             run = find_run(store, run)
         file = folder / "report.pdf"
         make_report(self.folder, run, file, settings)
+        return file
+
+    def compare_runs(self, first: str, second: str, folder: Path) -> Path:
+        """Draw two runs of one profile and their difference as a PDF into a folder. Raises StoreError, RunError."""
+        with open_to_read(self.folder, self.now, close_interrupted=False) as store:
+            first, second = (find_run(store, run) for run in (first, second))
+        file = folder / "comparison.pdf"
+        make_comparison(self.folder, first, second, file)
         return file
 
 

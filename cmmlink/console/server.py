@@ -170,6 +170,7 @@ class ConsoleServer:
                 Route("/", lambda _: _file_response(files["index.html"])),
                 Route("/export/{run}", self._export),
                 Route("/report/{run}", self._report),
+                Route("/compare/{first}/{second}", self._compare),
                 Route("/{name}", lambda request: _file_response(files.get(request.path_params["name"]))),
                 WebSocketRoute("/live", self._live),
             ]
@@ -184,6 +185,10 @@ class ConsoleServer:
         run, asked = request.path_params["run"], request.query_params
         settings = {name: asked[name] for name, allowed in _LOOKS.items() if asked.get(name) in allowed}
         return await self._send_file(request, lambda folder: self.station.report_run(run, folder, settings), "application/pdf")
+
+    async def _compare(self, request: Request) -> Response:
+        first, second = request.path_params["first"], request.path_params["second"]
+        return await self._send_file(request, lambda folder: self.station.compare_runs(first, second, folder), "application/pdf")
 
     async def _send_file(self, request: Request, make: Callable[[Path], Path], media_type: str) -> Response:
         if not self._keys.knows(request.headers.get("authorization", "").removeprefix("Bearer ")):

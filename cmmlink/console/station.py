@@ -215,6 +215,12 @@ class Station:
         with answer_errors():
             return records.report_run(run, folder, settings)
 
+    def compare_runs(self, first: str, second: str, folder: Path) -> Path:
+        """Draw two recorded runs of one profile and their difference into a folder."""
+        records = self._records()
+        with answer_errors():
+            return records.compare_runs(first, second, folder)
+
     def devices(self) -> list[tuple[str, str]]:
         """Addresses of devices that can be seen now, with a description each."""
         return list(self._setup.devices())

@@ -38,6 +38,9 @@ class Records(Protocol):
     def report_run(self, run: str, folder: Path, settings: Mapping[str, str]) -> Path:
         """Write the report of one run into a folder; `settings` are those of its look that are not as its plan says."""
 
+    def compare_runs(self, first: str, second: str, folder: Path) -> Path:
+        """Draw two runs of one profile and their difference into a folder."""
+
 
 @dataclass(frozen=True, slots=True)
 class StationSetup:

@@ -6,6 +6,7 @@ Pictures are drawn by matplotlib, which is loaded when the first one is.
 TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer to load than all of this
 
 if TYPE_CHECKING:
+    from cmmlink.report.comparison_picture import write_comparison_picture
     from cmmlink.report.folder import prepare, write_results, write_run
     from cmmlink.report.nominal_picture import write_nominal_picture
     from cmmlink.report.pdf import write_report
@@ -19,6 +20,7 @@ else:
     from cmmlink.front_door import load_on_use
 
     _PLACES = {
+        "cmmlink.report.comparison_picture": ("write_comparison_picture",),
         "cmmlink.report.folder": ("prepare", "write_results", "write_run"),
         "cmmlink.report.picture_processes": ("Pictures", "processes_here"),
         "cmmlink.report.nominal_picture": ("write_nominal_picture",),
@@ -47,6 +49,7 @@ __all__ = [
     "print_summary",
     "processes_here",
     "with_settings",
+    "write_comparison_picture",
     "write_nominal_picture",
     "write_report",
     "write_results",

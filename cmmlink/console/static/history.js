@@ -1,4 +1,4 @@
-// The history view: the station's runs, one of them chosen to be opened, replayed, exported or reported.
+// The history view: the station's runs, one of them chosen to be opened, replayed, exported, reported or compared.
 
 import { Chart } from "./chart.js";
 import { buttonOf, byId, put } from "./dom.js";
@@ -6,11 +6,11 @@ import { count } from "./numbers.js";
 import { Table, cell, verdictCell, worstCells } from "./table.js";
 
 /** @import { RunRow } from "./protocol.js" */
-/** @typedef {"open" | "replay" | "export" | "report"} Act */
+/** @typedef {"open" | "replay" | "export" | "report" | "compare"} Act */
 
 const SHOWN = 20;
 /** @type {Act[]} */
-const ACTS = ["open", "replay", "export", "report"];
+const ACTS = ["open", "replay", "export", "report", "compare"];
 
 export class History {
   /**

@@ -41,6 +41,7 @@ let cursor = null;
 let isPainting = false;
 let outdated = { drawings: true, words: true };
 let saidAt = 0;
+let toCompare = ""; // the run that was chosen first
 
 const scan = new Scan();
 const timing = new Timing();
@@ -54,6 +55,7 @@ const history = new History({
   replay: (run) => askToSee({ do: "replay", run }),
   export: (run) => download(`/export/${encodeURIComponent(run)}`, `${run}.zip`),
   report,
+  compare,
 }, rewrite);
 const characteristics = new Characteristics(showChosen);
 /** @type {CharacteristicList} */
@@ -246,6 +248,18 @@ function report(run) {
   return download(`/report/${encodeURIComponent(run)}?${chosen.join("&")}`, `${run}.pdf`);
 }
 
+/**
+ * Take a run as the first one to compare, or draw the one that was taken before and this one.
+ * @param {string} run
+ */
+function compare(run) {
+  const first = toCompare === run ? "" : toCompare;
+  toCompare = first ? "" : run;
+  if (!first) return say({ ok: true, message: `${run} is the first one: choose the other run and press C again` });
+  say({ ok: true, message: "drawing both runs \u2026" });
+  return download(`/compare/${encodeURIComponent(first)}/${encodeURIComponent(run)}`, `${first}-${run}.pdf`);
+}
+
 /** Save the report of the run whose verdict stands at the right. */
 function reportShown() {
   const { record } = cardOf(heard);
@@ -333,7 +347,7 @@ const KEYS = {
   1: [() => go("live")], 2: [() => go("part")], 3: [() => go("history")], 4: [press("tab-ct")],
   s: [press("start")], e: [press("end")], n: [press("next")], a: [press("acknowledge")], l: [press("alarm-list-button")],
   t: [press("test")], o: [pressIn("history", "open-run"), pressIn("ct", "open-section")], r: [pressIn("history", "replay-run")],
-  x: [pressIn("history", "export-run")], p: [reportShown], i: [pressIn("ct", "import-ct")], escape: [leave],
+  x: [pressIn("history", "export-run")], p: [reportShown], c: [pressIn("history", "compare-run")], i: [pressIn("ct", "import-ct")], escape: [leave],
 };
 
 /** @param {KeyboardEvent} event */

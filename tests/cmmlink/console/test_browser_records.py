@@ -92,7 +92,7 @@ def test_history_is_listed_opened_replayed_and_exported(make_bench: MakeBench, t
 
 
 def check_report_while_measuring(bench: Bench, page: Page, folder: Path) -> None:
-    """The report of the chosen run is saved while the next part is measured, and in the language that is chosen."""
+    """The report of the chosen run is saved while the next part is measured, and so is its comparison with the run after it."""
     bench.device.renew()
     page.keyboard.press("s")
     expect(page.locator("#verdict-why")).to_contain_text("waiting for points")
@@ -106,6 +106,16 @@ def check_report_while_measuring(bench: Bench, page: Page, folder: Path) -> None
     told = "".join(one.extract_text() for one in PdfReader(folder / "report.pdf").pages)
     assert "NOT CONFORM" in told
     assert "B-0042" in told
+    page.keyboard.press("c")
+    expect(page.locator("#said")).to_contain_text("is the first one")
+    page.locator("#runs").focus()
+    page.keyboard.press("ArrowUp")
+    with page.expect_download() as download:
+        page.keyboard.press("c")
+    assert re.search(r"-0002-.*-0003\.pdf$", download.value.suggested_filename)
+    download.value.save_as(folder / "both.pdf")
+    assert "second - first" in PdfReader(folder / "both.pdf").pages[0].extract_text()
+    page.keyboard.press("ArrowDown")
     page.keyboard.press("Escape")
     expect(page.locator("#start")).to_be_enabled()
     expect(page.locator("#runs tr[aria-selected=true]")).to_contain_text("B-0042")

@@ -1,4 +1,4 @@
-"""The report of a recorded run, made by another process: a scan that goes on at the station keeps its own."""
+"""What is made of recorded runs on request, by another process and with less priority: a scan that goes on at the station keeps its own."""
 
 import json
 import subprocess
@@ -17,23 +17,31 @@ _LONGEST_S = 300.0  # a report of a million points takes a few seconds
 
 
 def make_report(records: Path, run: str, file: Path, settings: Mapping[str, str]) -> None:
-    """Write the report of a run, which is given by its id, as `cmmlink report` does, with less priority than the station has.
+    """Write the report of a run, which is given by its id, as `cmmlink report` does.
 
     settings : options of that command without their dashes
 
     Raises RunError with what the command says where it fails, OSError where no process can be started.
     """
-    options = [word for name, value in settings.items() for word in (f"--{name}", value)]
-    command = ["report", run, "--records", str(records), "--out", str(file), "--json", *options]
-    child = [sys.executable, "-P", "-c", _CHILD, str(Path(__file__).resolve().parents[2]), *command]
+    _make(["report", run], records, file, [word for name, value in settings.items() for word in (f"--{name}", value)])
+
+
+def make_comparison(records: Path, first: str, second: str, file: Path) -> None:
+    """Draw the comparison of two runs, which are given by their ids, as `cmmlink compare` does. Raises like `make_report`."""
+    _make(["compare", first, second], records, file, [])
+
+
+def _make(command: list[str], records: Path, file: Path, options: list[str]) -> None:
+    words = [*command, "--records", str(records), "--out", str(file), "--json", *options]
+    child = [sys.executable, "-P", "-c", _CHILD, str(Path(__file__).resolve().parents[2]), *words]
     try:
         ended = subprocess.run(
             child, stdin=subprocess.DEVNULL, capture_output=True, timeout=_LONGEST_S, creationflags=_BELOW_NORMAL, check=False
         )
     except subprocess.TimeoutExpired:
-        raise RunError(f"run {run}: its report was not made within {_LONGEST_S:g} s") from None
+        raise RunError(f"it was not made within {_LONGEST_S:g} s") from None
     if ended.returncode or not file.is_file():
-        raise RunError(_refusal(ended.stdout) or f"run {run}: its report could not be made; `cmmlink report {run}` says more")
+        raise RunError(_refusal(ended.stdout) or f"it could not be made; `cmmlink {' '.join(command)}` says more")
 
 
 def _refusal(answer: bytes) -> str:
