@@ -10,10 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cmmlink.plan import PROFILE, AskedCharacteristic, AskedFilter, AskedProfile, CtPlan, Datum, Place, Plan
+from cmmlink.plan import PROFILE, AskedCharacteristic, AskedDatum, AskedFilter, AskedProfile, CtPlan, Datum, Place, Plan
 from inspection import (
     Characteristic,
     CharacteristicResult,
+    DatumFeature,
+    DatumFeatures,
     Features,
     FitName,
     FreedomName,
@@ -28,6 +30,8 @@ from inspection import (
     SectionCharacteristic,
     VaryingZone,
     WholeProfile,
+    check_datum,
+    default_gap_max_mm,
     features_of,
     find_airfoil,
     region_between,
@@ -73,7 +77,9 @@ def base_row(plan: Plan | CtPlan) -> int | None:
         return None
     if plan.tolerance is not None:
         return 0
-    return None if plan.first_profile.filter is not None else plan.characteristics.index(plan.first_profile)
+    first, registration = plan.first_profile, plan.registration
+    elsewhere = first.datum is not None and known_pose(pose_of(registration.datum), registration.fit) is not None
+    return None if first.filter is not None or elsewhere else plan.characteristics.index(first)
 
 
 def notes_on_zone(plan: Plan | CtPlan) -> tuple[str, ...]:
@@ -107,8 +113,8 @@ class Builder:
         asked = self._plan.characteristics[number]
         if not isinstance(asked, AskedProfile):
             return self._value(asked)
-        if asked.fit == "datum" and self._known_pose is None:
-            raise ValueError("fit datum needs a known pose: give registration.datum")
+        if asked.fit == "datum" and self._known_pose is None and asked.datum is None:
+            raise ValueError("fit datum needs a known pose or features: give registration.datum, or a datum of its own")
         if self._plan.tolerance is None and asked is self._plan.first_profile and _is_run_itself(asked):
             return WholeProfile(asked.name)
         return self._line_profile(asked)
@@ -139,6 +145,7 @@ class Builder:
             fit=asked.fit,
             freedoms=None if asked.is_all_free else _freedoms(asked),
             datum=self._known_pose,
+            features=self._datum(asked.datum),
             filter=_filter(asked.filter),
             rule=asked.rule or self._plan.rule,
             region_words=words,
@@ -157,6 +164,37 @@ class Builder:
             return None, "whole profile"
         region = region_between(self._profile, self._station(asked.from_, at_end=False), self._station(asked.to, at_end=True))
         return region, f"station {region.from_mm:.4g} .. {region.to_mm:.4g} mm"
+
+    def _datum(self, asked: AskedDatum | None) -> DatumFeatures | None:
+        """The features that place the part, which fix it as the nominal shows."""
+        if asked is None:
+            return None
+        share, found = asked.within_mm or default_gap_max_mm(self._profile), list[DatumFeature]()
+        if asked.line is not None:
+            first, last = self._station(asked.line.from_, at_end=False), self._station(asked.line.to, at_end=True)
+            region = region_between(self._profile, first, last)
+            words = f"line station {region.from_mm:.4g} .. {region.to_mm:.4g} mm"
+            found.append(DatumFeature("line", region.from_mm, region.to_mm, words))
+        if asked.edge is not None:
+            within = asked.within_mm or 3 * share
+            edge = self._found_features.edge(asked.edge, within)
+            found.append(DatumFeature("edge", edge.from_mm, edge.to_mm, f"edge {asked.edge} within {within:.3g} mm"))
+        found += [self._point_of_datum(place, share) for place in asked.points]
+        features = DatumFeatures(tuple(found))
+        check_datum(self._profile, features)
+        return features
+
+    def _point_of_datum(self, place: Place, within_mm: float) -> DatumFeature:
+        """A point of a datum, and how far around it points count."""
+        station, length = self._station(place, at_end=False), self._profile.length_mm
+        words = f"point at station {station:.4g} mm"
+        if self._profile.curve.closed:
+            return DatumFeature("point", (station - within_mm) % length, (station + within_mm) % length, words)
+        if not within_mm <= station <= length - within_mm:
+            raise ValueError(
+                f"a {words} of the datum needs {within_mm:.3g} mm of an open profile, {length:.6g} mm long, on either side of it"
+            )
+        return DatumFeature("point", station - within_mm, station + within_mm, words)
 
     def _station(self, place: Place, at_end: bool) -> float:
         """The station of a place that a region begins or ends at: of the two of a trailing edge the one that it runs from or to."""
@@ -187,6 +225,7 @@ class Builder:
             math.nan if asked.nominal is None else asked.nominal,
             asked.expanded_uncertainty,
             datum=self._known_pose,
+            features=self._datum(getattr(asked, "datum", None)),
             filter=_filter(getattr(asked, "filter", None)),
             **told,
         )
@@ -202,7 +241,7 @@ def _is_run_itself(asked: AskedProfile) -> bool:
     """Whether a line-profile of the whole profile is what the run itself judges."""
     constant = asked.zone.stations_mm is None
     placed = asked.fit in ("none", "datum") or (asked.fit != "tolerance" and asked.is_all_free)
-    return constant and placed and asked.filter is None
+    return constant and placed and asked.filter is None and asked.datum is None
 
 
 def _freedoms(asked: AskedProfile) -> Freedoms:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from inspection import ZoneCertificate
 
 if TYPE_CHECKING:
-    from inspection import CharacteristicResult, ConsumptionCertificate, RigidTransform, WorstPlace
+    from inspection import CharacteristicResult, ConsumptionCertificate, FoundDatum, RigidTransform, WorstPlace
 
 
 def characteristic_json(found: "CharacteristicResult") -> dict[str, Any]:
@@ -36,6 +36,7 @@ def characteristic_json(found: "CharacteristicResult") -> dict[str, Any]:
         "pose": None if found.pose is None else pose_json(found.pose),
         "coverage": number(found.coverage),
         "largest_gap_mm": number(found.gap_mm),
+        "datum": None if found.datum is None else _datum(found.datum),
         "places": [{"name": name, "x_mm": x, "y_mm": y} for name, x, y in found.places_mm],
         "notes": list(found.notes),
         "certificate": certificate_json(found.certificate),
@@ -72,6 +73,22 @@ def certificate_json(proof: "ZoneCertificate | ConsumptionCertificate | None") -
         "finest_mm": number(proof.finest_mm),
         "words": proof.words,
     }
+
+
+def _datum(datum: "FoundDatum") -> list[dict[str, Any]]:
+    """The features that a part was placed by."""
+    return [
+        {
+            "kind": seen.feature.kind,
+            "words": seen.feature.words,
+            "from_mm": seen.feature.from_mm,
+            "to_mm": seen.feature.to_mm,
+            "points": seen.points,
+            "rms_mm": seen.rms_mm,
+            "largest_gap_mm": seen.gap_mm,
+        }
+        for seen in datum.seen
+    ]
 
 
 def pose_json(pose: "RigidTransform") -> dict[str, Any]:

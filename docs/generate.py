@@ -13,13 +13,13 @@ import drivers
 import inspection
 import simulators
 from cmmlink import deviations_csv, uncertainty_tables
+from cmmlink.comparison_keys import Compared
 from cmmlink.plan.reference import Group, groups_of, table
 from cmmlink.plan.scan import Plan
 from cmmlink.plan.surface import CtPlan
 from cmmlink.record import export
 from cmmlink.report import stack_folder
 from cmmlink.result_keys import (
-    Compared,
     Exported,
     Inspected,
     Measured,

@@ -46,8 +46,10 @@ if TYPE_CHECKING:
     from inspection.consumption_proof import certify_consumption
     from inspection.curve import NurbsCurve
     from inspection.curve_check import CurveCheck, Hollow, check_curve
+    from inspection.datum import DatumFeature, DatumFeatures, FoundDatum
     from inspection.difference import Course, Difference, difference_along
     from inspection.errors import InspectionError, NominalError, NotMeasured, RegistrationError
+    from inspection.evaluation.datum import check_datum
     from inspection.evaluation.evaluate import doubt_part, evaluate
     from inspection.evaluation.line_profile import zone_words
     from inspection.evaluation.region import FeatureName, Features, features_of, region_between, station_near
@@ -110,6 +112,7 @@ else:
         "inspection.conclusion": ("Missing", "Reason", "reasons_of_abort"),
         "inspection.consumption": ("fit_least_consumption",),
         "inspection.consumption_proof": ("certify_consumption",),
+        "inspection.datum": ("DatumFeature", "DatumFeatures", "FoundDatum"),
         "inspection.curve": ("NurbsCurve",),
         "inspection.curve_check": ("CurveCheck", "Hollow", "check_curve"),
         "inspection.difference": ("Course", "Difference", "difference_along"),
@@ -154,6 +157,7 @@ else:
             "doubt_part",
             "evaluate",
         ),
+        "inspection.evaluation.datum": ("check_datum",),
         "inspection.evaluation.line_profile": ("zone_words",),
         "inspection.evaluation.region": (
             "FeatureName",
@@ -198,6 +202,8 @@ __all__ = [
     "Course",
     "Crossing",
     "CurveCheck",
+    "DatumFeature",
+    "DatumFeatures",
     "DecisionRule",
     "DeviationUncertainty",
     "Deviations",
@@ -210,6 +216,7 @@ __all__ = [
     "FilterOrder",
     "FilteredProfile",
     "FitName",
+    "FoundDatum",
     "FreedomName",
     "Freedoms",
     "Gap",
@@ -276,6 +283,7 @@ __all__ = [
     "certify_consumption",
     "certify_minimum_zone",
     "check_curve",
+    "check_datum",
     "chord",
     "chord_angle",
     "compare_airfoil",

@@ -33,6 +33,7 @@ ReasonKind = Literal[
     "shift",
     "unseen",
     "no-value",
+    "datum",
 ]
 
 

@@ -20,16 +20,25 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inspection.datum import FoundDatum
 from inspection.freedoms import Freedoms
 from inspection.gaps import weigh_by_station
 from inspection.methods import WeightName
 from inspection.nominal import NominalProfile
 from inspection.rigid import RigidTransform
-from inspection.uncertainty import DeviationUncertainty, PartName, UncertaintyBudget, deviation_uncertainty, places_on, propagate
+from inspection.uncertainty import (
+    DeviationUncertainty,
+    PartName,
+    UncertaintyBudget,
+    deviation_uncertainty,
+    places_on,
+    propagate,
+    propagate_by,
+)
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
-Basis = Literal["the known pose", "any placement of the part", "the best fit of the points"]
+Basis = Literal["the known pose", "any placement of the part", "the best fit of the points", "the measured datum"]
 
 _ALONG, _AROUND = 512, 256  # places that stand for the profile, all along it and, where it bends, to a full turn
 _MOST_STATIONS = 200  # of a table for people
@@ -189,6 +198,29 @@ def uncertainty_at_fit(
         in_any_order, nominal, stated.budget, freedoms, fixed_mm=fixed_mm, tip_radius_mm=tip_radius_mm, weights=weights
     )
     return _along(found, stated, "the best fit of the points", float(np.hypot(*np.ptp(points_mm, axis=0))))
+
+
+def uncertainty_at_datum(nominal: NominalProfile, stated: StatedUncertainty, datum: FoundDatum, fixed_mm: ArrayLike) -> ProfileUncertainty:
+    """Uncertainty of deviations all along a profile that is placed by features that were measured: that of the datum's pose is in it.
+
+    fixed_mm : (2,) what stays where it is as the part grows, in nominal coordinates
+    """
+    rows = _samples_that_tell(nominal)
+    free = Freedoms.about(datum.pivot_mm)
+    there = places_on(nominal.station_mm[rows], nominal.points_mm[rows], nominal.outward * nominal.normal[rows], free)
+    fit = places_on(datum.station_mm, datum.at_mm, datum.normal, free)
+    found = propagate_by(datum.gain, fit, there, free, stated.budget, np.asarray(fixed_mm, dtype=np.float64))
+    return _along(found, stated, "the measured datum", nominal.size_mm)
+
+
+def pose_uncertainty(datum: FoundDatum, stated: StatedUncertainty, place_mm: ArrayLike, fixed_mm: ArrayLike) -> tuple[Array, Array]:
+    """Covariance (3, 3) of a measured datum's pose about a place (2,), mm and rad, and what known growth moves it by (3,)."""
+    about = Freedoms.about(place_mm)
+    lever = np.asarray(place_mm, dtype=np.float64) - datum.pivot_mm
+    carried = np.array([[1.0, 0.0, -lever[1]], [0.0, 1.0, lever[0]], [0.0, 0.0, 1.0]])  # motions about the pivot as motions about the place
+    fit = places_on(datum.station_mm, datum.at_mm, datum.normal, about)
+    found = propagate_by(carried @ datum.gain, fit, fit, about, stated.budget, np.asarray(fixed_mm, dtype=np.float64))
+    return found.covariance, found.grown * stated.budget.growth_left
 
 
 def _along(found: DeviationUncertainty, stated: StatedUncertainty, basis: Basis, size_mm: float) -> ProfileUncertainty:

@@ -172,7 +172,14 @@ def propagate(
     there : `fit` itself for the fitted points; the pose has followed the errors of these
     """
     reach = float(np.hypot(*(fit.at - free.pivot_mm).T).max(initial=0.0))
-    gain = _gain(fit.rates, shares, 1.0 / np.maximum(free.units_mm(reach), 1e-300))  # (k, m) amounts of the motions by deviations
+    gain = _gain(fit.rates, shares, 1.0 / np.maximum(free.units_mm(reach), 1e-300))
+    return propagate_by(gain, fit, there, free, budget, fixed_mm)
+
+
+def propagate_by(
+    gain: Array, fit: Places, there: Places, free: Freedoms, budget: UncertaintyBudget, fixed_mm: Array
+) -> DeviationUncertainty:
+    """The same where a unit of each of the m deviations moves the motions by amounts `gain` (k, m), however these are found."""
     parts, poses = {}, np.zeros((len(free), len(free)))
     for name, variance, pose in _parts(fit, there, gain, budget, fixed_mm):
         parts[name], poses = np.sqrt(np.maximum(variance, 0.0)), poses + pose

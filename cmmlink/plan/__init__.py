@@ -3,7 +3,7 @@
 TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer to load than all of this
 
 if TYPE_CHECKING:
-    from cmmlink.plan.characteristics import AskedCharacteristic, AskedFilter, AskedProfile, Place
+    from cmmlink.plan.characteristics import AskedCharacteristic, AskedDatum, AskedFilter, AskedProfile, Place
     from cmmlink.plan.cutters import CutterName
     from cmmlink.plan.deciding import PROFILE, Deciding
     from cmmlink.plan.own_maps import map_of
@@ -52,7 +52,7 @@ else:
             "place_of",
             "with_own_maps",
         ),
-        "cmmlink.plan.characteristics": ("AskedCharacteristic", "AskedFilter", "AskedProfile", "Place"),
+        "cmmlink.plan.characteristics": ("AskedCharacteristic", "AskedDatum", "AskedFilter", "AskedProfile", "Place"),
         "cmmlink.plan.cutters": ("CutterName",),
         "cmmlink.plan.stack_characteristics": ("AskedOfStack",),
         "cmmlink.plan.surface": ("CtPlan", "NominalAt", "load_ct_plan"),
@@ -65,6 +65,7 @@ else:
 __all__ = [
     "PROFILE",
     "AskedCharacteristic",
+    "AskedDatum",
     "AskedFilter",
     "AskedOfStack",
     "AskedProfile",

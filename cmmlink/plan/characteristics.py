@@ -25,7 +25,7 @@ from inspection import (
     Transition,
 )
 
-_ISO = re.compile(r"(?P<width>\d*\.?\d+)\s*(?:UZ\s*(?P<offset>[+-]?\d*\.?\d+))?", re.ASCII)
+_ISO = re.compile(r"(?P<width>\d*\.?\d+)\s*(?P<unequal>UZ\s*(?P<offset>[+-]?\d*\.?\d+)?)?", re.ASCII)
 _ASME = re.compile(r"(?P<width>\d*\.?\d+)\s*\(?U\)?\s*(?P<outward>\d*\.?\d+)", re.ASCII)
 
 LOWER = "the lower limit of the deviation from the nominal; null: no limit"
@@ -33,6 +33,7 @@ UPPER = "the upper limit of the deviation from the nominal; null: no limit"
 U = "the expanded uncertainty U (95 %), in the unit of the value, as in ISO 14253-1"
 NOMINAL = "the value of the drawing, from which the deviation is counted; null: that of the nominal section by the same method"
 _FILTER = "what the deviations go through after the fit; null: they are judged raw"
+_DATUM = "features of the part by which it is placed; null: the known pose, registration.datum"
 
 
 def _as_list(given: object) -> object:
@@ -58,6 +59,36 @@ class Place(Settings):
         return self
 
 
+class Stretch(Settings):
+    """A stretch of the profile, with rising stations."""
+
+    from_: Place = Field(alias="from", description="where it begins")
+    to: Place = Field(description="where it ends")
+
+
+class AskedDatum(Settings):
+    """What places the part: measured features of its own, which together fix all three motions."""
+
+    line: Stretch | None = Field(
+        default=None, description="a stretch of least squares over a rotation and a shift across it; its nominal need not be quite straight"
+    )
+    edge: Literal["LE", "TE"] | None = Field(default=None, description="an edge of an airfoil section, of least squares over both shifts")
+    points: tuple[Place, ...] = Field(
+        default=(), description="places at each of which the deviation is zero: beside a line or an edge one, else three"
+    )
+    within_mm: Positive | None = Field(
+        default=None,
+        description="how far along the profile to either side points count for an edge and for a point, the nearer ones more for a point; "
+        "null: a hundredth of the nominal's length for a point, three for an edge",
+    )
+
+    @model_validator(mode="after")
+    def _fixes_three(self) -> Self:
+        if 2 * (self.line is not None) + 2 * (self.edge is not None) + len(self.points) != 3:
+            raise ValueError("what fixes three motions: a line and one of points, an edge and one of points, or three points")
+        return self
+
+
 class ProfileZone(Settings):
     """The deviations allowed, positive out of material: by limits, by width and offset (ISO UZ, ASME circled U), or along stations."""
 
@@ -77,6 +108,8 @@ class ProfileZone(Settings):
         if not isinstance(given, str):
             return given
         if iso := _ISO.fullmatch(given.strip()):
+            if iso["unequal"] and iso["offset"] is None:
+                raise ValueError("how far the middle lies out of material, signed, after UZ, as in 0.06 UZ +0.01: ISO 1101 wants it there")
             return {"width_mm": iso["width"], "offset_mm": iso["offset"] or "0"}
         if asme := _ASME.fullmatch(given.strip()):
             return {"width_mm": asme["width"], "outward_mm": asme["outward"]}
@@ -148,6 +181,9 @@ class AskedProfile(_Named):
         description="where it is judged: none (where the run judges its points), datum, or at a fit of its region: best-fit, minimum-zone, "
         "or tolerance (the least consumption of its zone)",
     )
+    datum: AskedDatum | None = Field(
+        default=None, description="with fit datum, the features of the part by which it is placed; null: the known pose, registration.datum"
+    )
     free: tuple[FreedomName, ...] = Field(default=("x", "y", "rotation"), description="the motions that the fit may make")
     limits: Freed = Field(default=Freed(), description="how far the free motions may go from the datum")
     pivot_mm: tuple[float, float] = Field(default=(0.0, 0.0), description="what a rotation turns about, in the nominal's coordinates")
@@ -157,7 +193,8 @@ class AskedProfile(_Named):
     uncertainty_mm: float | None = Field(
         default=None,
         ge=0,
-        description="the expanded uncertainty U (95 %) of one deviation; null: that of the run, by tolerance or by the budget",
+        description="the expanded uncertainty U (95 %) of one deviation, with that of a measured datum; null: that of the run, by "
+        "tolerance or by the budget",
     )
 
     @model_validator(mode="after")
@@ -168,6 +205,8 @@ class AskedProfile(_Named):
             raise ValueError("either region, or from and to")
         if (self.within_mm is not None) != (self.region in ("LE", "TE")):
             raise ValueError("within_mm with region LE or TE, and with nothing else")
+        if self.datum is not None and self.fit != "datum":
+            raise ValueError(f"fit datum beside a datum, not fit {self.fit}")
         if self.zone.stations_mm is not None and self.fit == "minimum-zone":
             raise ValueError("fit tolerance for a zone that varies along the profile: a minimum zone has one width")
         return self
@@ -277,6 +316,7 @@ class ChordAngle(_OfOutline, InDeg):
 
     type: Literal["chord-angle"] = Field(description="the angle of the chord from the x axis, from leading to trailing edge; needs a datum")
     method: ChordAngleMethod = Field(default="nose-tail", description="by nose and tail, by the flat, or by the farthest two places")
+    datum: AskedDatum | None = Field(default=None, description=_DATUM)
 
 
 class Thickness(_OfOutline, InMm):
@@ -322,6 +362,7 @@ class Twist(_OfOutline, InDeg):
     method: Literal["best-fit", "nose-tail", "caliper", "maximum-distance"] = Field(
         default="best-fit", description="by the best fit of the whole outline, or by the chord angle of that name"
     )
+    datum: AskedDatum | None = Field(default=None, description=_DATUM)
 
 
 class Displacement(InMm):
@@ -333,6 +374,7 @@ class Displacement(InMm):
     place_mm: tuple[float, float] = Field(
         default=(0.0, 0.0), description="the place of the nominal that is looked at, like a stacking point"
     )
+    datum: AskedDatum | None = Field(default=None, description=_DATUM)
 
 
 AskedCharacteristic = Annotated[

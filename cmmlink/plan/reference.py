@@ -87,8 +87,8 @@ def _mappings(path: str, key: Mapping[str, Any], definitions: Mapping[str, Any])
             name = _definition(choice)
             kind = definitions[name]["properties"].get("type", {}).get("const") if several else None
             yield (f"{path} (type: {kind})" if kind else path), name
-        elif choice.get("type") == "array" and "$ref" in choice.get("items", {}):
-            yield f"{path}[]", _definition(choice["items"])
+        elif choice.get("type") == "array":
+            yield from _mappings(f"{path}[]", choice.get("items", {}), definitions)
         elif "$ref" in _values(choice):
             yield f"{path}.NAME", _definition(_values(choice))
 
@@ -127,8 +127,10 @@ def _list(choice: Mapping[str, Any], places: Mapping[str, str]) -> str:
     if "prefixItems" in choice:
         return f"a list of {len(choice['prefixItems'])} numbers"
     items: Mapping[str, Any] = choice.get("items", {})
-    if "$ref" in items:
-        return f"a list of mappings, see `{places[_definition(items)]}`"
+    kinds = [_definition(item) for item in _choices(items) if "$ref" in item]
+    if kinds:
+        see = f"`{places[kinds[0]]}`" if len(kinds) == 1 else f"`{places[kinds[0]].partition(' ')[0]}` of each type"
+        return f"a list of mappings, see {see}"
     return {"number": "a list of numbers", "string": "a list of texts", "array": "a list of lists"}.get(str(items.get("type")), "a list")
 
 

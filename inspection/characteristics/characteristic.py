@@ -11,6 +11,7 @@ from inspection.characteristics.error_fields import Sensitivities
 from inspection.characteristics.outline import AirfoilSection, Edge
 from inspection.characteristics.section_value import SectionValue, Unit
 from inspection.conclusion import Reason
+from inspection.datum import DatumFeatures, FoundDatum
 from inspection.filters import ProfileFilter
 from inspection.first_use import OnFirstUse
 from inspection.freedoms import Freedoms
@@ -68,6 +69,7 @@ class LineProfile:
                   consumption of the zone
     freedoms    : motions that the fit may make from where it starts; None frees all
     datum       : the known pose, from section to nominal, where fits with locked or limited freedoms start; None: the pose of the run
+    features    : with fit "datum", what the part is placed by where that is measured; None for a known pose
     filter      : acts on the deviations after the fit; None judges them raw
     rule        : what decides where a best fit is free: "minimum-zone" (any placement may pass), or "best-fit"
     region_words, zone_words : both as the user gave them, for reports
@@ -80,6 +82,7 @@ class LineProfile:
     fit: CharacteristicFit = "best-fit"
     freedoms: Freedoms | None = None
     datum: RigidTransform | None = None
+    features: DatumFeatures | None = None
     filter: ProfileFilter | None = None
     rule: RuleName = "minimum-zone"
     region_words: str = "whole profile"
@@ -97,6 +100,7 @@ class SectionCharacteristic:
     lower, upper : limits of the deviation, in the unit of the value; infinite where there is none
     uncertainty  : expanded uncertainty U of the value
     datum    : the known pose, from section to nominal, that angles and places are counted from; None where there is none
+    features : what the part is placed by, in place of a known pose
     filter   : the actual section is drawn from filtered deviations; None takes them raw
     """
 
@@ -113,6 +117,7 @@ class SectionCharacteristic:
     axis: Literal["total", "x", "y"] = "total"
     place_mm: tuple[float, float] = (0.0, 0.0)
     datum: RigidTransform | None = None
+    features: DatumFeatures | None = None
     filter: ProfileFilter | None = None
     section: AirfoilSection | None = None
     nominal: SectionValue | None = None
@@ -150,6 +155,7 @@ class CharacteristicResult:
     pose         : nominal from section, where it was judged; None where there was none
     coverage     : share of the region that was measured, and `gap_mm` the longest stretch of it without a point
     certificate  : what proves a minimum zone or a least consumption; None for other fits
+    datum        : the features that it was placed by, where these were measured
     places_mm    : places of a number of the section, for a drawing, with their names
     notes        : what the method had to assume
     """
@@ -179,6 +185,7 @@ class CharacteristicResult:
     coverage: float = float("nan")
     gap_mm: float = float("nan")
     certificate: ZoneCertificate | ConsumptionCertificate | None = None
+    datum: FoundDatum | None = None
     places_mm: tuple[tuple[str, float, float], ...] = ()
     notes: tuple[str, ...] = ()
 

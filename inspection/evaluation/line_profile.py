@@ -15,6 +15,7 @@ from inspection.characteristics.characteristic import CharacteristicResult, Line
 from inspection.cloud import MANY, row_blocks
 from inspection.conclusion import Conclusion, Reason, word_points
 from inspection.evaluation.basis import Basis, filter_deviations
+from inspection.evaluation.datum import UNSTATED
 from inspection.evaluation.placing import Placed, certify_run, consume_least, is_constant, place, place_so_far, shrink_zone
 from inspection.evaluation.region_uncertainty import uncertainty_of
 from inspection.gaps import Measured
@@ -159,7 +160,8 @@ def _result(
         coverage=measured.coverage,
         gap_mm=measured.gap.length_mm,
         certificate=placed.certificate,
-        notes=seen.notes,
+        datum=placed.datum,
+        notes=(*seen.notes, *([UNSTATED] if placed.datum is not None and not _u(asked) else [])),
     )
 
 
@@ -257,6 +259,8 @@ def _decide(
 ) -> tuple[Placed, _Seen, Verdict, Reason | None]:
     """The pose that decides and what was seen there; the verdict on the points, NONCONFORM only where it is proven, and its reason."""
     why = _why(asked, seen, basis.terms.zone.rule)
+    if asked.features is not None:
+        return placed, seen, *_judge_at_datum(asked, basis, few, placed, seen, why)
     if seen.verdict is not Verdict.NONCONFORM or placed.is_known:
         return placed, seen, seen.verdict, why
     if asked.filter is not None or (asked.rule == "best-fit" and asked.fit in ("best-fit", "none")):
@@ -268,6 +272,24 @@ def _decide(
             decided = replace(placed, pose=elsewhere, fit="minimum-zone" if is_constant(asked.zone) else "tolerance")
             return decided, at_elsewhere, at_elsewhere.verdict, _why(asked, at_elsewhere, basis.terms.zone.rule)
     return placed, seen, *_ask_every_placement(asked, basis, few, placed, why)
+
+
+def _judge_at_datum(
+    asked: LineProfile, basis: Basis, few: Rows, placed: Placed, seen: _Seen, why: Reason | None
+) -> tuple[Verdict, Reason | None]:
+    """The verdict of points at a datum that was measured. Without one, they are out where no placement at all brings them in."""
+    if placed.doubt is None and seen.verdict is Verdict.CONFORM:
+        return seen.verdict, why
+    if placed.doubt is None and seen.verdict is Verdict.NONCONFORM and basis.complete:
+        return seen.verdict, why
+    if asked.filter is None and len(few):
+        at_any = replace(asked, uncertainty_mm=basis.result.zone.uncertainty_mm)
+        if _ask_every_placement(at_any, basis, few, placed, None)[0] is Verdict.NONCONFORM:
+            return Verdict.NONCONFORM, Reason(
+                "out-of-tolerance", "No placement of the part brings its points into the zone: it fails at any datum."
+            )
+    unsettled = Reason("datum", "The scan did not come to its end: the points of the datum may not all be there.")
+    return Verdict.UNCERTAIN, placed.doubt or (unsettled if seen.verdict is Verdict.NONCONFORM else why)
 
 
 def _smallest(asked: LineProfile, basis: Basis, few: Rows, start: RigidTransform) -> RigidTransform:

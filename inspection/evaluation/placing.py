@@ -11,9 +11,13 @@ from numpy.typing import NDArray
 
 from inspection.certificate import certify_minimum_zone
 from inspection.characteristics.characteristic import LineProfile
+from inspection.conclusion import Reason
 from inspection.consumption import fit_least_consumption
 from inspection.consumption_proof import certify_consumption
+from inspection.datum import DatumFeatures, FoundDatum
+from inspection.errors import InspectionError
 from inspection.evaluation.basis import Basis
+from inspection.evaluation.datum import datum_of
 from inspection.freedoms import Freedoms
 from inspection.limited_fit import register_within
 from inspection.minimum_zone import MinimumZone, fit_minimum_zone
@@ -44,6 +48,8 @@ class Placed:
     is_free     : the fit could make every motion
     converged   : the fit settled
     certificate : of a minimum zone or a least consumption over every placement; its rows are those of the run
+    datum       : the features that the part was placed by, where these were measured
+    doubt       : why the pose decides nothing, where it does not: the datum that was asked for was not found
     """
 
     pose: RigidTransform
@@ -52,10 +58,14 @@ class Placed:
     is_free: bool = False
     converged: bool = True
     certificate: ZoneCertificate | ConsumptionCertificate | None = None
+    datum: FoundDatum | None = None
+    doubt: Reason | None = None
 
 
 def place(asked: LineProfile, basis: Basis, every: Rows, rows: Rows) -> Placed:
     """Find the pose of a characteristic from all rows of its region, and from those (k,) of them that tell how far they go."""
+    if asked.features is not None:
+        return _place_by(asked.features, basis)
     if asked.fit == "none" or len(rows) < _FEWEST_POINTS:
         return Placed(basis.pose, "none", is_known=basis.terms.known_pose is not None)
     start = basis.pose if asked.datum is None else asked.datum
@@ -91,6 +101,16 @@ def place(asked: LineProfile, basis: Basis, every: Rows, rows: Rows) -> Placed:
     gap_mm = float(asked.zone.upper_mm[0] - asked.zone.lower_mm[0]) * (_GAP_SHARE if asked.region is None else _GAP_SHARE_REGION)
     certificate = _certify(basis, points, best.registration, middle_of(asked.zone, basis, rows), gap_mm)
     return Placed(certificate.nominal_from_section.snap_to_grid(), words, False, True, certificate.balanced, _in_run(certificate, rows))
+
+
+def _place_by(features: DatumFeatures, basis: Basis) -> Placed:
+    """The pose of a datum that is measured; where there is none that of the run, at which nothing is decided."""
+    words = f"datum: {features.words}"
+    try:
+        datum = datum_of(features, basis)
+    except InspectionError as error:
+        return Placed(basis.pose, words, doubt=Reason("datum", str(error)))
+    return Placed(datum.pose, words, datum=datum)
 
 
 def place_so_far(asked: LineProfile, basis: Basis, rows: Rows) -> Placed:

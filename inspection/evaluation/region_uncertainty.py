@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from inspection.characteristics.characteristic import LineProfile
 from inspection.evaluation.basis import Basis
+from inspection.evaluation.datum import uncertainty_at
 from inspection.evaluation.placing import Placed
 from inspection.evaluation.region import is_inside
 from inspection.profile_uncertainty import ProfileUncertainty, StatedUncertainty, uncertainty_along, uncertainty_at_fit
@@ -27,6 +28,8 @@ def uncertainty_of(asked: LineProfile, basis: Basis, few: Rows, placed: Placed) 
     """
     if asked.uncertainty_mm is not None:
         return asked.uncertainty_mm
+    if placed.datum is not None:
+        return uncertainty_at(placed.datum, asked, basis)
     known_before = basis.terms.uncertainty
     if known_before is None:
         return basis.result.zone.uncertainty_mm

@@ -30,8 +30,10 @@ from inspection.characteristics.placement import displacement, twist_by_fit
 from inspection.characteristics.section_value import SectionValue, angle_within_half_a_turn, no_places
 from inspection.characteristics.thickness import EdgeThicknessMethod, ThicknessMethod, edge_thickness, maximum_thickness
 from inspection.conclusion import Reason
+from inspection.datum import FoundDatum
 from inspection.errors import InspectionError
 from inspection.evaluation.basis import Basis, filter_deviations
+from inspection.evaluation.datum import UNSTATED, datum_of, fixed_place
 from inspection.evaluation.region import features_of, region_around
 from inspection.evaluation.value_uncertainty import LINEARISED, OF_POSE, uncertainty_of_placing, uncertainty_of_value
 from inspection.filters import ProfileFilter
@@ -39,6 +41,7 @@ from inspection.first_use import OnFirstUse
 from inspection.freedoms import Freedoms
 from inspection.gaps import Measured
 from inspection.limited_fit import register_within
+from inspection.profile_uncertainty import pose_uncertainty
 from inspection.registration import Registration
 from inspection.rigid import RigidTransform
 from inspection.signed_deviations import deviations
@@ -181,15 +184,22 @@ def judge_value(asked: SectionCharacteristic, basis: Basis, outlines: ActualOutl
     nominal = asked.nominal
     assert nominal is not None
     by_budget = basis.terms.uncertainty is not None and not asked.uncertainty
+    measured_datum: FoundDatum | None = None
     try:
+        if asked.features is not None:
+            measured_datum = datum_of(asked.features, basis)
+            asked = replace(asked, datum=measured_datum.pose)
         if asked.type in PLACED and asked.datum is None:
             raise InspectionError(_NO_DATUM)
         value, actual = _find(asked, basis, outlines)
-        asked = replace(asked, uncertainty=_uncertainty(asked, basis, outlines, value, actual))
+        by_datum = _uncertainty_of_datum(asked, basis, measured_datum) if by_budget and measured_datum is not None else 0.0
+        asked = replace(asked, uncertainty=_uncertainty(asked, basis, outlines, value, actual) + by_datum)
     except InspectionError as error:
         conclusion = basis.conclude(Verdict.UNCERTAIN, Reason("no-value", _sentence(str(error))), basis.measured(None), basis.result.judged)
         return replace(_bare(asked, nominal, basis), verdict=conclusion.verdict, reasons=conclusion.reasons)
     how = (LINEARISED if actual is not None else OF_POSE,) if by_budget else ()
+    if measured_datum is not None and not asked.uncertainty:
+        how = (*how, UNSTATED)
     deviation = value.value - asked.nominal_value
     deviation = angle_within_half_a_turn(deviation) if nominal.unit == "deg" else deviation
     measured = _measured(asked, basis, value, actual)
@@ -208,6 +218,7 @@ def judge_value(asked: SectionCharacteristic, basis: Basis, outlines: ActualOutl
         pose=basis.pose,
         coverage=measured.coverage,
         gap_mm=measured.gap.length_mm,
+        datum=measured_datum,
         places_mm=places,
         notes=(*value.notes, *(actual.notes[:1] if actual is not None else ()), *_words_of_drawing(drawing, nominal.unit), *how),
     )
@@ -231,7 +242,7 @@ def _bare(asked: SectionCharacteristic, nominal: SectionValue, basis: Basis) -> 
         rule=decision_words(basis.terms.zone.rule, asked.uncertainty, asked.upper - asked.lower, nominal.unit),
         verdict=Verdict.UNCERTAIN,
         reasons=(),
-        fit="datum" if placed else "none",
+        fit="none" if not placed else "datum" if asked.features is None else f"datum: {asked.features.words}",
         filter=asked.filter.words if asked.filter else "none",
         region_words=f"{asked.edge} edge" if asked.type in ("edge-radius", "edge-thickness") else "whole profile",
     )
@@ -289,6 +300,18 @@ def _uncertainty(
         return uncertainty_of_placing(asked, basis, outlines.best_fit().nominal_from_section, along, stated)
     is_known = asked.type in PLACED or basis.terms.known_pose is not None
     return uncertainty_of_value(asked.sensitivities.value, is_known, basis, actual, stated)
+
+
+def _uncertainty_of_datum(asked: SectionCharacteristic, basis: Basis, datum: FoundDatum) -> float:
+    """What a measured datum adds to U of an angle or a place, by the budget of the run."""
+    assert basis.terms.uncertainty is not None
+    stated = basis.terms.uncertainty.stated
+    covariance, left = pose_uncertainty(datum, stated, asked.place_mm, fixed_place(stated, datum))
+    if asked.type != "displacement":
+        return math.degrees(stated.coverage_factor * math.sqrt(covariance[2, 2]) + abs(float(left[2])))
+    axis = _AXES[asked.axis]
+    variance = float(np.linalg.eigvalsh(covariance[:2, :2]).max()) if asked.axis == "total" else float(covariance[axis, axis])
+    return stated.coverage_factor * math.sqrt(max(variance, 0.0)) + float(np.hypot(*left[:2]))
 
 
 def _measured(asked: SectionCharacteristic, basis: Basis, value: SectionValue, actual: ActualSection | None) -> Measured:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from pypdf import PdfReader
 
+from cmmlink.comparison_keys import Compared
 from cmmlink.record.store import FILE_NAME
-from cmmlink.result_keys import Compared
 from tests.cmmlink.command import cmmlink
 from tests.cmmlink.commands.oval_files import TOLERANCE
 from tests.cmmlink.oval_part import oval_points, write_nominal, write_points

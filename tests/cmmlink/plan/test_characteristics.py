@@ -160,3 +160,30 @@ def test_a_zone_that_varies_judges_the_points_as_they_arrive_by_its_envelope() -
     limits: dict[str, Any] = {"stations_mm": [0, 5], "lower_mm": [-0.1, -0.3], "upper_mm": [0.2, 0.1]}
     plan = read(HEAD + f"characteristics:\n  - {{name: a, type: line-profile, fit: tolerance, zone: {limits}}}\n")
     assert (plan.zone.lower_mm, plan.zone.upper_mm) == (-0.3, 0.2)
+
+
+def datum_of(spelled: str) -> AskedProfile:
+    asked = read(HEAD + f"{TOLERANCE}characteristics:\n  - {{name: a, type: line-profile, zone: 0.1, {spelled}}}\n").characteristics[0]
+    assert isinstance(asked, AskedProfile)
+    return asked
+
+
+def test_a_datum_is_a_line_or_an_edge_and_a_point_or_three_points() -> None:
+    asked = datum_of("fit: datum, datum: {line: {from: {station_mm: 20}, to: {feature: LE, offset_mm: -9}}, points: [{feature: LE}]}")
+    assert asked.datum is not None
+    assert asked.datum.line is not None
+    assert asked.datum.line.to.offset_mm == -9
+    assert datum_of("fit: datum, datum: {edge: LE, points: [{near: [80, 3]}]}").datum is not None
+    assert datum_of("fit: datum, datum: {points: [{station_mm: 10}, {station_mm: 60}, {feature: LE}]}").datum is not None
+    for wrong in ("{points: [{feature: LE}]}", "{edge: LE}", "{line: {from: {station_mm: 1}, to: {station_mm: 9}}, edge: LE}", "{}"):
+        with pytest.raises(ValueError, match="what fixes three motions: a line and one of points"):
+            datum_of(f"fit: datum, datum: {wrong}")
+    with pytest.raises(ValueError, match="fit datum beside a datum, not fit none"):
+        datum_of("fit: none, datum: {edge: LE, points: [{near: [80, 3]}]}")
+
+
+def test_an_unequal_zone_needs_its_offset_as_the_standard_has_it() -> None:
+    assert zone_of("0.06").limits == ((-0.03,), (0.03,))
+    for spelled in ("0.06 UZ", "0.06UZ"):
+        with pytest.raises(ValueError, match=r"signed, after UZ, as in 0.06 UZ \+0.01"):
+            zone_of(spelled)

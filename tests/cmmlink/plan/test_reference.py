@@ -54,6 +54,13 @@ def test_every_kind_of_device_has_its_group() -> None:
     assert len(paths) == len(set(paths))
 
 
+def test_every_type_of_characteristic_has_its_group() -> None:
+    paths = {group.path for group in groups_of(CtPlan)}
+    assert {"characteristics[] (type: line-profile)", "characteristics[] (type: chord)", "characteristics[].datum.line"} <= paths
+    assert "stack_characteristics[] (type: bow)" in paths
+    assert keys_of(Plan)[": characteristics"].takes == "a list of mappings, see `characteristics[]` of each type"
+
+
 @pytest.mark.parametrize("model", [Plan, CtPlan, RegisterMap])
 def test_every_key_and_every_mapping_is_explained(model: type[BaseModel]) -> None:
     assert [path for path, key in keys_of(model).items() if not key.meaning] == []

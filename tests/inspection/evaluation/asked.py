@@ -26,6 +26,7 @@ from inspection import (
     find_airfoil,
     with_nominal,
 )
+from inspection.datum import DatumFeature, DatumFeatures
 from inspection.evaluation.region import features_of
 from tests.inspection import profiles
 from tests.inspection.profiles import Array
@@ -42,6 +43,17 @@ def nominal() -> NominalProfile:
 
 def even(lower: float, upper: float) -> VaryingZone:
     return VaryingZone.constant(lower, upper, nominal().length_mm, nominal().curve.closed)
+
+
+def point(station: float) -> DatumFeature:
+    return DatumFeature("point", station - 3.0, station + 3.0, f"point at station {station:g} mm")
+
+
+@cache
+def by_features() -> DatumFeatures:
+    """A line along the rear of one side, and the nose: what is measured of a part to place it."""
+    nose = features_of(nominal()).nose
+    return DatumFeatures((DatumFeature("line", 20.0, 70.0, "line station 20 .. 70 mm"), point(nose)))
 
 
 def value(name: str, type_: Any, method: str, limit: float = LIMIT, **told: Any) -> SectionCharacteristic:
@@ -63,6 +75,7 @@ def every_type() -> tuple[Characteristic, ...]:
         WholeProfile("profile"),
         LineProfile("flank at the pose of the run", even(-LIMIT, LIMIT), region=flank, fit="none"),
         LineProfile("location", even(-LIMIT, LIMIT), fit="datum", datum=DATUM),
+        LineProfile("at its own datum", even(-LIMIT, LIMIT), fit="datum", features=by_features()),
         LineProfile("flank", even(-LIMIT, LIMIT), region=flank, fit="best-fit"),
         LineProfile("filtered", even(-LIMIT, LIMIT), fit="best-fit", filter=ProfileFilter(3.0), rule="best-fit"),
         LineProfile("edge", even(-LIMIT, LIMIT), region=features.edge("LE", 20.0), fit="minimum-zone"),
@@ -77,6 +90,7 @@ def every_type() -> tuple[Characteristic, ...]:
         value("camber", "camber", "inscribed", 0.15),
         value("twist", "twist", "best-fit", 0.1),
         value("displacement", "displacement", "best-fit", 0.1),
+        value("twist of its own datum", "twist", "best-fit", 0.1, features=by_features()),
     )
 
 
