@@ -22,7 +22,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--baud-rate", type=int, default=115_200)
     group.addoption("--parity", default="N", choices=["N", "E", "O"])
     group = parser.getgroup("damage", "tests/cmmlink/record/test_damage.py")
-    group.addoption("--damages", type=int, default=12, metavar="N", help="kinds of damage to the records to try (default 12)")
+    group.addoption("--damages", type=int, default=8, metavar="N", help="kinds of damage to the records to try (default 8)")
     group = parser.getgroup("browser", "tests/cmmlink/console in Chromium")
     group.addoption("--require-browser", action="store_true", help="fail where the tests in a browser would be skipped")
     group.addoption("--require-open3d", action="store_true", help="fail where the tests with Open3D would be skipped")
@@ -56,9 +56,9 @@ def _preparations_made_once() -> Iterator[None]:
     if "cmmlink.run" not in sys.modules:  # no test that was collected runs anything
         yield
         return
-    from tests.cmmlink.prepared import preparations_made_once
+    from tests.cmmlink.prepared import pictures_drawn_here, preparations_made_once
 
-    with preparations_made_once():
+    with preparations_made_once(), pictures_drawn_here():
         yield
 
 

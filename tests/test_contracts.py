@@ -11,6 +11,7 @@ import textwrap
 import tomllib
 from collections import Counter
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -61,6 +62,7 @@ def tracked() -> list[Path]:
     return [path.relative_to(ROOT) for path in ROOT.rglob("*") if path.is_file() and ".venv" not in path.parts]
 
 
+@cache
 def imported_by(path: Path) -> set[str]:
     """Top-level names of the modules that a file imports anywhere in it."""
     nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))

@@ -28,3 +28,10 @@ def preparations_made_once() -> Iterator[None]:
 
     with patch("cmmlink.from_plan.discretize", discretize_once), patch("cmmlink.run.rehearse", rehearse_once):
         yield
+
+
+@contextmanager
+def pictures_drawn_here() -> Iterator[None]:
+    """Let `cmmlink inspect` draw its pictures in this process, which loads what draws them once; another process has tests of its own."""
+    with patch("cmmlink.report.processes_here", lambda: 0):
+        yield

@@ -22,7 +22,7 @@ from inspection.cloud import row_blocks
 from inspection.kernels import PoseFit, judge_rows
 from tests.cmmlink.recorded import small_plan, small_profile, today
 
-COUNTS = (1_000, 10_000, 100_000)
+COUNTS = (600, 6_000, 60_000)
 IN_PIECES = ("cloud", "far_points", "gaps", "prefix", "result", "scan_rows", "settled", "station_order")
 STEPS_APART = 1.6  # a fit may take some steps more of other points; work that grows faster than its points is beyond this after two decades
 

@@ -20,7 +20,7 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy of what the page adds files to; the rest stays where it is, or the inspection would be compiled anew."""
     tree = tmp_path_factory.mktemp("tree")
     for name in COPIED:
-        shutil.copytree(ROOT / name, tree / name, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(ROOT / name, tree / name, ignore=shutil.ignore_patterns("node_modules", "corpus"))
     shutil.copy(ROOT / "pyproject.toml", tree)
     for name, text in FILES.items():
         assert not (tree / name).exists()

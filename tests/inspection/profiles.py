@@ -162,7 +162,7 @@ EVERY: dict[str, Callable[[], NurbsCurve]] = {
     "SC(2)-0714": lambda: airfoil("sc20714"),
 }
 FILES = ("ag35", "clarky", "dae11", "e387", "fx63137", "goe227", "goe404", "mh42", "naca65410", "rae2822", "s1223_hires", "sc20714")
-SECTIONS = tuple(f"{camber}{thickness:02d}" for camber in ("00", "24", "44", "65") for thickness in (6, 9, 12, 15, 21))
+SECTIONS = tuple(f"{camber}{thickness:02d}" for camber in ("00", "24", "65") for thickness in (6, 9, 21))
 
 
 @cache

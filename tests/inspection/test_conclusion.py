@@ -74,7 +74,7 @@ def test_a_defect_whose_points_are_missing_never_conforms(name: str, loss: str) 
     assert inspect(name, narrow[seen], missing, allow_unseen_mm=0.5).verdict is Verdict.UNCERTAIN
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(
     name=st.sampled_from(NAMES),
     seed=st.integers(0, 5),
@@ -95,7 +95,7 @@ def test_what_is_said_to_be_missing_never_improves_a_verdict(
         assert with_them.verdict is not Verdict.CONFORM
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(name=st.sampled_from(NAMES), seed=st.integers(0, 5), kept=st.integers(8, 600), first=st.integers(0, 599))
 def test_silently_absent_points_hide_at_most_the_gap_that_is_stated(name: str, seed: int, kept: int, first: int) -> None:
     points, _ = scan(name, seed, count=600)
@@ -110,7 +110,7 @@ def test_silently_absent_points_hide_at_most_the_gap_that_is_stated(name: str, s
 # ---- law II: order, density and batches change nothing
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(
     name=st.sampled_from(NAMES),
     seed=st.integers(0, 5),

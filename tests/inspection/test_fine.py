@@ -54,9 +54,9 @@ def test_the_way_points_are_ordered_or_the_profile_is_travelled_does_not_matter(
 @pytest.mark.parametrize("name", [*ASYMMETRIC, "stadium"])
 def test_fine_registration_is_the_least_squares_optimum(name: str) -> None:
     curve, nominal = curve_of(name), nominal_of(name)
-    u = profiles.even_in_arc_length(curve, 300)
+    u = profiles.even_in_arc_length(curve, 150)
     s = curve.station_mm(u) / curve.length_mm
-    form = 0.03 * np.sin(2 * np.pi * (3 * s + 0.1)) + 0.02 * np.cos(2 * np.pi * 5 * s) + np.random.default_rng(7).normal(0, 0.01, 300)
+    form = 0.03 * np.sin(2 * np.pi * (3 * s + 0.1)) + 0.02 * np.cos(2 * np.pi * 5 * s) + np.random.default_rng(7).normal(0, 0.01, 150)
     truth = profiles.offset_points(curve, u, form)
     best, rms = optimum(curve, truth)
     points = profiles.rotated(truth, 92.0, (12.0, -7.0))
@@ -68,7 +68,7 @@ def test_fine_registration_is_the_least_squares_optimum(name: str) -> None:
     assert found.rms_mm == pytest.approx(rms, abs=1e-12)
     # no nearby pose is better, by the oracle's distances
     rng, place = np.random.default_rng(8), found.nominal_from_section.apply(points)
-    for step in rng.normal(0, 1, (8, 3)) * 10.0 ** -rng.uniform(2, 4, (8, 1)):
+    for step in rng.normal(0, 1, (4, 3)) * 10.0 ** -rng.uniform(2, 4, (4, 1)):
         other = profiles.rotated(place, step[2]) + step[:2]
         assert np.sqrt(np.mean(closest_point(curve, other).left_mm ** 2)) > found.rms_mm
 
@@ -241,12 +241,12 @@ def test_forty_percent_of_a_profile_is_found_in_either_direction(name: str) -> N
 @pytest.mark.parametrize("name", ["P1", "P3", "GOE404", "NACA 2412 sharp"])
 def test_robust_registration_finds_outliers_and_fits_the_others(name: str) -> None:
     curve, nominal, rng = curve_of(name), nominal_of(name), np.random.default_rng(40)
-    u = profiles.even_in_arc_length(curve, 800)
-    form = 0.02 * np.sin(8 * np.pi * curve.station_mm(u) / curve.length_mm) + rng.normal(0, 0.005, 800)
+    u = profiles.even_in_arc_length(curve, 400)
+    form = 0.02 * np.sin(8 * np.pi * curve.station_mm(u) / curve.length_mm) + rng.normal(0, 0.005, 400)
     truth = profiles.offset_points(curve, u, form)
-    bad = np.zeros(800, dtype=bool)
-    bad[rng.choice(np.arange(10, 790), 80, replace=False)] = True
-    truth[bad] += rng.choice([-1.0, 1.0], (80, 1)) * rng.uniform(0.4, 3.0, (80, 1)) * profiles.left_normal(curve, u)[bad]
+    bad = np.zeros(400, dtype=bool)
+    bad[rng.choice(np.arange(10, 390), 40, replace=False)] = True
+    truth[bad] += rng.choice([-1.0, 1.0], (40, 1)) * rng.uniform(0.4, 3.0, (40, 1)) * profiles.left_normal(curve, u)[bad]
     points = profiles.rotated(truth, 200.0, (9.0, 9.0))
     found = register(points, nominal, robust=True)
     # thrown through a thin edge a point may come to lie on the other side

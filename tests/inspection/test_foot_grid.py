@@ -76,7 +76,7 @@ class Neighbourhood:
 def test_a_cell_names_where_the_closest_point_lies_or_a_search_is_made(name: str) -> None:
     # A foot on a named piece or beside it is taken without a search; where a named piece has none the whole curve is searched.
     curve = curve_of(name)
-    grid, near, places = build_foot_grid(curve), Neighbourhood(curve), places_around(name, 150)
+    grid, near, places = build_foot_grid(curve), Neighbourhood(curve), places_around(name, 50)
     lists = grid.integers[grid.integers[layout.LISTS_AT] :]
     truth, directly, claimed = closest_point(curve, places), 0, 0
     for place, held, u, gap in zip(places, cell_contents(grid, places).tolist(), truth.parameter.tolist(), truth.gap_mm, strict=True):

@@ -109,8 +109,7 @@ def test_straight_parts_have_poles_at_infinity_and_true_deviations(method: Metho
 # ---- coverage below 98 %
 
 
-@pytest.mark.parametrize("backwards", [False, True])
-@pytest.mark.parametrize("coverage", [0.9, 0.6, 0.4])
+@pytest.mark.parametrize(("coverage", "backwards"), [(0.9, False), (0.6, True), (0.4, False)])
 @pytest.mark.parametrize("name", ["P1", "P2", "P3", "NACA 2412 sharp"])
 def test_a_part_of_the_profile_is_enough(name: str, coverage: float, backwards: bool) -> None:
     nominal = nominal_of(name)

@@ -48,7 +48,7 @@ def everything(result: InspectionResult | str) -> list[object]:
     return [*(array.tobytes() for array in arrays), *told, repr(numbers), repr(result.registration.nominal_from_section)]
 
 
-@settings(deadline=None, max_examples=8)
+@settings(deadline=None, max_examples=5)
 @given(
     st.sampled_from(KINDS),
     st.integers(0, 20),

@@ -156,7 +156,7 @@ def test_no_station_is_less_certain_than_the_u_that_judged(way: tuple[FitName, R
 def test_a_larger_uncertainty_never_makes_a_verdict_more_certain(way: tuple[FitName, RuleName, WeightName], measured: str) -> None:
     for scale in (0.9, 1.25):
         before: InspectionResult | None = None
-        for factor in (0.0, 1.0, 3.0, 9.0):
+        for factor in (0.0, 1.0, 9.0):
             budget = replace(SOME, **{name: factor * getattr(SOME, name) for name in ("repeatability_mm", "mpe_mm", "tip_radius_mm")})
             found = judge(measured, budget, *way, scale)
             if before is not None:

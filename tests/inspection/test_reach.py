@@ -37,7 +37,7 @@ def walks(nominal: NominalProfile, count: int, near: bool) -> tuple[Array, Array
 @pytest.mark.parametrize("near", [True, False])
 def test_no_foot_leaves_its_reach(name: str, near: bool) -> None:
     nominal = discretize(CURVES[name](), samples=500)
-    places, moves, moved = walks(nominal, 20_000, near)
+    places, moves, moved = walks(nominal, 5_000, near)
     found = StationReach(nominal.curve).stretches(places, project(places, nominal.grid), moves)
     foot = project(moved, nominal.grid).station_mm
     turns = (-1, 0, 1) if nominal.curve.closed else (0,)

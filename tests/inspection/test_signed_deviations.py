@@ -57,9 +57,9 @@ def assert_exact(found: Deviations, truth: Closest, points: Array, nominal: Nomi
 def test_exact_is_the_globally_closest_point_within_the_band(name: str) -> None:
     rng = np.random.default_rng(11)
     u = np.concatenate(
-        [profiles.inner_parameters(curve_of(name), 250, rng, 1e-5), profiles.inner_parameters(curve_of(name), 150, rng, 1e-5)]
+        [profiles.inner_parameters(curve_of(name), 100, rng, 1e-5), profiles.inner_parameters(curve_of(name), 60, rng, 1e-5)]
     )
-    offset = np.concatenate([rng.normal(0, 0.05, 250), rng.uniform(-1, 1, 150)])
+    offset = np.concatenate([rng.normal(0, 0.05, 100), rng.uniform(-1, 1, 60)])
     points = profiles.offset_points(curve_of(name), u, offset)
     truth = closest_point(curve_of(name), points)
     for material in get_args(Material):
@@ -71,7 +71,7 @@ def test_exact_is_the_globally_closest_point_within_the_band(name: str) -> None:
 def test_exact_is_the_globally_closest_point_far_off_and_across_the_medial_axis(name: str) -> None:
     nominal, rng = nominal_of(name), np.random.default_rng(12)
     box = curve_of(name).point(np.linspace(*curve_of(name).domain, 500))
-    points = rng.uniform(box.min(axis=0) - 10, box.max(axis=0) + 10, (400, 2))
+    points = rng.uniform(box.min(axis=0) - 10, box.max(axis=0) + 10, (150, 2))
     points[:5] += 500.0
     assert_exact(deviations(points, nominal), closest_point(curve_of(name), points), points, nominal)
 
@@ -80,10 +80,10 @@ def test_exact_is_the_globally_closest_point_far_off_and_across_the_medial_axis(
 def test_exact_finds_the_right_branch_at_a_thin_trailing_edge(name: str) -> None:
     curve, nominal, rng = curve_of(name), nominal_of(name, 10_000), np.random.default_rng(13)
     first, last = curve.domain
-    near = np.concatenate([first + 0.03 * rng.uniform(0, 1, 200) ** 2, last - 0.03 * rng.uniform(0, 1, 200) ** 2])
-    points = profiles.offset_points(curve, near, rng.normal(0, 0.3, 400))
+    near = np.concatenate([first + 0.03 * rng.uniform(0, 1, 80) ** 2, last - 0.03 * rng.uniform(0, 1, 80) ** 2])
+    points = profiles.offset_points(curve, near, rng.normal(0, 0.3, 160))
     edge = curve.point(np.array([first]))[0]
-    points = np.vstack([points, edge + rng.normal(0, 0.2, (100, 2))])
+    points = np.vstack([points, edge + rng.normal(0, 0.2, (40, 2))])
     assert_exact(deviations(points, nominal), closest_point(curve, points), points, nominal)
 
 
@@ -105,8 +105,8 @@ def test_exact_holds_where_the_curvature_jumps(samples: int) -> None:
         )
         knot, rng = curve.knots[3], np.random.default_rng(seed)
         radius = 1 / np.abs(curve.curvature(np.array([np.nextafter(knot, 0), knot]))).max()
-        u = np.clip(knot + rng.normal(0, 3 / samples, 400), 0.001, 0.999)
-        points = profiles.offset_points(curve, u, rng.uniform(-1.3, 1.3, 400) * min(radius, 3.0))
+        u = np.clip(knot + rng.normal(0, 3 / samples, 150), 0.001, 0.999)
+        points = profiles.offset_points(curve, u, rng.uniform(-1.3, 1.3, 150) * min(radius, 3.0))
         nominal = discretize(curve, samples=samples, step_min=1 / samples)
         assert_exact(deviations(points, nominal), closest_point(curve, points), points, nominal)
 

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from unittest.mock import patch
 
 import numpy as np
@@ -37,6 +37,19 @@ def demonstration(folder: Path, *options: str) -> tuple[int, dict[str, Any]]:
     return ended.code, ended.json()
 
 
+class Sound(NamedTuple):
+    """A demonstration without a defect: its folder, and its exit code and JSON object."""
+
+    folder: Path
+    ended: tuple[int, dict[str, Any]]
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory: pytest.TempPathFactory) -> Sound:
+    folder = tmp_path_factory.mktemp("sound")
+    return Sound(folder, demonstration(folder))
+
+
 def judged_points(folder: Path) -> NDArray[np.float64]:
     """Stations and deviations (m, 2) of deviations.csv, in the order of the scan."""
     with (folder / "deviations.csv").open(newline="", encoding="utf-8") as file:
@@ -58,12 +71,12 @@ def has_the_defect(code: int, facts: dict[str, Any]) -> None:
     assert facts["worst"]["deviation_mm"] == pytest.approx(0.12, abs=0.01)
 
 
-def test_the_demonstration_conforms_and_finds_a_defect_where_and_as_high_as_it_was_made(tmp_path: Path) -> None:
-    conforms(*demonstration(tmp_path / "sound"))
+def test_the_demonstration_conforms_and_finds_a_defect_where_and_as_high_as_it_was_made(sound: Sound, tmp_path: Path) -> None:
+    conforms(*sound.ended)
     has_the_defect(*demonstration(tmp_path / "bad", "--defect", "0.12@40"))
 
     # The same seed is the same part but for the defect: what differs is the bump alone.
-    without, with_defect = judged_points(tmp_path / "sound"), judged_points(tmp_path / "bad")
+    without, with_defect = judged_points(sound.folder), judged_points(tmp_path / "bad")
     assert len(without) == len(with_defect) == POINTS
     bump = with_defect[:, 1] - without[:, 1]
     assert bump.max() == pytest.approx(0.12, abs=0.002)
@@ -72,18 +85,19 @@ def test_the_demonstration_conforms_and_finds_a_defect_where_and_as_high_as_it_w
     assert elsewhere.max() < 0.004  # the best fit yields to the bump by micrometres, most at the edge
 
 
-def test_another_seed_is_another_part_in_another_place(tmp_path: Path) -> None:
-    (code_2, two), (code_3, three) = (demonstration(tmp_path / seed, "--seed", seed) for seed in ("2", "3"))
-    assert (code_2, code_3) == (0, 0)
-    # Seed n lies turned by 37 + 11 n degrees on the simulated machine, at (210, 145) mm.
-    for seed, facts in ((2, two), (3, three)):
+def test_another_seed_is_another_part_in_another_place(sound: Sound, tmp_path: Path) -> None:
+    _, one = sound.ended
+    code, three = demonstration(tmp_path, "--seed", "3")
+    assert code == 0
+    # Seed n lies turned by 37 + 11 n degrees on the simulated machine, at (210, 145) mm; what is given no seed has the first.
+    for seed, facts in ((1, one), (3, three)):
         turned = -np.radians(37 + 11 * seed)
         at = np.array([[np.cos(turned), -np.sin(turned)], [np.sin(turned), np.cos(turned)]]) @ [-210, -145]
         assert facts["registration"]["rotation_deg"] == pytest.approx(np.degrees(turned), abs=0.05)
         np.testing.assert_allclose(facts["registration"]["translation_mm"], at, atol=0.1)
         assert facts["received"] == facts["judged"] == POINTS
-    assert abs(two["max_deviation_mm"] - three["max_deviation_mm"]) > 1e-4
-    assert abs(two["rms_mm"] - three["rms_mm"]) > 1e-5
+    assert abs(one["max_deviation_mm"] - three["max_deviation_mm"]) > 1e-4
+    assert abs(one["rms_mm"] - three["rms_mm"]) > 1e-5
 
 
 class Terminal:

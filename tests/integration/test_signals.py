@@ -88,7 +88,7 @@ def simulated_device_runs(folder: Path) -> bool:
     return any((folder / "temporary").glob("simulated-port-*/port"))
 
 
-@pytest.mark.parametrize("request_to_end", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
+@pytest.mark.parametrize("request_to_end", [signal.SIGTERM, signal.SIGINT])
 def test_a_run_that_is_asked_to_end_leaves_nothing_behind(request_to_end: signal.Signals, tmp_path: Path) -> None:
     with started(tmp_path, "demo", "--headless", "--out", str(tmp_path / "out"), "--records", str(tmp_path / "records")) as process:
         assert comes_true(lambda: simulated_device_runs(tmp_path), 60.0)
@@ -109,12 +109,11 @@ def test_a_simulated_device_ends_with_a_run_that_is_killed(tmp_path: Path) -> No
     assert not simulated_device_runs(tmp_path)
 
 
-@pytest.mark.parametrize("request_to_end", [signal.SIGTERM, signal.SIGHUP])
-def test_a_console_that_is_asked_to_end_does(request_to_end: signal.Signals, tmp_path: Path) -> None:
+def test_a_console_that_is_asked_to_end_by_a_closing_terminal_does(tmp_path: Path) -> None:
     with started(tmp_path, "console", "--no-browser", "--port", "0", str(tmp_path)) as process:
         assert process.stderr is not None
         assert process.stderr.readline().startswith("console: ")
-        process.send_signal(request_to_end)
+        process.send_signal(signal.SIGHUP)
         assert end_of(process) == (0, "")
     assert list((tmp_path / "temporary").iterdir()) == []
 

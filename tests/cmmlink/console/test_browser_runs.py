@@ -273,21 +273,22 @@ def test_demonstration_goes_from_its_address_to_a_verdict(browser: Browser, tmp_
     assert worst["station_mm"] == pytest.approx(40.0, abs=1.0)
 
 
-@pytest.mark.parametrize(("width", "height"), [(1280, 800), (1920, 1080), (1024, 700)])
-def test_everything_is_on_the_screen_without_scrolling(bench: Bench, keep: Keep, width: int, height: int) -> None:
-    page = bench.page(width, height)
+def test_everything_is_on_the_screen_without_scrolling(bench: Bench, keep: Keep) -> None:
+    page = bench.page()
     page.locator("#plans div").click()
     expect(page.locator("#serial")).to_be_focused()
     page.keyboard.press("Enter")
     bench.device.source.put(opened(2000), *batches(measured(bench.profile, 2000, seed=2, defect_mm=0.12, at_mm=60.0), 50), CLOSED)
     expect(page.locator("#verdict[data-final=true] .word")).to_have_text("NOT CONFORM")
     seen = "verdict-word verdict-why worst-value worst-where worst-use coverage lost age abort serial-number strip profile remarks"
-    for name in seen.split():
-        box = page.locator(f"#{name}").bounding_box()
-        assert box is not None
-        assert box["x"] >= 0
-        assert box["y"] >= 0
-        assert box["x"] + box["width"] <= width
-        assert box["y"] + box["height"] <= height
-    assert overflowing(page) == []
+    for width, height in ((1280, 800), (1920, 1080), (1024, 700)):
+        page.set_viewport_size({"width": width, "height": height})
+        for name in seen.split():
+            box = page.locator(f"#{name}").bounding_box()
+            assert box is not None
+            assert box["x"] >= 0
+            assert box["y"] >= 0
+            assert box["x"] + box["width"] <= width
+            assert box["y"] + box["height"] <= height
+        assert overflowing(page) == []
     keep(page, "defect")

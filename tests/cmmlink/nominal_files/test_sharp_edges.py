@@ -81,7 +81,7 @@ def check_signs(curve: NurbsCurve, points: Array) -> None:
     assert np.abs(deviations(points[1:-1], nominal).deviation_mm).max() < 1e-9
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(points=sharp_edges())
 def test_points_outside_a_sharp_tip_have_positive_deviations(tmp_path: Path, points: Array) -> None:
     """A nominal is refused where its points themselves meet before the edge, or coincide, and for no other reason."""

@@ -35,8 +35,7 @@ def refusal(path: Path, section: SectionPlane | None = None) -> str:
     return str(refused.value).removeprefix(f"{path}: ")
 
 
-@pytest.mark.parametrize("schema", ["AP203", "AP214IS", "AP242DIS"])
-@pytest.mark.parametrize("unit", ["MM", "INCH", "M"])
+@pytest.mark.parametrize(("schema", "unit"), [("AP203", "MM"), ("AP214IS", "INCH"), ("AP242DIS", "MM"), ("AP242DIS", "M")])
 @pytest.mark.usefixtures("occt")
 def test_a_wire_in_step_comes_back_exact(cad_files: Path, schema: str, unit: str) -> None:
     found = load_nominal(cad_files / f"wire-{schema}-{unit}.step")

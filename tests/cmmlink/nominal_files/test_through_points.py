@@ -145,7 +145,7 @@ def test_both_corners_of_a_blunt_edge_inside_the_loop_are_pointed_out(tmp_path: 
     assert [note.split(":")[0] for note in nominal.notes if "turn by" in note] == ["line 41", "line 42"]
 
 
-@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     points=st.lists(st.tuples(st.integers(-3, 3), st.integers(-3, 3)), min_size=5, max_size=12),
     scale=st.sampled_from([1.0, 1e-7, 1e5]),

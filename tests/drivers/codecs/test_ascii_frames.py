@@ -213,7 +213,7 @@ def test_a_unit_that_is_none_is_named(unit: str) -> None:
 
 
 def test_thousands_of_flipped_bits_give_no_wrong_point_and_the_true_loss() -> None:
-    count = 200_000
+    count = 60_000
     device, rng = AsciiDevice(), np.random.default_rng(4)
     sent_mm = np.round(rng.uniform(-100, 100, (count, 3)), 3)
     opening = device.opening(count)
@@ -223,7 +223,7 @@ def test_thousands_of_flipped_bits_give_no_wrong_point_and_the_true_loss() -> No
     book = decoded(AsciiDecoder(), damaged, range(1024, len(damaged), 1024))
     only_sent_points(book, sent_mm, within_mm=0.0)
     assert len(set(book.sequence)) == len(book.sequence)
-    assert 4000 < book.lost == count - len(book.sequence)
+    assert 1200 < book.lost == count - len(book.sequence)
 
 
 def test_an_opening_behind_points_whose_first_copy_was_damaged_loses_none_of_them() -> None:

@@ -3,6 +3,7 @@
 import struct
 from binascii import crc32, crc_hqx
 from collections.abc import Sequence
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -31,6 +32,7 @@ GOLDEN = bytes.fromhex(
 )
 
 
+@cache
 def single(count: int, first: int = 0) -> tuple[bytes, np.ndarray[tuple[int, int], np.dtype[np.float64]]]:
     """A whole scan of single frames, made with numpy, and its points."""
     rng = np.random.default_rng(count)
@@ -185,13 +187,13 @@ def test_a_heartbeat_puts_a_wrong_guess_right() -> None:
 
 @pytest.mark.parametrize("size", [1, 64])
 def test_thousands_of_flipped_bits_give_no_wrong_point_and_the_true_loss(size: int) -> None:
-    count = 200_000
+    count = 60_000
     data, sent_mm = single(count) if size == 1 else blocks(count, size)
     damaged = data[:72] + flipped(data[72:-72], 5e-4, np.random.default_rng(4)) + data[-72:]
     book = decoded(BinaryDecoder(), damaged, range(1024, len(damaged), 1024))
     only_sent_points(book, sent_mm, within_mm=0.0)
     assert len(set(book.sequence)) == len(book.sequence)
-    assert 2000 < book.lost == count - len(book.sequence)
+    assert 600 < book.lost == count - len(book.sequence)
 
 
 def test_a_point_marked_invalid_in_any_frame_is_rejected() -> None:

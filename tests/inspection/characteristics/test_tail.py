@@ -53,10 +53,15 @@ def extent_mm(section: ActualSection) -> float:
     return chord(section.section, find_camber_line(section.section), "x-extent").value
 
 
+@cache
+def chord_of(kind: str, limit_mm: float) -> SectionCharacteristic:
+    asked = SectionCharacteristic("chord", "chord", "x-extent", -limit_mm, limit_mm)
+    return with_nominal(asked, lambda: Outline(find_airfoil(nominal(kind))))
+
+
 def judged(kind: str, points: Array, limit_mm: float) -> tuple[float, Verdict, list[str]]:
     """The deviation of the chord, its verdict, and the kinds of its reasons."""
-    asked = SectionCharacteristic("chord", "chord", "x-extent", -limit_mm, limit_mm)
-    whole = with_nominal(asked, lambda: Outline(find_airfoil(nominal(kind))))
+    whole = chord_of(kind, limit_mm)
     live = LiveInspection(nominal(kind), ToleranceZone(-2, 2), datum=RigidTransform.identity(), characteristics=(whole,))
     live.add(points)
     (found,) = live.finish().characteristics
@@ -75,7 +80,7 @@ def test_a_part_that_is_longer_has_a_longer_chord(kind: str, by_mm: float) -> No
 @pytest.mark.parametrize("kind", ["sharp", "open"])
 def test_a_part_that_is_shorter_is_not_taken_for_one_that_is_as_long_as_its_nominal(kind: str) -> None:
     """Nobody knows whether it is broken off or was not measured to its end, so neither is proven."""
-    for by_mm in (0.2, 0.5, 0.9):
+    for by_mm in (0.2, 0.9):
         shorter = drawn(kind, moved_tail(kind, -by_mm))
         assert shorter.is_unseen[[0, -1]].all()
         assert any("mm before its trailing edge" in note for note in shorter.notes)

@@ -75,14 +75,14 @@ def test_each_is_judged_by_the_uncertainty_of_what_its_deviations_are_counted_fr
 def test_a_larger_budget_never_makes_a_characteristic_more_certain(kind: str) -> None:
     width = judge(kind, None).value
     for half_mm in (0.51 * width, 0.47 * width):
-        before = judge(kind, None, half_mm)
+        before = plain = judge(kind, None, half_mm)
         for factor in (0.05, 10.0):
             budget = UncertaintyBudget(factor * 0.0009, factor * 0.0018, tip_radius_mm=factor * 0.0003)
             found = judge(kind, budget, half_mm)
             assert found.uncertainty > before.uncertainty
             assert found.verdict in (before.verdict, Verdict.UNCERTAIN)
             before = found
-        assert judge(kind, BUDGET, half_mm, "simple").verdict is judge(kind, None, half_mm).verdict
+        assert judge(kind, BUDGET, half_mm, "simple").verdict is plain.verdict
 
 
 def test_what_a_characteristic_states_itself_stands() -> None:

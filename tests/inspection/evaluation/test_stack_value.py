@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from inspection import (
@@ -152,6 +152,7 @@ def test_a_value_near_a_limit_is_proven_neither_way(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", KINDS)
+@settings(max_examples=30)
 @given(st.data())
 def test_what_is_missing_or_in_doubt_never_makes_a_verdict_better(name: str, data: st.DataObject) -> None:
     """Over limits of any width: what the whole stack does not prove, the stack with fewer sections or with doubts does not either."""

@@ -116,17 +116,18 @@ def test_a_larger_budget_never_makes_a_number_more_certain_and_by_simple_accepta
     near = tuple(with_nominal(SectionCharacteristic("a", "thickness", "inscribed", *pair), outline) for pair in limits)
     before = judge(points, None, characteristics=near)
     assert [one.uncertainty for one in before] == [0.0, 0.0]
-    for factor in (0.1, 10.0, 100.0):
+    plain = [one.verdict for one in before]
+    for factor in (0.1, 100.0):
         budget = UncertaintyBudget(factor * 0.0005, tip_radius_mm=factor * 0.0003)
         found = judge(points, budget, characteristics=near)
         for one, other in zip(before, found, strict=True):
             assert other.value == one.value
             assert other.uncertainty > one.uncertainty
             assert other.verdict in (one.verdict, Verdict.UNCERTAIN)
-        by_simple = judge(points, budget, characteristics=near, rule="simple")
-        assert [one.verdict for one in by_simple] == [one.verdict for one in judge(points, None, characteristics=near)]
-        assert "simple acceptance" in by_simple[0].rule
         before = found
+    by_simple = judge(points, budget, characteristics=near, rule="simple")
+    assert [one.verdict for one in by_simple] == plain
+    assert "simple acceptance" in by_simple[0].rule
     assert {one.verdict for one in before} == {Verdict.UNCERTAIN}
 
 

@@ -30,7 +30,7 @@ def test_compiled_method_is_the_plain_one(name: str, method: str) -> None:
     }
     for samples in (60, 1000):
         nominal = discretize(curve_of(name), samples=samples, step_min=0.9 / samples, pole_angle_min_deg=90.0)
-        points = scattered(curve_of(name), np.random.default_rng(42), 150)
+        points = scattered(curve_of(name), np.random.default_rng(42), 50)
         wanted = plain[method](points, nominal)
         found = project_on_samples(points, grid_of(name), nominal.sample_table, method)
         for field in FIELDS:
@@ -59,7 +59,7 @@ def test_points_worked_on_together_get_the_bits_that_each_gets_alone(name: str, 
     proof = np.arange(CELL_WIDTH) >= CELL_LEFT
     never = replace(table, cells=np.where(proof, -np.inf, table.cells))  # proves nothing: every point goes alone
     rng = np.random.default_rng(44)
-    points = np.vstack([scattered(curve_of(name), rng, 600), table.samples[:, LEFT_POLE_X : LEFT_POLE_X + 2]])
+    points = np.vstack([scattered(curve_of(name), rng, 200), table.samples[:, LEFT_POLE_X : LEFT_POLE_X + 2]])
     nearest, next_to_it = np.asarray(nominal.tree.query(points, k=2)[0]).T
     points = np.vstack([points[next_to_it > nearest * (1 + 1e-9)], [[np.nan, 0.0], [0.0, np.inf]]])  # of equally near ones either will do
     alone, together = (project_on_samples(points, grid_of(name), each, method) for each in (never, table))
