@@ -11,13 +11,16 @@ import sys
 
 _STOPPED = 130
 _REQUESTS = ("SIGTERM", "SIGHUP", "SIGBREAK")  # as far as the system has them
-_OBJECTS_BETWEEN_LOOKS = 10_000  # for garbage; libraries make some hundred thousand objects, and all of them stay
+_OBJECTS_BEFORE_A_LOOK = 400_000  # for garbage; libraries make some hundred thousand objects, and all of them stay
+_OBJECTS_BETWEEN_LOOKS = 10_000
 
 
 def main() -> None:
     """Run the command line."""
     interruptible = signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    gc.set_threshold(_OBJECTS_BETWEEN_LOOKS)
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "1")  # else it looks for some through all that is installed
+    gc.set_threshold(_OBJECTS_BEFORE_A_LOOK)
+    gc.callbacks.append(_look_oftener)
     try:
         if interruptible:
             signal.signal(signal.SIGINT, _end_at_once)
@@ -36,6 +39,14 @@ def main() -> None:
         gc.freeze()  # the memory goes back to the system as it is: to look through it once more takes a sixth of a short command
         if interruptible:
             signal.signal(signal.SIGINT, signal.SIG_DFL)  # all is done; what is left is Python's own end
+
+
+def _look_oftener(phase: str, _: object) -> None:
+    """Once the first look for garbage is over: what is there by then stays and is not looked at again, and looks come oftener."""
+    if phase == "stop":
+        gc.callbacks.remove(_look_oftener)
+        gc.freeze()
+        gc.set_threshold(_OBJECTS_BETWEEN_LOOKS)
 
 
 def _end_at_once(*_: object) -> None:

@@ -109,10 +109,10 @@ def carry_out(
     """
     assumed, plan = (*notes_on_nominal(plan), *notes_on_temperature(plan)), with_section(plan)
     _log.info("nominal %s, %s, %s", plan.nominal.file, zone_of(plan, profile), plan.registration)
-    rehearse(profile, plan.registration.method, plan.registration.reject_outliers)
+    followed = bool(sinks) or not isinstance(plan.device, FileDevice)
+    rehearse(profile, plan.registration.method, plan.registration.reject_outliers, not followed)
     scratch = scratch_in(records)
     _log.info("%s", words_of_room(scratch.folder))
-    followed = bool(sinks) or not isinstance(plan.device, FileDevice)
     live = inspection_of(plan, profile, scratch, provisional=followed)
     started = run_started(plan, device.device, device.simulated, (*assumed, *notes_on_zone(plan), *device.notes))
     on_ready()

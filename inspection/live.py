@@ -24,7 +24,7 @@ from inspection.compensation import Compensation
 from inspection.conclusion import Missing
 from inspection.evaluation.evaluate import evaluate
 from inspection.evaluation.so_far import EvaluationSoFar, ScanSoFar, ScanWatch
-from inspection.kernels import Room, compile_projection, fit_compiled_beside
+from inspection.kernels import Room, compile_projection, fit_compiled_beside, is_fit_compiled
 from inspection.methods import FitName, Method, RuleName, WeightName
 from inspection.nominal import NominalProfile
 from inspection.pose_track import PoseTrack, seek_pose
@@ -324,11 +324,15 @@ def _of_one_type(points: Array) -> Array:
     return points if flags.c_contiguous and flags.writeable else np.array(points, order="C")
 
 
-def rehearse(nominal: NominalProfile, method: Method = "exact", reject_outliers: bool = False) -> None:
+def rehearse(nominal: NominalProfile, method: Method = "exact", reject_outliers: bool = False, unless_compiled: bool = False) -> None:
     """Inspect a made-up scan of the nominal itself, so that every loop it needs is compiled before a real scan begins.
+
+    unless_compiled : leave it where compiled code is on disk, for points that do not come by themselves: they can wait while it is loaded
 
     Takes seconds on the first use after an installation, milliseconds from the cache afterwards.
     """
+    if unless_compiled and is_fit_compiled():
+        return
     with fit_compiled_beside(reject_outliers) as fit_comes:
         compile_projection()
         if fit_comes:  # meanwhile all that needs no fit

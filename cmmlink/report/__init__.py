@@ -8,6 +8,7 @@ TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer 
 if TYPE_CHECKING:
     from cmmlink.report.comparison_picture import write_comparison_picture
     from cmmlink.report.folder import prepare, write_results, write_run
+    from cmmlink.report.live_table import LiveTable
     from cmmlink.report.nominal_picture import write_nominal_picture
     from cmmlink.report.pdf import write_report
     from cmmlink.report.picture_processes import Pictures, processes_here
@@ -15,13 +16,14 @@ if TYPE_CHECKING:
     from cmmlink.report.report_input import ReportInput, with_settings
     from cmmlink.report.section_pictures import SectionPictures
     from cmmlink.report.stack_folder import write_stack
-    from cmmlink.report.terminal import STYLE_OF, STYLES, LiveTable, print_characteristics, print_summary
+    from cmmlink.report.terminal import STYLE_OF, STYLES, print_characteristics, print_summary
 else:
     from cmmlink.front_door import load_on_use
 
     _PLACES = {
         "cmmlink.report.comparison_picture": ("write_comparison_picture",),
         "cmmlink.report.folder": ("prepare", "write_results", "write_run"),
+        "cmmlink.report.live_table": ("LiveTable",),
         "cmmlink.report.picture_processes": ("Pictures", "processes_here"),
         "cmmlink.report.nominal_picture": ("write_nominal_picture",),
         "cmmlink.report.pdf": ("write_report",),
@@ -29,7 +31,7 @@ else:
         "cmmlink.report.report_input": ("ReportInput", "with_settings"),
         "cmmlink.report.section_pictures": ("SectionPictures",),
         "cmmlink.report.stack_folder": ("write_stack",),
-        "cmmlink.report.terminal": ("STYLE_OF", "STYLES", "LiveTable", "print_characteristics", "print_summary"),
+        "cmmlink.report.terminal": ("STYLE_OF", "STYLES", "print_characteristics", "print_summary"),
     }
 
     __getattr__ = load_on_use(__name__, _PLACES)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from inspection.kernels.pose import NONE_LEFT_OUT, PoseEstimate, PoseFit
     from inspection.kernels.projection import Turned, project, project_on_samples, project_outward
     from inspection.kernels.rows import JUDGED_AS, NONE_TAKEN, TALLY, Columns, Judgement, Places, Taken, judge_few_rows, judge_rows, take_in
-    from inspection.kernels.side_by_side import fit_compiled_beside
+    from inspection.kernels.side_by_side import fit_compiled_beside, is_fit_compiled
     from inspection.kernels.splines import spline_derivatives
     from inspection.kernels.thinning import strides
     from inspection.kernels.tree_growing import GrownTree, shortest_tree
@@ -52,7 +52,7 @@ else:
             "judge_rows",
             "take_in",
         ),
-        "inspection.kernels.side_by_side": ("fit_compiled_beside",),
+        "inspection.kernels.side_by_side": ("fit_compiled_beside", "is_fit_compiled"),
         "inspection.kernels.splines": ("spline_derivatives",),
         "inspection.kernels.thinning": ("strides",),
         "inspection.kernels.tree_growing": ("GrownTree", "shortest_tree"),
@@ -86,6 +86,7 @@ __all__ = [
     "compile_projection",
     "compiled_code_folder",
     "fit_compiled_beside",
+    "is_fit_compiled",
     "judge_few_rows",
     "judge_rows",
     "project",

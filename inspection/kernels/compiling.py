@@ -3,11 +3,9 @@
 Nothing is compiled at import; the first call of a kernel does it.
 """
 
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
-from importlib import import_module
 from operator import attrgetter
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -15,9 +13,10 @@ from typing import Any, TypeVar, cast
 from llvmlite import ir
 from numba import carray, njit, typeof, types
 from numba.core import cgutils, config
+from numba.core.caching import FunctionCache
 from numba.core.event import Event, Listener, register
+from numba.core.runtime import rtsys
 from numba.extending import intrinsic
-from numba.np import linalg
 
 from inspection.kernels.cache_folder import places_for, stamp_of, stamped_folder
 from inspection.kernels.compile_notice import begin_to_compile
@@ -40,14 +39,30 @@ REAL_ARRAY, INTEGER_ARRAY = REAL[::1], INTEGER[::1]  # that is written to
 REAL_TABLE, INTEGER_TABLE, SHORT_TABLE = (types.Array(of, 1, "C", readonly=True) for of in (REAL, INTEGER, types.int32))
 
 
+class _KeptCode(FunctionCache):  # type: ignore[misc]  # numba has no types
+    """What is kept on disk of a function, loaded without what compiles.
+
+    numba would first load everything that any function might be compiled with: a tenth of the time of a short command. It does so as
+    well before it compiles.
+    """
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The code for arguments of these types; None where there is none yet."""
+        rtsys.initialize(target_context)  # compiled code calls it for arrays
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)
+
+
 def kernel(function: _Function, **options: bool) -> _Function:
     """Compile on the first call and keep the result on disk; where nothing can be written, compile in every process."""
-    options |= {"nogil": True, "no_cfunc_wrapper": True}
+    compiled = njit(error_model="numpy", nogil=True, no_cfunc_wrapper=True, **options)(function)
     try:
         with _code_kept_in_stamped_folder():
-            return cast(_Function, njit(cache=True, error_model="numpy", **options)(function))
+            kept = _KeptCode(function)
     except RuntimeError:
-        return cast(_Function, njit(error_model="numpy", **options)(function))
+        return cast(_Function, compiled)
+    compiled._cache = kept
+    return cast(_Function, compiled)
 
 
 def inner_kernel(function: _Function, **options: bool) -> _Function:
@@ -217,21 +232,3 @@ class _Notice(Listener):  # type: ignore[misc]  # numba has no types
 
 
 register("numba:compile", _Notice())  # at import, because who waits to be told has long said so
-
-
-def _load_arrays_without_blas() -> None:
-    """Load what numba compiles arrays with, without the linear algebra of scipy: that takes a fifth of a second, and no kernel needs it.
-
-    numba loads it to see whether it is there. Where a product of matrices is compiled it looks again.
-    """
-    if "numba.np.arraymath" in sys.modules or not hasattr(linalg, "ensure_blas"):
-        return
-    look = linalg.ensure_blas
-    linalg.ensure_blas = lambda: None
-    try:
-        import_module("numba.np.arraymath").ensure_blas = look  # type: ignore[attr-defined]  # numba has no types
-    finally:
-        linalg.ensure_blas = look
-
-
-_load_arrays_without_blas()

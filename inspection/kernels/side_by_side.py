@@ -45,9 +45,14 @@ def fit_compiled_beside(outliers: bool = False) -> Iterator[bool]:
             child.wait()
 
 
-def _is_worth_it() -> bool:
+def is_fit_compiled() -> bool:
+    """Whether the fit, which is compiled last, is on disk."""
     folder = compiled_code_folder()
-    return folder is not None and (os.cpu_count() or 1) > 1 and not any(folder.rglob("pose.*.nbi"))
+    return folder is not None and any(folder.rglob("pose.*.nbi"))
+
+
+def _is_worth_it() -> bool:
+    return compiled_code_folder() is not None and (os.cpu_count() or 1) > 1 and not is_fit_compiled()
 
 
 def _start(outliers: bool) -> "subprocess.Popen[bytes] | None":

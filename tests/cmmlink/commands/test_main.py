@@ -62,6 +62,22 @@ def test_an_unknown_command_is_named_and_the_near_one_offered() -> None:
     assert re.match(r"No such command 'inspcet'\. Did you mean 'inspect'\?", cmmlink("inspcet").refused())
 
 
+def test_garbage_is_looked_for_late_for_the_first_time_and_often_from_then_on() -> None:
+    code = """
+import gc, sys
+from cmmlink.__main__ import main
+sys.argv = ["cmmlink", "--version"]
+try:
+    main()
+except SystemExit:
+    print(gc.isenabled(), gc.get_threshold()[0], len(gc.callbacks))
+gc.collect()
+print(gc.get_threshold()[0], len(gc.callbacks))
+"""
+    told = subprocess.run([sys.executable, "-c", code], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True).stdout
+    assert told.splitlines()[-2:] == ["True 400000 1", "10000 0"]
+
+
 def test_version() -> None:
     assert cmmlink("--version") == Ended(0, f"cmmlink {__version__}\n", "")
 

@@ -13,7 +13,7 @@ import pytest
 from inspection.kernels import OutlierLimit, PoseFit, pose, side_by_side
 from inspection.kernels.outliers import mark_outliers
 from inspection.kernels.pose_sums import add_up
-from inspection.kernels.side_by_side import fit_compiled_beside
+from inspection.kernels.side_by_side import fit_compiled_beside, is_fit_compiled
 from tests.inspection import profiles
 
 MARK = "import sys; from pathlib import Path; Path({!r}).write_text(chr(10).join(sys.argv[1:]))"
@@ -44,8 +44,10 @@ def test_no_other_process_where_the_fit_is_on_disk_or_there_is_one_processor(fol
     with fit_compiled_beside():
         pass
     monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    assert not is_fit_compiled()
     (folder / "of_this_package").mkdir()
     (folder / "of_this_package" / "pose._settle_pose-128.py311.nbi").touch()
+    assert is_fit_compiled()
     with fit_compiled_beside() as comes:
         assert not comes
         assert gc.isenabled()

@@ -7,7 +7,7 @@ import pytest
 from rich.console import Console
 
 from cmmlink.events import Arrived, Counts, Judged, RunFinished, RunStarted
-from cmmlink.report.terminal import LiveTable
+from cmmlink.report.live_table import LiveTable
 from cmmlink.run_view import RunContext, RunView
 from drivers import LinkDown, ScanOpened
 from inspection import LiveInspection, NominalProfile, RigidTransform, ToleranceZone
