@@ -7,7 +7,7 @@ the whole box; a box that no point refutes is cut. The distance to the curve is 
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -42,6 +42,8 @@ class ZoneCheck:
         if self.problem:
             return f"{self.name}: NOT VERIFIED: {self.problem}"
         bound = f"no rigid motion brings the witnesses within {self.half_mm - self.gap_mm:.6f} mm of its middle"
+        if self.half_mm <= self.gap_mm:
+            bound = f"half of it is no wider than {self.gap_mm:.6f} mm, and nothing smaller by so much can be"
         return f"{self.name}: verified: minimum zone {2 * self.half_mm:.6f} mm; {bound} ({self.boxes:,} boxes)"
 
 
@@ -106,15 +108,21 @@ class _Polygon:
 def _check(zone: Mapping[str, Any], curve: _Polygon) -> ZoneCheck:
     """Check one zone."""
     half, middle, gap, tip = zone["zone_mm"] / 2, zone["middle_mm"], zone["gap_mm"], zone["tip_radius_mm"]
-    active = np.array([[point["x_mm"], point["y_mm"]] for point in zone["active"]], dtype=np.float64)
-    witnesses = np.array([[point["x_mm"], point["y_mm"]] for point in zone["witnesses"]], dtype=np.float64)
+    active, witnesses = (_places(zone[which]) for which in ("active", "witnesses"))
     found = ZoneCheck(str(zone["name"]), half, gap, 0, "")
     problem = _problem_at_pose(zone, active, curve)
+    if not problem and half <= gap and zone["proven"]:
+        return found  # no zone is narrower than none at all
     if problem or not zone["proven"]:
         return ZoneCheck(found.name, half, gap, 0, problem or "what the file says is not proven over every placement")
     boxes, refuted = _refute(witnesses, curve, half - gap, middle + tip)
     problem = "" if refuted else f"after {boxes:,} boxes of motions it is not shown that every other placement needs a wider zone"
     return ZoneCheck(found.name, half, gap, boxes, problem)
+
+
+def _places(points: Sequence[Mapping[str, float]]) -> Array:
+    """Where points (k, 2) were measured."""
+    return np.array([[point["x_mm"], point["y_mm"]] for point in points], dtype=np.float64).reshape(-1, 2)
 
 
 def _problem_at_pose(zone: Mapping[str, Any], active: Array, curve: _Polygon) -> str:
@@ -127,6 +135,8 @@ def _problem_at_pose(zone: Mapping[str, Any], active: Array, curve: _Polygon) ->
     stated = np.array([point["deviation_mm"] for point in zone["active"]])
     if np.abs(off - stated).max(initial=0.0) > _SAME_MM or np.abs(np.abs(stated) - zone["zone_mm"] / 2).max(initial=0.0) > _SAME_MM:
         return "the points that hold the zone are not at its limits"
+    if zone["zone_mm"] / 2 <= zone["gap_mm"]:
+        return ""  # points all on the nominal need not balance
     share = np.array([point["multiplier"] for point in zone["active"]])
     if not len(share) or share.min() <= 0 or abs(share.sum() - 1) > 1e-6:
         return "the multipliers are not positive with the sum 1"

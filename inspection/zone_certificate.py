@@ -71,6 +71,8 @@ class ZoneCertificate:
             if self.proven
             else f"no proof over every placement: the search ended after {self.boxes:,} boxes of motions"
         )
+        if self.proven and half <= self.gap_mm:
+            last = f"proof: half of it is no wider than the gap of the proof, {1e3 * self.gap_mm:g} um, so that none is smaller by that"
         return (
             f"minimum zone {self.zone_mm:.6f} mm (half {half:.9f}) about {self.middle_mm:g} mm, "
             f"turned {turned:.9f} deg, moved ({x:.9f}, {y:.9f}) mm\nheld by points {held}\n{last}"

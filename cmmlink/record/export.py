@@ -11,9 +11,11 @@ from cmmlink.deviations_csv import write_deviations
 from cmmlink.errors import PlanError
 from cmmlink.record.bodies import unpack_judged
 from cmmlink.record.reader import arrivals_of, describe, event_document, points_of, reads_of, recorded_run
+from cmmlink.record.replay import recorded_plan, recorded_profile
 from cmmlink.record.shapes import plain_name
 from cmmlink.record.store import Store
 from cmmlink.result_files import NewFiles, new_files
+from cmmlink.zone_file import zone_document
 
 POINT_COLUMNS = {
     "sequence": "the device's own counter of the point, unwrapped",
@@ -34,7 +36,7 @@ def export_run(store: Store, run: str, folder: Path) -> list[Path]:
 
     run.json: all but the points; events.json; points.csv and points.npy (m, 5): sequence, time_s, x, y, z in mm;
     wire.bin, the bytes as they arrived, and wire.csv, when; plan.yaml; the nominal's file; of a run with a result
-    deviations.csv and result.json.
+    deviations.csv and result.json, and zone.json where it has a certificate.
     """
     try:
         with new_files(folder) as files:
@@ -87,6 +89,10 @@ def _result(store: Store, run: str, files: NewFiles) -> None:
     ending = str(recorded.end["state"])
     blocks = (unpack_judged(record.body) for record in store.records(run, "deviations"))
     write_deviations(blocks, files("deviations.csv"), ending)
+    if any(one["certificate"] for one in recorded.result.get("characteristics", ())):
+        zones = zone_document(recorded.result, recorded_profile(recorded_plan(recorded), recorded))
+        if zones is not None:
+            _json(files("zone.json"), zones)
     _json(files("result.json"), recorded.result | ({} if ending == "complete" else {"ending": ending}))
 
 

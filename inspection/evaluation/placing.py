@@ -100,7 +100,8 @@ def place(asked: LineProfile, basis: Basis, every: Rows, rows: Rows) -> Placed:
         return Placed(zone.nominal_from_section.snap_to_grid(), words, False, False, zone.converged)
     gap_mm = float(asked.zone.upper_mm[0] - asked.zone.lower_mm[0]) * (_GAP_SHARE if asked.region is None else _GAP_SHARE_REGION)
     certificate = _certify(basis, points, best.registration, middle_of(asked.zone, basis, rows), gap_mm)
-    return Placed(certificate.nominal_from_section.snap_to_grid(), words, False, True, certificate.balanced, _in_run(certificate, rows))
+    settled = certificate.balanced or certificate.proven  # points all on the nominal balance nothing, and no zone is smaller
+    return Placed(certificate.nominal_from_section.snap_to_grid(), words, False, True, settled, _in_run(certificate, rows))
 
 
 def _place_by(features: DatumFeatures, basis: Basis) -> Placed:

@@ -1,10 +1,13 @@
 """What is no proof is refused with the reason, before anything is said of a zone."""
 
+import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.cmmlink.command import cmmlink
+from tests.cmmlink.oval_part import COUNT, oval_points, write_nominal, write_points
 
 
 @pytest.mark.parametrize(
@@ -21,3 +24,24 @@ def test_json_that_states_no_zone_is_refused(tmp_path: Path, content: str) -> No
     file = tmp_path / "zone.json"
     file.write_text(content, encoding="utf-8")
     assert cmmlink("verify-zone", file).failed(2).startswith(f"{file}: ")
+
+
+@pytest.mark.parametrize("size_mm", [0.02, 0.0], ids=["formed", "perfect"])
+def test_the_exported_proof_of_a_recorded_run_is_checked_like_that_of_the_run(tmp_path: Path, size_mm: float) -> None:
+    turn = np.arange(COUNT) * 2 * np.pi / COUNT
+    write_nominal(tmp_path / "oval.yaml")
+    write_points(tmp_path / "points.csv", oval_points(size_mm * np.sin(5 * turn + 0.3)))
+    (tmp_path / "plan.yaml").write_text(
+        "part: {name: oval}\nnominal: {file: oval.yaml}\ndevice: {type: file, file: points.csv}\nrecords: records\nout: out\n"
+        "registration: {datum: {rotation_deg: 0.0}}\ntolerance: {lower_mm: -0.05, upper_mm: 0.05}\ncharacteristics:\n"
+        "  - {name: half, type: line-profile, zone: 0.1, from: {station_mm: 1}, to: {station_mm: 54}, fit: minimum-zone}\n"
+    )
+    run = cmmlink("run", tmp_path / "plan.yaml", "--json").json()
+    assert run["characteristics"][1]["verdict"] == "conform"
+    assert run["characteristics"][1]["reasons"] == []
+    cmmlink("export", run["run"], "--records", tmp_path / "records", "--out", tmp_path / "exported")
+    written = list((tmp_path / "out").rglob("zone.json")) or list(tmp_path.rglob("out/zone.json"))
+    exported = tmp_path / "exported" / "zone.json"
+    assert json.loads(exported.read_bytes()) == json.loads(written[0].read_bytes())
+    checked = cmmlink("verify-zone", exported)
+    assert (checked.code, "half: verified: minimum zone" in checked.out) == (0, True)
