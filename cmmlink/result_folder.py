@@ -14,7 +14,7 @@ PLACEHOLDERS = ("part", "serial", "run")
 _PLACEHOLDER = re.compile(r"\{(\w*)\}")
 _OF_A_RUN = (
     "result.json", "deviations.csv", "characteristics.csv", "zone.json", "uncertainty.csv", "profile.png", "profile.svg", "report.pdf",
-    "sections.csv", "stack.png",
+    "sections.csv", "stack.png", "stack.svg",
 )  # fmt: skip
 _SECTIONS = "section-*_*mm"
 _LONGEST_NAME = 80

@@ -312,7 +312,7 @@ class Exported(JsonObject):
 class Reported(JsonObject):
     """The answer of `report`."""
 
-    run: str = Field(description="the id of the run")
+    run: str = Field(description="the id of the run, or that of the stack")
     file: str = Field(description="the PDF file that was written")
 
 

@@ -189,8 +189,8 @@ def _inspect_stack(plan: "CtPlan", output: Output, pictures: bool, no_record: bo
     pattern = output.out or plan.out
     prepare(pattern)
     bar = _SectionBar(Console(stderr=True), visible=not output.as_json and sys.stderr.isatty())
-    with Pictures() as drawn:
-        wanted = SectionPictures(plan.part.name, drawn) if pictures and pattern is not None else None
+    with Pictures() as processes:
+        wanted = SectionPictures(plan.part.name, processes) if pictures and pattern is not None else None
         stack = _judge_stack(plan, output, bar, wanted, no_record)
         folder = None if pattern is None else stack.folder_of(pattern, plan)
         try:
@@ -204,9 +204,8 @@ def _inspect_stack(plan: "CtPlan", output: Output, pictures: bool, no_record: bo
             else:
                 _print_stack(terminal(), stack)
     if folder is not None and not output.as_json:
-        typer.echo(
-            f"results in {folder}: result.json, sections.csv, a folder for each section{', stack.png, report.pdf' if pictures else ''}"
-        )
+        drawn = ", stack.png, stack.svg, report.pdf" if pictures else ""
+        typer.echo(f"results in {folder}: result.json, sections.csv, a folder for each section{drawn}")
     return EXIT_OF[stack.verdict]
 
 

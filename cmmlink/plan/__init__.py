@@ -7,7 +7,7 @@ if TYPE_CHECKING:
     from cmmlink.plan.cutters import CutterName
     from cmmlink.plan.deciding import PROFILE, Deciding
     from cmmlink.plan.own_maps import map_of
-    from cmmlink.plan.papers import LanguageName, PaperName
+    from cmmlink.plan.papers import LanguageName, PaperName, SectionPages
     from cmmlink.plan.report import ReportSettings
     from cmmlink.plan.scan import (
         Datum,
@@ -34,7 +34,7 @@ else:
     _PLACES = {
         "cmmlink.plan.deciding": ("PROFILE", "Deciding"),
         "cmmlink.plan.own_maps": ("map_of",),
-        "cmmlink.plan.papers": ("LanguageName", "PaperName"),
+        "cmmlink.plan.papers": ("LanguageName", "PaperName", "SectionPages"),
         "cmmlink.plan.report": ("ReportSettings",),
         "cmmlink.plan.scan": (
             "Datum",
@@ -88,6 +88,7 @@ __all__ = [
     "Registration",
     "ReportSettings",
     "Section",
+    "SectionPages",
     "SerialDevice",
     "Settings",
     "line_of",

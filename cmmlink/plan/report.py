@@ -4,7 +4,7 @@ from pathlib import Path
 
 from pydantic import Field
 
-from cmmlink.plan.papers import LanguageName, PaperName
+from cmmlink.plan.papers import LanguageName, PaperName, SectionPages
 from cmmlink.plan.yaml_model import Settings, Text
 
 REPORT = "how the report looks: a mapping with company, logo, language, paper"
@@ -17,6 +17,11 @@ class ReportSettings(Settings):
     logo: Path | None = Field(default=None, description="a picture, PNG or JPEG, that stands there in place of the name")
     language: LanguageName = Field(default="en", description="the language of the report: en or de")
     paper: PaperName = Field(default="a4", description="the size of its pages: a4 or letter")
+
+    section_pages: SectionPages = Field(
+        default="not-conform",
+        description="of a stack, which sections have a page of their own: not-conform (of many the 30 worst), or all",
+    )
 
     def with_path_from(self, folder: Path) -> "ReportSettings":
         """Give the same with the path of the logo absolute, seen from a folder."""

@@ -102,6 +102,26 @@ def find_run(store: Store, name: str) -> str:
     raise RunError(f"{store.path}: {what}; `cmmlink runs` lists them")
 
 
+def find_stack(store: Store, name: str) -> tuple[str, list[str]]:
+    """The id of a stack of sections and its runs in their order. Raises RunError.
+
+    name : its id, the beginning of one, or a run of it
+    """
+    stacks: dict[str, dict[str, int]] = {}
+    for begin, _ in store.begins_and_ends():
+        place = (_document(store, begin).get("stack") or {}) if not is_damaged(begin) else {}
+        if "stack" in place:
+            stacks.setdefault(place["stack"], {})[str(begin.run)] = place["section"]
+    found = [stack for stack in stacks if stack == name] or [stack for stack in stacks if name and stack.startswith(name)]
+    if len(found) != 1:
+        run = find_run(store, name)
+        found = [stack for stack, runs in stacks.items() if run in runs]
+    if not found:
+        raise RunError(f"{store.path}: run {run} is no section of a surface, so that no stack belongs to it")
+    runs = stacks[found[0]]
+    return found[0], sorted(runs, key=lambda run: runs[run])
+
+
 def recorded_run(store: Store, run: str) -> RecordedRun:
     """Read all but the bulk of a run. Raises StoreError where a record is missing or damaged."""
     found: dict[str, Record] = {}

@@ -27,7 +27,7 @@ from cmmlink.record.store import Store
 from cmmlink.result_json import density_notes, density_of, result_json, stations_of
 from cmmlink.scratch import scratch_in
 from drivers import Arrival, Capture, Decoder, LinkDown, LinkUp, PointBatch
-from inspection import NominalProfile, Reason
+from inspection import NominalProfile, Reason, SectionCharacteristic
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,10 +71,13 @@ def replay_run(
     sinks: Sequence[Sink] = (),
     stop: threading.Event | None = None,
     shown: bool = False,
+    profile: NominalProfile | None = None,
+    numbers: Sequence[SectionCharacteristic] = (),
 ) -> Replay:
     """Evaluate a recorded run again. `decoder_of` gives the decoder of a plan's device, None for one without wire bytes.
 
     `sinks` take the events; setting `stop` aborts the replay. `shown`: somebody looks on, who is told the characteristics meanwhile.
+    `profile` is the nominal of the record, where it is known already; `numbers` are found as well, without a part in the verdict.
 
     Raises StoreError where the record is altered or cannot be read, PlanError where the changed plan cannot be used.
     """
@@ -83,13 +86,13 @@ def replay_run(
         raise StoreError(f"{store.path}: {altered}; what was altered is not evaluated again")
     plan = recorded_plan(recorded)
     changed = _with_changes(plan, tolerance, method)
-    profile = recorded_profile(changed, recorded)
+    profile = profile or recorded_profile(changed, recorded)
     stop = stop or threading.Event()
     decoder = _decoder_of(plan.device, recorded, decoder_of)
     reading = _Reading(_arrivals(store, recorded, decoder, stop))
     source = Capture(reading, decoder, _failure(recorded))
     started = RunStarted.from_header(recorded.header)
-    live = inspection_of(changed, profile, scratch_in(store.path.parent))
+    live = inspection_of(changed, profile, scratch_in(store.path.parent), numbers=numbers)
     doubt = _doubt_of(recorded)
     outcome = run_inspection(
         source, live, sinks, started, buffer_points=plan.buffer_points, clock=clock, stop=stop, doubt=doubt, shown=shown

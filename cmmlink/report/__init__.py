@@ -13,9 +13,11 @@ if TYPE_CHECKING:
     from cmmlink.report.pdf import write_report
     from cmmlink.report.picture_processes import Pictures, processes_here
     from cmmlink.report.recorded_report import input_of_replay, input_on_record
+    from cmmlink.report.recorded_stack import stack_on_record
     from cmmlink.report.report_input import ReportInput, with_settings
     from cmmlink.report.section_pictures import SectionPictures
     from cmmlink.report.stack_folder import write_stack
+    from cmmlink.report.stack_pdf import write_stack_report
     from cmmlink.report.terminal import STYLE_OF, STYLES, print_characteristics, print_summary
 else:
     from cmmlink.front_door import load_on_use
@@ -28,9 +30,11 @@ else:
         "cmmlink.report.nominal_picture": ("write_nominal_picture",),
         "cmmlink.report.pdf": ("write_report",),
         "cmmlink.report.recorded_report": ("input_of_replay", "input_on_record"),
+        "cmmlink.report.recorded_stack": ("stack_on_record",),
         "cmmlink.report.report_input": ("ReportInput", "with_settings"),
         "cmmlink.report.section_pictures": ("SectionPictures",),
         "cmmlink.report.stack_folder": ("write_stack",),
+        "cmmlink.report.stack_pdf": ("write_stack_report",),
         "cmmlink.report.terminal": ("STYLE_OF", "STYLES", "print_characteristics", "print_summary"),
     }
 
@@ -50,6 +54,7 @@ __all__ = [
     "print_characteristics",
     "print_summary",
     "processes_here",
+    "stack_on_record",
     "with_settings",
     "write_comparison_picture",
     "write_nominal_picture",
@@ -57,4 +62,5 @@ __all__ = [
     "write_results",
     "write_run",
     "write_stack",
+    "write_stack_report",
 ]

@@ -10,6 +10,7 @@ from cmmlink.report.picture_processes import Drawing, Pictures, drawn_by_none, p
 if TYPE_CHECKING:
     from cmmlink.stack import SectionOutcome
 
+_KINDS = (".png", ".svg")
 _WORTH_A_PROCESS = 8  # pictures: it takes as long to load matplotlib
 
 
@@ -18,7 +19,7 @@ class SectionPictures:
 
     def __init__(self, title: str, pictures: Pictures) -> None:
         self._title, self._pictures = title, pictures
-        self._begun: list[Drawing] = []
+        self._begun: list[dict[str, Drawing]] = []
 
     def expect(self, sections: int) -> None:
         """Start the processes that are worth it for so many sections."""
@@ -27,12 +28,14 @@ class SectionPictures:
     def begin(self, section: "SectionOutcome") -> None:
         """Let another process draw the next section, where there is one and points were judged."""
         judged = section.run.result is not None and section.run.result.judged
-        self._begun.append(self._pictures.begin(self._content_of(section)) if judged else drawn_by_none())
+        content = self._content_of(section) if judged else None
+        self._begun.append({} if content is None else {suffix: self._pictures.begin(content, suffix) for suffix in _KINDS})
 
-    def write(self, number: int, section: "SectionOutcome", path: Path) -> None:
-        """Write the picture of a section, whose number in the stack counts from 1, and in which points were judged."""
-        begun = self._begun[number - 1] if number <= len(self._begun) else drawn_by_none()
-        self._pictures.write(begun, lambda: self._content_of(section), path)
+    def write(self, number: int, section: "SectionOutcome", *paths: Path) -> None:
+        """Write the picture of a section, whose number in the stack counts from 1 and in which points were judged, as PNG and SVG."""
+        begun = self._begun[number - 1] if number <= len(self._begun) else {}
+        for path in paths:
+            self._pictures.write(begun.get(path.suffix, drawn_by_none()), lambda: self._content_of(section), path)
 
     def _content_of(self, section: "SectionOutcome") -> PictureContent:
         assert section.run.result is not None

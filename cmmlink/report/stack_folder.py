@@ -67,7 +67,7 @@ def write_stack(
     pictures: SectionPictures | None = None,
     on_section: Callable[[], None] = lambda: None,
 ) -> None:
-    """Write result.json, sections.csv, stack.png and for each section its deviations, contours and picture.
+    """Write result.json, sections.csv, stack.png, stack.svg and for each section its deviations, contours and picture.
 
     Of a stack with characteristics there are characteristics.csv and, with the value of each section, stack.csv as well.
 
@@ -90,16 +90,17 @@ def write_stack(
                     if result.uncertainty is not None:
                         write_uncertainty(result.uncertainty, files(f"{own}/uncertainty.csv"))
                     if pictures is not None:
-                        pictures.write(number, section, files(f"{own}/profile.png"))
+                        pictures.write(number, section, files(f"{own}/profile.png"), files(f"{own}/profile.svg"))
                 on_section()
             if pictures is not None:
                 from cmmlink.report.stack_picture import write_stack_picture  # noqa: PLC0415 - it loads matplotlib, half a second
 
-                write_stack_picture(stack, zone, title, files("stack.png"))
+                write_stack_picture(stack, zone, title, *files.together("stack.png", "stack.svg"))
                 if plan is not None:
+                    from cmmlink.report.stack_input import input_of_stack  # noqa: PLC0415 - only reports need it
                     from cmmlink.report.stack_pdf import write_stack_report  # noqa: PLC0415 - it loads reportlab
 
-                    write_stack_report(stack, plan, zone, files("report.pdf"))
+                    write_stack_report(input_of_stack(stack, plan), files("report.pdf"))
     except OSError as error:
         raise PlanError(f"{folder}: the results cannot be written ({error.strerror}); choose another folder with --out") from None
 

@@ -49,9 +49,10 @@ def test_the_command_writes_results_for_the_stack_and_every_section(blade: tuple
     assert sorted(path.name for path in out.iterdir()) == [
         "earlier", "report.pdf", "result.json", "section-001_5.000mm", "section-002_10.500mm", "section-003_15.000mm", "sections.csv",
         "stack.png",
+        "stack.svg",
     ]  # fmt: skip
     own = out / "section-002_10.500mm"
-    assert sorted(path.name for path in own.iterdir()) == ["contours.csv", "deviations.csv", "profile.png"]
+    assert sorted(path.name for path in own.iterdir()) == ["contours.csv", "deviations.csv", "profile.png", "profile.svg"]
     with (own / "contours.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == facts["slices"][1]["received"]

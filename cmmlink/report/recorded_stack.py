@@ -1,0 +1,131 @@
+"""What the report of a stack on record is made of: its sections as they were recorded, and the plan of the stack.
+
+The characteristics of a stack are not on record themselves, but all that they are worked out of is: each section is evaluated again.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from datetime import datetime
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from cmmlink.devices import decoder_of
+from cmmlink.errors import StoreError, YamlError
+from cmmlink.events import Counts
+from cmmlink.pipeline import RunOutcome
+from cmmlink.plan import CtPlan, read_model
+from cmmlink.record import RecordedRun, Store, end_missing, recorded_plan, recorded_profile, recorded_run, replay_run, unpack_judged
+from cmmlink.report.judged_scan import JudgedScan, scan_on_record
+from cmmlink.report.picture_content import PictureContent, content_of
+from cmmlink.report.recorded_report import zone_in
+from cmmlink.report.report_input import places_in, regions_in
+from cmmlink.report.stack_input import MAP_COLUMNS, MapRow, SectionSheet, StackInput, map_row, runs_words
+from cmmlink.result_json import result_json
+from cmmlink.stack_characteristics import JudgedSection, StackQuestions, stack_characteristic_json
+from cmmlink.words import utc_words
+from inspection import JudgedRows, NominalProfile, RegistrationError, Verdict
+
+_DRAWINGS = (".step", ".stp", ".igs", ".iges", ".dxf")  # a solid, or a curve in space, is another nominal at every height
+_VERDICTS = {verdict.word: verdict for verdict in Verdict}
+
+
+def stack_on_record(store: Store, runs: Sequence[str]) -> StackInput:
+    """What the report of a stack is made of, whose sections are these runs, in their order, for as long as the records are open.
+
+    Raises StoreError where a record was altered or cannot be read.
+    """
+    for run in runs:
+        altered, _, _ = store.first_alteration(run)
+        if altered is not None:
+            raise StoreError(f"{store.path}: {altered}; of what was altered there is no report")
+    recorded, profiles = [recorded_run(store, run) for run in runs], _Profiles()
+    place: Mapping[str, Any] = recorded[0].header["stack"]
+    plan = _plan_of(recorded[0], place)
+    shared = [note for note in recorded[0].header.get("notes", ()) if all(note in one.header.get("notes", ()) for one in recorded)]
+    sheets = tuple(_sheet_of(store, one, profiles, shared) for one in recorded)
+    asked = int(place["sections"])
+    of_stack, told = _characteristics(store, plan, recorded, profiles, asked)
+    complete = len(sheets) == asked and all(sheet.document["ending"] == "complete" for sheet in sheets)
+    verdicts = [_VERDICTS[found["verdict"]] for found in (*(sheet.document for sheet in sheets), *of_stack)]
+    verdict = max(*verdicts, Verdict.CONFORM if complete else Verdict.UNCERTAIN)
+    document = {
+        "verdict": verdict.word,
+        "ending": "complete" if complete else "aborted",
+        "measured_at": utc_words(datetime.fromisoformat(recorded[0].header["started"])),
+        "run": runs_words([one.run for one in recorded]),
+        "software": recorded[0].header["software"],
+    }
+    return StackInput(plan, document, sheets, asked, (*shared, *told), of_stack)
+
+
+def _plan_of(section: RecordedRun, place: Mapping[str, Any]) -> CtPlan:
+    """The plan of a stack. Raises StoreError when this version cannot read it."""
+    try:
+        return read_model(place["plan"], CtPlan)
+    except YamlError as error:
+        raise StoreError(f"the plan of the stack of run {section.run} cannot be read by this version of cmmlink: {error}") from None
+
+
+class _Profiles:
+    """The nominal of each section; sections of one nominal share it."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[str, str, str], NominalProfile] = {}
+
+    def of(self, recorded: RecordedRun) -> NominalProfile:
+        plan = recorded_plan(recorded)
+        own = plan.section.model_dump_json() if plan.nominal.file.suffix.lower() in _DRAWINGS else ""
+        key = (recorded.header["nominal_sha256"], plan.nominal.model_dump_json() + plan.discretisation.model_dump_json(), own)
+        if key not in self._known:
+            self._known[key] = recorded_profile(plan, recorded)
+        return self._known[key]
+
+
+def _sheet_of(store: Store, recorded: RecordedRun, profiles: _Profiles, shared: Sequence[str]) -> SectionSheet:
+    header, end = recorded.header, recorded.end or end_missing(store, recorded.run)
+    place, profile = header["stack"], profiles.of(recorded)
+    received = end["received"] or 0
+    found = recorded.result or result_json(None, Counts(received=received, rejected=received))
+    own = [note for note in header.get("notes", ()) if note not in shared] + ([end["message"]] if end["message"] else [])
+    document = found | {"height_mm": place["height_mm"], "ending": end["state"], "run": recorded.run, "notes": own}
+    blocks = partial(_blocks, store, recorded.run)
+    row = MapRow(place["height_mm"], profile.length_mm, np.full(MAP_COLUMNS, np.nan))
+    scan: JudgedScan | None = None
+    if found["rule"] is not None and found["judged"]:
+        scan = scan_on_record(found, zone_in(found["tolerance"]), blocks)
+        stretches = [(one["from_mm"], one["to_mm"], one["worst_mm"]) for one in found["stretches"]]
+        row = map_row(row.height_mm, row.length_mm, scan.station_mm, scan.deviation_mm, stretches, scan.zone.middle_mm)
+
+    def draw() -> PictureContent | None:
+        if scan is None:
+            return None
+        return content_of(scan, profile, "", end["state"], regions=regions_in(document), places_mm=places_in(document))
+
+    return SectionSheet(place["section"], document, end["message"] or "", row, draw)
+
+
+def _blocks(store: Store, run: str) -> Iterator[JudgedRows]:
+    return (unpack_judged(record.body) for record in store.records(run, "deviations"))
+
+
+def _characteristics(
+    store: Store, plan: CtPlan, recorded: Sequence[RecordedRun], profiles: _Profiles, asked: int
+) -> tuple[tuple[Mapping[str, Any], ...], list[str]]:
+    """The characteristics of the stack, and a note where its sections do not come out today as they are on record."""
+    if not plan.stack_characteristics:
+        return (), []
+    questions, judged, differs = StackQuestions(plan), [], []
+    for one in recorded:
+        place, end = one.header["stack"], one.end or end_missing(store, one.run)
+        if one.result is None:
+            outcome = RunOutcome("complete", None, Counts(), None, RegistrationError(end["message"] or "nothing of it was judged"))
+        else:
+            again = replay_run(store, one, decoder_of, profile=profiles.of(one), numbers=questions.numbers(profiles.of(one)))
+            outcome = again.outcome
+            differs += [one.run] if again.identical is False else []
+        judged.append(JudgedSection(place["asked_height_mm"], place["height_mm"], outcome))
+    told = ["the characteristics of the stack were evaluated again from the points on record"]
+    if differs:
+        told.append(f"evaluated again, {len(differs)} sections are not what is on record, the first of them run {differs[0]}")
+    return tuple(stack_characteristic_json(found) for found in questions.judge(judged, asked)), told
