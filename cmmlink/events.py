@@ -7,7 +7,7 @@ A sink is any function that takes an event; it is called in the thread of the ru
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 from drivers import Arrival
@@ -41,6 +41,13 @@ class Counts:
     buffer_peak: int = 0
     stalls: int = 0
     rejected_by_reason: Mapping[str, int] = field(default_factory=dict)
+
+    def broken_off(self, arrived: int) -> "Counts":
+        """The counts of a run that broke off after so many arrived: every point is accounted for, and none waits any more."""
+        received = max(self.received, arrived)
+        left = received - self.judged - self.rejected
+        reasons = {**self.rejected_by_reason, **({"not judged": left} if left else {})}
+        return replace(self, received=received, rejected=self.rejected + left, pending=0, rejected_by_reason=reasons)
 
 
 @dataclass(frozen=True, slots=True)

@@ -82,8 +82,9 @@ class _Tally:
         return Missing(self.lost, self.damaged_bytes, rejected, self.announced, self._arrived, self.begun)
 
     def counts(self, judged: int, rejected_by_reason: Mapping[str, int], buffer: "Buffer[tuple[float, Arrival]]") -> Counts:
-        reasons = Counter(self.rejected_by_driver)
-        reasons.update(rejected_by_reason)
+        reasons = dict(self.rejected_by_driver)
+        for reason, count in rejected_by_reason.items():
+            reasons[reason] = reasons.get(reason, 0) + count
         rejected = sum(reasons.values())
         return Counts(
             received=self.received,
@@ -95,7 +96,7 @@ class _Tally:
             buffered=buffer.waiting,
             buffer_peak=buffer.peak,
             stalls=buffer.stalls,
-            rejected_by_reason=dict(reasons),
+            rejected_by_reason=reasons,
         )
 
 

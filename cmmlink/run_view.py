@@ -130,7 +130,7 @@ class RunView:
         covered = coverage(self._extremes.stations_mm, self.context.profile)
         with self._lock:
             self._failure, self._phase, self._link, self._coverage = message, "finished", "closed", covered
-            self._counts = _settled(self._counts, self._arrived)
+            self._counts = self._counts.broken_off(self._arrived)
             self._publish()
 
     def remark(self, words: str) -> None:
@@ -387,14 +387,6 @@ class RunView:
 
 def _state_of(headline: Headline, final: bool, why: str, further: Sequence[str] = (), of: str = "") -> VerdictState:
     return VerdictState(headline.words, headline.shape, final, why, of, tuple(further))
-
-
-def _settled(counts: Counts, arrived: int) -> Counts:
-    """The counts of a run that broke off: every point that arrived is accounted for, and none waits any more."""
-    received = max(counts.received, arrived)
-    left = received - counts.judged - counts.rejected
-    reasons = {**counts.rejected_by_reason, **({"not judged": left} if left else {})}
-    return replace(counts, received=received, rejected=counts.rejected + left, pending=0, rejected_by_reason=reasons)
 
 
 def _worst_point(worst: NDArray[np.float64] | None) -> WorstPoint | None:

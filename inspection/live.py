@@ -182,7 +182,7 @@ class LiveInspection:
             points = self._compensation.apply(points, self._plane)
         rows, pose, first = self._rows, self._pose, self._rows.count
         taken = (_of_one_type(points), self._plane, self._terms.off_section_max_mm)
-        if pose is not None and len(points) <= BLOCK - first % BLOCK:
+        if pose is not None and len(points) <= BLOCK - (first % BLOCK if self._known_pose is None else 0):
             rows.take_in_judged(*taken, pose, self._terms, self._reserve_mm)
         else:
             rows.take_in(*taken)

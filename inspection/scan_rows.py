@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from inspection.cloud import Cloud, row_blocks
 from inspection.judged_rows import JudgedRows
-from inspection.kernels import JUDGED_AS, NONE_TAKEN, TALLY, Judgement, Places, Room, Taken, judge_few_rows, judge_rows, take_in
+from inspection.kernels import JUDGED_AS, NONE_TAKEN, TALLY, Columns, Judgement, Places, Room, Taken, judge_few_rows, judge_rows, take_in
 from inspection.rigid import RigidTransform
 from inspection.section import XY_PLANE, SectionPlane
 from inspection.signed_deviations import feet_on
@@ -27,6 +27,7 @@ Rows = NDArray[np.int64]
 BLOCK = 64  # points between two moves of the state of a live inspection; the places of the block that is being filled are kept
 _GROWTH = 1.5  # of the columns, where they are full and have to be copied
 _MORE = 1 << 18  # rows that they grow by where they are not copied
+_REASONS = tuple(each.words for each in Rejection if each != Rejection.NONE)  # in the order of their codes, from 1 on
 _USABLE = (Rejection.NONE, Rejection.BEYOND_END, Rejection.IN_HOLLOW)  # the last two depend on the pose that is still being sought
 
 
@@ -70,7 +71,7 @@ class ScanRows:
 
     def take_in(self, points_mm: Array, plane: SectionPlane, off_section_max_mm: float) -> None:
         """Write points (m, 2) or (m, 3) behind the rows so far, as section points. They count once `count` is raised."""
-        first = self._make_room(points_mm, plane)
+        first = self._make_room(len(points_mm), plane)
         take_in(points_mm, plane.packed, off_section_max_mm, self.points, self._columns, self._places, self.base, first)
 
     def take_in_judged(
@@ -81,19 +82,18 @@ class ScanRows:
             self.take_in(points_mm, plane, off_section_max_mm)
             self.judge(self.count, self._end, pose, terms, reserve_mm)
         else:
-            first = self._make_room(points_mm, plane)
+            first = self._make_room(len(points_mm), plane)
             self._judged_to = self._end
             taken = (points_mm, plane.packed, off_section_max_mm)
             self._judge_few(first, self._end, self._places, self.base, pose, terms, reserve_mm, taken)
         self.count = self._end
 
-    def _make_room(self, points_mm: Array, plane: SectionPlane) -> int:
-        """Make room for points behind the rows so far, enter their heights, and return the row of the first."""
-        first, self._end, self.settled_at = self.count, self.count + len(points_mm), None
+    def _make_room(self, more: int, plane: SectionPlane) -> int:
+        """Make room for more points behind the rows so far, and return the row of the first."""
+        first, self._end, self.settled_at = self.count, self.count + more, None
         self._reserve(self._end)
         self.plane = plane
         self._keep_places(first - first % BLOCK, first)
-        self.height[first : self._end] = plane.heights(points_mm) if points_mm.shape[1] == 3 else 0.0
         return first
 
     def judge(self, first: int, stop: int, pose: RigidTransform, terms: Terms, reserve_mm: float = 0.0) -> None:
@@ -151,7 +151,7 @@ class ScanRows:
     @property
     def judged(self) -> int:
         """Rows that have a verdict."""
-        return int(self._tally[JUDGED_AS:].sum())
+        return sum(self._tally.tolist()[JUDGED_AS:])
 
     def count_of(self, verdict: Verdict) -> int:
         """Rows that have this verdict."""
@@ -160,7 +160,7 @@ class ScanRows:
     @property
     def rejected_by_reason(self) -> dict[str, int]:
         """Number of rejected rows for each reason that occurred."""
-        return {each.words: int(self._tally[each]) for each in Rejection if each != Rejection.NONE and self._tally[each]}
+        return {words: count for words, count in zip(_REASONS, self._tally[1:JUDGED_AS].tolist(), strict=False) if count}
 
     def usable(self) -> Cloud:
         """The points that a registration may use, where they lie."""
@@ -196,8 +196,8 @@ class ScanRows:
         return same
 
     @property
-    def _columns(self) -> tuple[Array, Array, NDArray[np.int8], NDArray[np.int8], NDArray[np.int64]]:
-        return self.station, self.deviation, self.verdicts, self.rejection, self._tally
+    def _columns(self) -> Columns:
+        return self.station, self.deviation, self.verdicts, self.rejection, self._tally, self.height
 
     @property
     def _places(self) -> Places:
@@ -229,6 +229,9 @@ class ScanRows:
 
     def _keep_places(self, base: int, held: int) -> None:
         """Hold the places of the rows from `base` on: of those up to `held` as they are known, of the others as not judged yet."""
+        if base == held > self.base and self._end - base <= len(self.actual) == BLOCK:  # what is taken in is entered as not judged
+            self.base = base
+            return
         known = [array[base - self.base : held - self.base] for array in self._places] if base >= self.base else []
         if base == self.base and self._end - base <= len(self.actual):
             return

@@ -68,7 +68,8 @@ class BinaryDecoder:
         data = self._pending + data
         at = 0
         while not self._out.closed:
-            at += self._take_run(data, at)
+            while run := self._take_run(data, at):
+                at += run
             used = self._take_one(data, at)
             if not used:
                 break

@@ -106,10 +106,11 @@ class TcpLine:
 
     def __init__(self, connection: socket.socket) -> None:
         self._connection = connection
+        self._waits_s: float | None = None  # set where it changes alone: each time another thread may take the interpreter
 
     def read(self) -> bytes:
         """Return what is there, at the latest after POLL_S. Raises OSError where the connection is at its end."""
-        self._connection.settimeout(POLL_S)
+        self._wait_at_most(POLL_S)
         try:
             data = self._connection.recv(LARGEST_READ)
         except TimeoutError:
@@ -120,9 +121,14 @@ class TcpLine:
 
     def write(self, data: bytes) -> None:
         """Send all of the data. Raises OSError where it is not taken within WRITE_S."""
-        self._connection.settimeout(WRITE_S)
+        self._wait_at_most(WRITE_S)
         self._connection.sendall(data)
 
     def close(self) -> None:
         """Close the connection."""
         self._connection.close()
+
+    def _wait_at_most(self, seconds: float) -> None:
+        if seconds != self._waits_s:
+            self._waits_s = seconds
+            self._connection.settimeout(seconds)

@@ -55,7 +55,8 @@ class _KeptCode(FunctionCache):  # type: ignore[misc]  # numba has no types
 
 def kernel(function: _Function, **options: bool) -> _Function:
     """Compile on the first call and keep the result on disk; where nothing can be written, compile in every process."""
-    compiled = njit(error_model="numpy", nogil=True, no_cfunc_wrapper=True, **options)(function)
+    options = {"nogil": True, "no_cfunc_wrapper": True} | options
+    compiled = njit(error_model="numpy", **options)(function)
     try:
         with _code_kept_in_stamped_folder():
             kept = _KeptCode(function)
@@ -63,6 +64,11 @@ def kernel(function: _Function, **options: bool) -> _Function:
         return cast(_Function, compiled)
     compiled._cache = kept
     return cast(_Function, compiled)
+
+
+def brief_kernel(function: _Function) -> _Function:
+    """Compile what takes a few microseconds: it keeps the interpreter. To have that again may take milliseconds beside another thread."""
+    return kernel(function, nogil=False)
 
 
 def inner_kernel(function: _Function, **options: bool) -> _Function:

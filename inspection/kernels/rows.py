@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inspection.kernels.blocks import CurveTables
-from inspection.kernels.compiling import kernel
+from inspection.kernels.compiling import brief_kernel, kernel
 from inspection.kernels.feet import Feet
 from inspection.kernels.layout import (
     BEYOND_END,
@@ -31,7 +31,7 @@ from inspection.kernels.pose_sums import new_feet
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int8]
-Columns = tuple[Array, Array, Codes, Codes, NDArray[np.int64]]  # plain tuples: a named one takes numba a microsecond a call
+Columns = tuple[Array, Array, Codes, Codes, NDArray[np.int64], Array]  # plain tuples: a named one takes numba a microsecond a call
 Places = tuple[Array, Array, Array]
 Judgement = tuple[float, float, float, float, float]
 Taken = tuple[Array, Array, float]
@@ -57,7 +57,7 @@ def judge_rows(
     """Place rows first .. stop - 1 of the section points (n, 2), project them, and enter what they are found to be.
 
     columns   : station and deviation in mm (n,), codes of the verdict and of the rejection (n,), NaN and NOT_JUDGED where there is no
-                verdict; and how many rows have each rejection and, from JUDGED_AS on, each verdict (TALLY,)
+                verdict; how many rows have each rejection and, from JUDGED_AS on, each verdict (TALLY,); heights above the plane (n,)
     places    : surface points, nominal points and directions of the deviation, (w, 2) each, of the rows from `base` on
     pose      : cosine and sine of the rotation, then the shift in mm (x, y)
     project   : feet of points (m, 2) in nominal coordinates; a row that cannot be used comes as NaN
@@ -92,7 +92,7 @@ def judge_few_rows(
     _judge_few(section_mm, columns, places, base, first, stop, pose, curve, judgement, taken)
 
 
-@kernel
+@brief_kernel
 def _judge_few(
     section: Any, columns: Any, places: Any, base: int, first: int, stop: int, pose: Any, curve: Any, judgement: Any, taken: Any
 ) -> None:
@@ -118,10 +118,10 @@ def take_in(
     _take_in(points_mm, plane, off_section_max_mm, section_mm, columns, places, base, at)
 
 
-@kernel
+@brief_kernel
 def _take_in(points: Any, plane: Any, off_section_max: float, section: Any, columns: Any, places: Any, base: int, at: int) -> None:
     flat = points.shape[1] == 2
-    stations, deviations, verdicts, rejection, tally = columns
+    stations, deviations, verdicts, rejection, tally, heights = columns
     for i in range(len(points)):
         row = at + i
         x, y, height = points[i, 0], points[i, 1], 0.0
@@ -130,7 +130,7 @@ def _take_in(points: Any, plane: Any, off_section_max: float, section: Any, colu
             x = px * plane[PLANE_X_AXIS] + py * plane[PLANE_X_AXIS + 1] + pz * plane[PLANE_X_AXIS + 2]
             y = px * plane[PLANE_Y_AXIS] + py * plane[PLANE_Y_AXIS + 1] + pz * plane[PLANE_Y_AXIS + 2]
             height = px * plane[PLANE_NORMAL] + py * plane[PLANE_NORMAL + 1] + pz * plane[PLANE_NORMAL + 2]
-        section[row, 0], section[row, 1] = x, y
+        section[row, 0], section[row, 1], heights[row] = x, y, height
         if not (np.isfinite(x) and np.isfinite(y) and np.isfinite(height)):
             rejection[row] = NOT_FINITE
         elif abs(height) > off_section_max:
@@ -179,7 +179,7 @@ def _judge(
     places: Any,
 ) -> None:
     outward, tip, lower, upper, uncertainty = judgement
-    stations, deviations, verdicts, rejection, tally = columns
+    stations, deviations, verdicts, rejection, tally, _ = columns
     actual, feet, normals = places
     for i in range(len(distance)):
         row, place = first + i, first + i - base

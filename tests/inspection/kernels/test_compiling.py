@@ -203,7 +203,7 @@ def test_python_calls_no_kernel_that_is_there_for_other_kernels_alone(path: Path
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("inspection.kernels."):
             there = path.with_name(f"{(node.module or '').rpartition('.')[2]}.py")
             inner |= kernels_in(there, "inner_kernel", "inlined_kernel") & {name.name for name in node.names}
-    kernels = kernels_in(path, "kernel", "inner_kernel", "inlined_kernel")
+    kernels = kernels_in(path, "kernel", "brief_kernel", "inner_kernel", "inlined_kernel")
     for function in (node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef) and node.name not in kernels):
         called = {node.func.id for node in ast.walk(function) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)}
         assert not called & inner, function.name

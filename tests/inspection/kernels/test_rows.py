@@ -21,12 +21,13 @@ def test_points_are_taken_into_the_plane_and_rejected_for_what_they_are() -> Non
     section, rejection = np.full((8, 2), -1.0), np.full(8, 77, dtype=np.int8)
     columns, places = columns_of(rejection), (np.zeros((9, 2)), np.zeros((9, 2)), np.zeros((9, 2)))
     take_in(points, PLANE.packed, 0.5, section, columns, places, -1, 1)
-    station, deviation, verdicts, _, tally = columns
+    station, deviation, verdicts, _, tally, height = columns
     assert np.isnan(station).tolist() == np.isnan(deviation).tolist() == (verdicts == NOT_JUDGED).tolist() == [False, *[True] * 6, False]
     assert [np.isnan(place[:, 0]).tolist() for place in places] == [[False, False, *[True] * 6, False]] * 3
     assert tally.tolist() == [2, 2, 2, *[0] * (TALLY - 3)]
     assert rejection.tolist() == [77, 0, 0, Rejection.OFF_SECTION, Rejection.OFF_SECTION, Rejection.NOT_FINITE, Rejection.NOT_FINITE, 77]
     assert np.array_equal(section[[1, 2]], [(0.0, 0.0), (1.0, 2.0)])
+    assert height[1:5] == pytest.approx([0.0, 0.2, 0.6, -0.6], abs=1e-14)
     assert np.array_equal(section[[0, 7]], np.full((2, 2), -1.0))
 
 
@@ -44,7 +45,7 @@ def judged(deviation: Array, zone: ToleranceZone, rejection: ArrayLike, vertex: 
     tally[JUDGED_AS] = m  # the verdict 0, until they are judged
     limits: Judgement = (1.0, 0.25, zone.lower_mm, zone.upper_mm, zone.uncertainty_mm)
     judge_rows(foot, columns, places, 0, 0, m, (1.0, 0.0, 0.0, 0.0), lambda _: feet, limits)
-    _, found, verdicts, rejections, _ = columns
+    _, found, verdicts, rejections, _, _ = columns
     assert tally[:JUDGED_AS].tolist() == np.bincount(rejections, minlength=JUDGED_AS).tolist()
     assert tally[JUDGED_AS:].tolist() == np.bincount(verdicts[verdicts != NOT_JUDGED], minlength=TALLY - JUDGED_AS).tolist()
     return found, verdicts, rejections
@@ -53,7 +54,7 @@ def judged(deviation: Array, zone: ToleranceZone, rejection: ArrayLike, vertex: 
 def columns_of(rejection: Codes) -> Columns:
     """Columns of rows that are not judged yet, and an empty tally."""
     m = len(rejection)
-    return np.zeros(m), np.zeros(m), np.zeros(m, dtype=np.int8), rejection, np.zeros(TALLY, dtype=np.int64)
+    return np.zeros(m), np.zeros(m), np.zeros(m, dtype=np.int8), rejection, np.zeros(TALLY, dtype=np.int64), np.zeros(m)
 
 
 @pytest.mark.parametrize("uncertainty", [0.0, 0.125])
