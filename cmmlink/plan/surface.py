@@ -4,6 +4,7 @@ Relative paths are relative to the plan's own folder. Every field says in its de
 from these descriptions.
 """
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Self
 
@@ -17,6 +18,8 @@ from cmmlink.plan.scan import OUT, RECORDS, Nominal, Part, Registration, ResultF
 from cmmlink.plan.stack_characteristics import AskedOfStack
 from cmmlink.plan.yaml_model import Positive, Settings, read_model
 from drivers import PointFileError, mm_per, read_text
+
+_SAME_HEIGHT_MM = 1e-6  # of two sections of one stack: over a shorter way no slope means anything
 
 
 class Mesh(Settings):
@@ -104,7 +107,7 @@ class CtPlan(Deciding):
         sections: Sections | None = info.data.get("sections")
         if sections is not None and asked and sections.every_mm is None:
             heights = sections.heights_mm
-            if len(set(heights)) < max(len(heights), 2):
+            if len(heights) < 2 or any(high - low < _SAME_HEIGHT_MM for low, high in pairwise(sorted(heights))):
                 raise ValueError("sections at two heights or more, each once")
             for one in asked:
                 for key in ("reference_mm", "root_mm", "tip_mm"):

@@ -18,6 +18,7 @@ from inspection.evaluation.basis import Basis, filter_deviations
 from inspection.evaluation.datum import UNSTATED
 from inspection.evaluation.placing import Placed, certify_run, consume_least, is_constant, place, place_so_far, shrink_zone
 from inspection.evaluation.region_uncertainty import uncertainty_of
+from inspection.filters import FilteredProfile
 from inspection.gaps import Measured
 from inspection.placements import PlacementSearch
 from inspection.rigid import RigidTransform
@@ -207,9 +208,23 @@ def _see_filtered(asked: LineProfile, basis: Basis, rows: Rows, pose: RigidTrans
     d = basis.deviations_at(rows, pose)
     filtered = filter_deviations(d, basis.nominal, asked.filter)
     notes = () if filtered.settled else ("the robust filter's limit did not settle",)
+    notes = (*notes, *_notes_on_raw(_judge(asked, d.deviation_mm, d.station_mm, d.foot_mm, d.beyond_end, basis), filtered))
     places = d.foot_mm + filtered.waviness_mm[:, None] * d.normal
     seen = _judge(asked, filtered.waviness_mm, d.station_mm, places, d.beyond_end, basis)
     return replace(seen, notes=notes)
+
+
+def _notes_on_raw(raw: _Seen, filtered: FilteredProfile) -> tuple[str, ...]:
+    """What a filter has taken away: a defect that is shorter than its cutoff is judged by what is left of it."""
+    spikes = int(np.count_nonzero((filtered.weight == 0.0) & np.isfinite(filtered.waviness_mm)))
+    told = []
+    if filtered.rounds > 1 and spikes:
+        told.append(f"the robust filter took {spikes} point{'s' * (spikes > 1)} for spikes, which count for nothing")
+    if raw.beyond and raw.worst is not None:
+        lies = "s lie" if raw.beyond > 1 else " lies"
+        worst = f"{raw.worst.deviation_mm:+.4f} mm at station {raw.worst.station_mm:.2f} mm"
+        told.append(f"before the filter {raw.beyond} point{lies} beyond the limits, the worst {worst}")
+    return tuple(told)
 
 
 _NOTHING = _Seen(0, 0, None, (math.nan, math.nan), -1.0, math.nan, 0, (0.0, 0))
@@ -261,7 +276,9 @@ def _decide(
     why = _why(asked, seen, basis.terms.zone.rule)
     if asked.features is not None:
         return placed, seen, *_judge_at_datum(asked, basis, few, placed, seen, why)
-    if seen.verdict is not Verdict.NONCONFORM or placed.is_known:
+    if placed.doubt is not None:
+        return placed, seen, Verdict.UNCERTAIN, placed.doubt
+    if seen.verdict is not Verdict.NONCONFORM or (placed.is_known and placed.converged):
         return placed, seen, seen.verdict, why
     if asked.filter is not None or (asked.rule == "best-fit" and asked.fit in ("best-fit", "none")):
         return placed, seen, *_doubt_fit(asked, basis, placed, why)
@@ -306,6 +323,8 @@ def _doubt_fit(asked: LineProfile, basis: Basis, placed: Placed, why: Reason | N
     if not basis.complete or covered < (basis.terms.coverage_min or _PLACED):
         words = f"Too little was measured ({covered:.1%}) to place the part: in another placement no point may be out."
         return Verdict.UNCERTAIN, Reason("placement", words)
+    if not placed.converged:
+        return Verdict.UNCERTAIN, Reason("fit", "Points are out at the pose of a fit that did not settle: another one may have none.")
     if basis.result.registration.rivals:
         words = "The part fits the nominal in another pose as well: only a datum can tell whether points are out."
         return Verdict.UNCERTAIN, Reason("placement", words)

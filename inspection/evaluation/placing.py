@@ -49,7 +49,7 @@ class Placed:
     converged   : the fit settled
     certificate : of a minimum zone or a least consumption over every placement; its rows are those of the run
     datum       : the features that the part was placed by, where these were measured
-    doubt       : why the pose decides nothing, where it does not: the datum that was asked for was not found
+    doubt       : why the pose decides nothing, where it does not: the datum that was asked for was not found, or too few points for a fit
     """
 
     pose: RigidTransform
@@ -66,12 +66,14 @@ def place(asked: LineProfile, basis: Basis, every: Rows, rows: Rows) -> Placed:
     """Find the pose of a characteristic from all rows of its region, and from those (k,) of them that tell how far they go."""
     if asked.features is not None:
         return _place_by(asked.features, basis)
-    if asked.fit == "none" or len(rows) < _FEWEST_POINTS:
+    if asked.fit == "none":
         return Placed(basis.pose, "none", is_known=basis.terms.known_pose is not None)
     start = basis.pose if asked.datum is None else asked.datum
     start_known = asked.datum is not None or basis.terms.known_pose is not None
     if asked.fit == "datum":
         return Placed(start, "datum", is_known=start_known)
+    if len(rows) < _FEWEST_POINTS:
+        return Placed(start, "none", doubt=_too_few(len(rows)))
     drawn = basis.drawn(every)
     freedoms = asked.freedoms or _all_free(basis.result.section_at(drawn), start)
     best = register_within(
@@ -94,14 +96,21 @@ def place(asked: LineProfile, basis: Basis, every: Rows, rows: Rows) -> Placed:
         least = consume_least(asked, basis, points, best.registration.nominal_from_section, None if free else start)
         proof = _certify_consumption(asked, basis, points, least, rows) if free else None
         fit = least if proof is None else proof.fit
-        return Placed(fit.nominal_from_section.snap_to_grid(), words, False, free, fit.converged, proof)
+        return Placed(fit.nominal_from_section.snap_to_grid(), words, is_free=free, converged=fit.converged, certificate=proof)
     if not free:
         zone = shrink_zone(asked, basis, points, start)
-        return Placed(zone.nominal_from_section.snap_to_grid(), words, False, False, zone.converged)
+        return Placed(zone.nominal_from_section.snap_to_grid(), words, converged=zone.converged)
     gap_mm = float(asked.zone.upper_mm[0] - asked.zone.lower_mm[0]) * (_GAP_SHARE if asked.region is None else _GAP_SHARE_REGION)
     certificate = _certify(basis, points, best.registration, middle_of(asked.zone, basis, rows), gap_mm)
     settled = certificate.balanced or certificate.proven  # points all on the nominal balance nothing, and no zone is smaller
-    return Placed(certificate.nominal_from_section.snap_to_grid(), words, False, True, settled, _in_run(certificate, rows))
+    pose = certificate.nominal_from_section.snap_to_grid()
+    return Placed(pose, words, is_free=True, converged=settled, certificate=_in_run(certificate, rows))
+
+
+def _too_few(points: int) -> Reason | None:
+    """Why so few points place nothing; None without a point, of which another reason tells."""
+    few = f"{points} point{'s are' if points > 1 else ' is'} too few for a fit; measure this region more densely."
+    return Reason("fit", few) if points else None
 
 
 def _place_by(features: DatumFeatures, basis: Basis) -> Placed:

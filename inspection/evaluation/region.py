@@ -14,6 +14,8 @@ from inspection.signed_deviations import deviations
 Array = NDArray[np.float64]
 FeatureName = Literal["LE", "TE", "UPPER", "LOWER"]
 
+_ONE_SIDE = 0.499  # of the outline: what lies around an edge meets itself on the other side of the section
+
 
 @dataclass(frozen=True, slots=True)
 class Features:
@@ -51,6 +53,8 @@ def features_of(nominal: NominalProfile, section: AirfoilSection | None = None) 
     section = section or find_airfoil(nominal)
     stations = section.curve.station_mm(np.array([section.nose, section.first, section.last]))
     nose, first, last = (float(station) for station in stations)
+    if section.trailing in ("round", "sharp"):
+        last = first  # one place, of which a station a hair apart would make its flat the whole way around
     if not nominal.curve.closed:
         last = nominal.length_mm
     return Features(nose, first, last, section.upper_first, nominal.length_mm, nominal.curve.closed)
@@ -108,7 +112,8 @@ def region_around(features: Features, edge: Edge, stations_mm: Array, at_least_m
         off = stations_mm - tip
         return np.mod(off + length / 2, length) - length / 2 if features.closed else off
 
-    reach_before = float((-beyond(before)).max(initial=at_least_mm))
-    reach_behind = float(beyond(behind).max(initial=at_least_mm))
     flat = (behind - before) % length if features.closed else 0.0
+    most = (length - flat) * _ONE_SIDE
+    reach_before = min(float((-beyond(before)).max(initial=at_least_mm)), most)
+    reach_behind = min(float(beyond(behind).max(initial=at_least_mm)), most)
     return (_region(features, before - reach_before, before + flat + reach_behind),)

@@ -65,6 +65,7 @@ PLACED: tuple[SectionKind, ...] = ("chord-angle", "twist", "displacement")  # ki
 _NO_DATUM = "It is counted from a datum (registration.datum): a fit of all freedoms leaves nothing of it."
 _FEWEST_POINTS = 4  # of a fit: one more than there are freedoms
 _TIP_KNOTS = 3.0  # knots of the actual section to either side of a tip, on which its curvature depends
+_ON_ARC = 2.0  # times as far from the tip as an arc of the radius would have turned so far, or this part of it, ends an edge's window
 _OF_DRAWING = 2.0  # times the difference between both ways of drawing edges: what a value is doubted by
 _AXES = {"x": 0, "y": 1, "total": 2}
 
@@ -113,11 +114,29 @@ def with_nominal(asked: SectionCharacteristic, nominal: Callable[[], Outline]) -
     else:
         section = nominal().section
         found = _MEASURES[asked.type](nominal(), asked)
+        _refuse_wide_window(asked, found)
     drawn = 0.0 if asked.type == "twist" else found.value
     value = drawn if math.isnan(asked.nominal_value) else asked.nominal_value
     asked = replace(asked, section=section, nominal=found, nominal_value=value)
     measure = _measure_of(asked)
     return replace(asked, sensitivities=OnFirstUse(lambda: nominal().moved.value.sensitivities(measure)) if measure is not None else None)
+
+
+def _refuse_wide_window(asked: SectionCharacteristic, found: SectionValue) -> None:
+    """Raise InspectionError where the window of an edge's circle runs on into the sides: a circle through these is no radius of the edge.
+
+    The window of an arc ends where the arc has turned so far: as far from the tip as the radius says.
+    """
+    if (asked.type, asked.method) != ("edge-radius", "circle"):
+        return
+    tip, _, *ends = found.places_mm
+    by_radius = 2 * found.value * math.sin(math.radians(asked.window_deg) / 2)
+    away = [float(np.hypot(*(end - tip))) for end in ends]
+    if max(away) > _ON_ARC * by_radius or min(away) < by_radius / _ON_ARC:
+        raise InspectionError(
+            f"a window of {asked.window_deg:g} degrees reaches {max(away):.4g} mm from the tip of the {asked.edge} edge, into its sides: "
+            f"the circle through it has a radius of {found.value:.4g} mm, which is none of the edge; choose a smaller window_deg"
+        )
 
 
 def _measure_of(asked: SectionCharacteristic) -> Callable[[Outline], float] | None:

@@ -32,6 +32,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _SAME_HEIGHT_MM = 1e-9
+_FEWEST_OFF_A_LINE = 3
 _MOST_DOUBTS = 3  # that are told
 _MOST_HEIGHTS = 6  # that are named
 _TURNED_MEAN = "its directions are those of the nominals, turned by the mean twist of the sections: the plan has no datum"
@@ -88,6 +89,8 @@ def _judge(
     heights = [section.height_mm for section in sections] if len(verdicts) == len(sections) else []
     at = heights[worst] if heights else math.nan
     told = [] if lost is None else [lost]
+    if _lies_straight(asked, len(sections)):
+        told.append(Reason("no-value", "Two sections lie on a straight line whatever the part is; cut a third one."))
     if verdicts[worst] is not Verdict.CONFORM and proven[worst]:
         told.insert(0, _limit_reason(asked, values, (nominal, float(deviation[worst]), float(values.value[worst])), verdicts[worst], at))
     reasons = (*told, *_told_doubts(sections, doubts)) if verdict is not Verdict.CONFORM else ()
@@ -186,6 +189,8 @@ def _evaluate(asked: StackCharacteristic, sections: Sequence[MeasuredSection]) -
     k, every = len(sections), np.ones((1, len(sections)), dtype=bool)
     heights = np.array([section.height_mm for section in sections])
     numbers = np.array([[_value(section, number.name) for number in asked.numbers] for section in sections])
+    if _lies_straight(asked, k):
+        numbers[:] = np.nan
     known = np.isfinite(numbers).all(axis=1)
     if asked.type == "taper":
         return _taper(asked, sections, known)
@@ -208,6 +213,11 @@ def _evaluate(asked: StackCharacteristic, sections: Sequence[MeasuredSection]) -
         notes = (*notes, _TURNED_MEAN)
     value = math.nan if stack is None else _of_axis(asked, stack)
     return _Values(np.array([value]), every, 0.0, unit, method, notes)
+
+
+def _lies_straight(asked: StackCharacteristic, sections: int) -> bool:
+    """Whether so few sections leave nothing to find: two always lie on the line that bow and straightness are counted from."""
+    return sections < _FEWEST_OFF_A_LINE and (asked.type, asked.method) in (("bow", asked.method), ("stacking-axis", "straightness"))
 
 
 def _value(section: MeasuredSection, name: str) -> float:

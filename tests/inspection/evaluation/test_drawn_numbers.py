@@ -23,6 +23,7 @@ from inspection import (
     with_nominal,
 )
 from inspection.characteristics.inscribed import continue_to_edges, inscribe_circles
+from inspection.characteristics.outline import Edge
 from tests.inspection.profiles import Array, even_in_arc_length, left_normal
 
 POINTS = 1500
@@ -105,3 +106,16 @@ def test_a_camber_line_that_was_followed_to_no_edge_is_refused() -> None:
     for part, edge in ((slice(60, None), "leading"), (slice(None, -60), "trailing")):
         with pytest.raises(InspectionError, match=f"no circle touches both sides over the last .* before the {edge} edge"):
             continue_to_edges(section, inscribe_circles(section, whole.u[part]))
+
+
+@pytest.mark.parametrize("edge", ["leading", "trailing"])
+def test_a_window_that_runs_into_the_sides_gives_no_radius_of_the_edge(edge: Edge) -> None:
+    """From 90 degrees on it holds a whole side, and the circle through it has a radius of 500 mm, which noise moves by 60."""
+    outline = Outline(find_airfoil(blade()))
+    for window in (1.0, 30.0, 60.0):
+        asked = SectionCharacteristic("radius", "edge-radius", "circle", -1.0, 1.0, edge=edge, window_deg=window)
+        assert with_nominal(asked, lambda: outline).nominal_value < 1.2
+    for window in (90.0, 120.0, 180.0):
+        asked = SectionCharacteristic("radius", "edge-radius", "circle", -1.0, 1.0, edge=edge, window_deg=window)
+        with pytest.raises(InspectionError, match=f"window of {window:g} degrees reaches .* into its sides"):
+            with_nominal(asked, lambda: outline)

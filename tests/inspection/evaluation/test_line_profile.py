@@ -10,6 +10,8 @@ from inspection import (
     Freedoms,
     LineProfile,
     LiveInspection,
+    ProfileFilter,
+    Region,
     RigidTransform,
     StatedUncertainty,
     ToleranceZone,
@@ -163,3 +165,43 @@ def test_a_minimum_zone_with_locked_freedoms_that_is_not_proven_too_wide_is_no_n
 def test_too_few_points_for_a_fit_prove_nothing() -> None:
     found = named(run(good()[: COUNT // 24]))
     assert {one.verdict for one in found.values()} == {Verdict.UNCERTAIN}
+
+
+def test_a_region_with_too_few_points_for_its_fit_is_proven_nowhere_else_than_where_it_was_asked_for() -> None:
+    """Two points in a region, a part 0.3 mm off its datum: it lies out there, and no fit of a region says anything of it."""
+    region = Region(0.2 * nominal().length_mm, 0.206 * nominal().length_mm)
+    locked = Freedoms.about((0.0, 0.0), ("x",))
+    asked = [
+        LineProfile("none", even(-0.06, 0.06), region=region, fit="none"),
+        LineProfile("datum", even(-0.06, 0.06), region=region, fit="datum", datum=DATUM),
+        *(LineProfile(fit, even(-0.06, 0.06), region=region, fit=fit) for fit in ("best-fit", "minimum-zone", "tolerance")),
+        *(
+            LineProfile(f"{fit} within", even(-0.06, 0.06), region=region, fit=fit, datum=DATUM, freedoms=locked)
+            for fit in ("best-fit", "minimum-zone", "tolerance")
+        ),
+        LineProfile("by its fit", even(-0.06, 0.06), region=region, fit="best-fit", rule="best-fit"),
+    ]
+    found = named(run(RigidTransform(0.0, np.array([0.0, 0.3])).apply(good()), asked=tuple(asked)))
+    assert found["none"].verdict is Verdict.CONFORM
+    assert found["datum"].verdict is Verdict.NONCONFORM
+    for one in asked[2:]:
+        assert found[one.name].verdict is Verdict.UNCERTAIN
+        assert "too few for a fit" in found[one.name].reasons[0].words
+
+
+def test_a_filtered_verdict_tells_what_the_filter_took_away() -> None:
+    """A dent that is shorter than the cutoff passes a filter; what it was stands beside the verdict."""
+    dented = points_at(stations(), form(stations(), -0.3, 60.0, 0.5))
+    asked = [
+        LineProfile("raw", even(-0.06, 0.06), fit="none"),
+        *(
+            LineProfile(name, even(-0.06, 0.06), fit="none", filter=ProfileFilter(20.0, 2, name == "robust"))
+            for name in ("plain", "robust")
+        ),
+    ]
+    found = named(run(dented, asked=tuple(asked)))
+    assert found["raw"].notes == ()
+    for name in ("plain", "robust"):
+        assert any("before the filter 1 point lies beyond the limits" in note for note in found[name].notes)
+    assert any("for spikes" in note for note in found["robust"].notes)
+    assert not any("for spikes" in note for note in found["plain"].notes)

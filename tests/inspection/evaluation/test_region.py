@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from inspection import NominalError, Region, discretize, features_of, region_between, station_near
+from inspection import NominalError, NurbsCurve, Region, discretize, features_of, region_between, station_near
 from inspection.evaluation.region import is_inside, region_around
 from inspection.gaps import measure, measure_region
 from tests.inspection import profiles
@@ -40,6 +40,30 @@ def test_a_circle_has_no_edges_but_an_open_profile_two_ends() -> None:
     assert region_between(CIRCLE, ROUND - 5, ROUND + 5.0).to_mm == pytest.approx(5.0)
     with pytest.raises(ValueError, match="begins where it ends"):
         region_between(CIRCLE, 5.0, 5.0)
+
+
+@pytest.mark.parametrize("size", [1e-3, 3e-3, 0.01, 0.1, 0.3, 1.0, 3.0, 7.0, 30.0, 1e3])
+def test_a_round_trailing_edge_is_one_place_however_round_off_falls(size: float) -> None:
+    """Its two ends have stations a hair apart, and the way from one to the other is not all around the section."""
+    turn = np.linspace(0.0, 2 * np.pi, 61)[:-1]
+    places = np.column_stack([50 * np.cos(turn), (6 - 2 * np.cos(turn)) * np.sin(turn)]) * size
+    profile = discretize(NurbsCurve.interpolate(places, closed=True), samples=200)
+    features, within = features_of(profile), 4 * size
+    edge = features.edge("TE", within)
+    assert features.first == features.last
+    assert (edge.to_mm - edge.from_mm) % profile.length_mm == pytest.approx(2 * within)
+    (around,) = region_around(features, "trailing", np.array([features.first + within, features.last - within]), size)
+    assert (around.to_mm - around.from_mm) % profile.length_mm == pytest.approx(2 * within)
+
+
+def test_what_lies_around_an_edge_is_less_than_the_whole_section() -> None:
+    """Places on both sides may be as far from the edge as the other edge is."""
+    features = features_of(nominal())
+    half = features.length_mm / 2
+    for edge in ("leading", "trailing"):
+        tip = features.nose if edge == "leading" else features.first
+        (around,) = region_around(features, edge, np.mod(tip + np.array([-half, half]), features.length_mm), half)
+        assert 0.9 * features.length_mm < (around.to_mm - around.from_mm) % features.length_mm < features.length_mm
 
 
 def test_stations_lie_in_a_region_that_crosses_the_seam() -> None:

@@ -203,6 +203,18 @@ def test_a_stack_without_enough_sections_has_no_value() -> None:
         judge_stack([KINDS["bow"]], sections(KINDS["bow"])[::-1])
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_two_sections_prove_nothing_that_two_always_have(kind: str) -> None:
+    """They lie on a straight line, so a bent blade had no bow and a straight axis, and conformed; the other kinds keep their values."""
+    found = judged(KINDS[kind], sections(KINDS[kind])[:2]).found
+    if kind not in ("bow", "straightness"):
+        assert math.isfinite(found.value)
+        return
+    assert math.isnan(found.value)
+    assert found.verdict is Verdict.UNCERTAIN
+    assert "cut a third one" in found.reasons[0].words
+
+
 def with_u(section: MeasuredSection, u: float, moved: dict[str, float] | None = None) -> MeasuredSection:
     """The section with numbers of this U, and off by so much."""
     off = moved or {}
