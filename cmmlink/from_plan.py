@@ -1,12 +1,12 @@
 """Builds what a plan describes, except its device: the nominal profile and the inspection. Errors name file, line and key."""
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
-from typing import TypedDict
+from typing import TypedDict, TypeVar
 
 import numpy as np
 
@@ -34,22 +34,46 @@ from inspection import (
     uncertainty_along,
 )
 
+Found = TypeVar("Found")
+
 
 def check_plan(plan: Plan, plan_file: Path) -> NominalProfile:
     """Build the profile of a plan and check the values that depend on it. Raises PlanError with file, line and key."""
-    with name_place(plan_file, "nominal.file"):
-        profile = profile_of(plan)
-    with name_place(plan_file, "temperature" if plan.temperature is not None else "uncertainty.temperature"):
-        check_fixed_place(plan)
-    with name_place(plan_file, "uncertainty"):
-        zone_of(plan, profile)
-    builder = Builder(plan, profile)
-    for number in range(len(plan.characteristics)):
-        with name_place(plan_file, f"characteristics.{number}"):
-            builder.build(number)
-    with name_place(plan_file, "probe.tip_radius_mm"):
-        inspection_of(plan, profile, characteristics=())
+    profile, problems = find_problems(plan, plan_file)
+    if problems or profile is None:
+        raise problems[0]
     return profile
+
+
+def find_problems(plan: Plan, plan_file: Path) -> tuple[NominalProfile | None, tuple[PlanError, ...]]:
+    """The profile of a plan, and everything that is wrong with the values that depend on it, each with file, line and key."""
+    found = Problems(plan_file)
+    profile = found.attempt("nominal.file", lambda: profile_of(plan))
+    found.attempt("temperature" if plan.temperature is not None else "uncertainty.temperature", lambda: check_fixed_place(plan))
+    if profile is not None:
+        found.attempt("uncertainty", lambda: zone_of(plan, profile))
+        builder = Builder(plan, profile)
+        for number in range(len(plan.characteristics)):
+            found.attempt(f"characteristics.{number}", partial(builder.build, number))
+        found.attempt("probe.tip_radius_mm", lambda: inspection_of(plan, profile, characteristics=()))
+    return profile, tuple(found.problems)
+
+
+class Problems:
+    """Collects what is wrong with a plan, step by step."""
+
+    def __init__(self, plan_file: Path) -> None:
+        self._plan_file = plan_file
+        self.problems: list[PlanError] = []
+
+    def attempt(self, key: str, step: Callable[[], Found]) -> Found | None:
+        """Take a step that depends on a key; None where it fails, which is kept with the place of the key."""
+        try:
+            with name_place(self._plan_file, key):
+                return step()
+        except PlanError as problem:
+            self.problems.append(problem)
+            return None
 
 
 @contextmanager

@@ -6,31 +6,24 @@ Contours beside it are counted and reported, never judged.
 
 import logging
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from cmmlink.characteristics import notes_on_zone
 from cmmlink.errors import PlanError
 from cmmlink.events import Ending, RunStarted
 from cmmlink.from_plan import (
-    asked_of,
     check_fixed_place,
-    discretize_file,
-    load_from,
     notes_on_temperature,
-    profile_of,
     run_started,
-    zone_of,
 )
 from cmmlink.outline import outline_of
 from cmmlink.pipeline import RunOutcome
-from cmmlink.plan import CtPlan, Discretisation, Plan
+from cmmlink.plan import CtPlan
 from cmmlink.record import PATIENCE_S, RecordReference, open_to_record
 from cmmlink.result_folder import folder_of
 from cmmlink.result_json import result_json
@@ -44,6 +37,7 @@ from cmmlink.section_run import (
     refuse_section,
 )
 from cmmlink.stack_characteristics import JudgedSection, StackQuestions, stack_characteristic_json
+from cmmlink.stack_inputs import Open3DOnUse, StackProfiles, check_own_nominals, heights_of, read_surface
 from cmmlink.words import utc_words
 from drivers.surface import (
     Contour,
@@ -54,19 +48,13 @@ from drivers.surface import (
     Open3DProcess,
     SurfaceMesh,
     SurfaceSection,
-    axes_of,
     cut_surface,
-    height_range_mm,
-    read_obj,
-    read_stl,
 )
-from inspection import Characteristic, NominalProfile, SectionPlane, StackCharacteristicResult, Verdict
+from inspection import NominalProfile, StackCharacteristicResult, Verdict
 
 _log = logging.getLogger(__name__)
 
 _FEW_SECTIONS = 50  # up to here Open3D costs less than half a second; numpy gives the same points, a stack of 200 twice as fast
-_MOST_SECTIONS = 100_000
-_SAME_HEIGHT_MM = 1e-9
 _LEAST_POINTS = 400  # over the length of a profile; on a coarser surface, points on the facets are judged as well as the corners
 
 
@@ -190,12 +178,12 @@ def inspect_stack(
     StoreError when the record cannot be kept.
     """
     check_fixed_place(plan)
-    began, profiles, questions = now(), _Profiles(plan), StackQuestions(plan)
+    began, profiles, questions = now(), StackProfiles(plan), StackQuestions(plan)
     with ExitStack() as opened:
-        open3d = _Open3D(opened)
-        mesh = _read(plan, open3d)
-        heights = _heights(plan, mesh)
-        _check_own_nominals(plan, heights)
+        open3d = Open3DOnUse(opened)
+        mesh = read_surface(plan, open3d)
+        heights = heights_of(plan, mesh)
+        check_own_nominals(plan, heights)
         questions.check_heights(heights)
         for height in heights:
             questions.numbers(profiles.at(height)[1])
@@ -222,111 +210,12 @@ def inspect_stack(
     return outcome
 
 
-class _Open3D:
-    """The process with Open3D. It is started on first use, and ended together with the ExitStack."""
-
-    def __init__(self, stack: ExitStack) -> None:
-        self._stack = stack
-        self._process: Open3DProcess | None = None
-
-    def __call__(self) -> Open3DProcess:
-        if self._process is None:
-            self._process = self._stack.enter_context(Open3DProcess())
-        return self._process
-
-
-def _read(plan: CtPlan, open3d: Callable[[], Open3DProcess]) -> SurfaceMesh:
-    path, scale = plan.mesh.file, plan.mesh.mm_per_unit
-    suffix = path.suffix.lower()
-    if suffix == ".stl":
-        return read_stl(path, scale)
-    if suffix == ".obj":
-        return read_obj(path, scale)
-    if suffix != ".ply":
-        raise PlanError(f"{path}: no surface file is known by the suffix '{suffix}'; expected .stl, .ply or .obj")
-    try:
-        return open3d().read(path, scale)
-    except Open3DMissing as error:
-        raise PlanError(f"{path}: PLY is read by Open3D. {error}. Or export the surface as STL") from None
-
-
-def _heights(plan: CtPlan, mesh: SurfaceMesh) -> list[float]:
-    where = plan.sections
-    if where.every_mm is None:
-        return list(where.heights_mm)
-    low, high = height_range_mm(mesh, where.normal)
-    start = low + where.every_mm / 2 if where.from_mm is None else where.from_mm
-    end = high if where.to_mm is None else where.to_mm
-    count = int(np.floor((end - start) / where.every_mm + 1e-9)) + 1
-    if not 1 <= count <= _MOST_SECTIONS:
-        raise PlanError(
-            f"a section every {where.every_mm:g} mm from {start:g} to {end:g} mm makes {max(count, 0)}; expected 1 to {_MOST_SECTIONS} "
-            f"(the surface spans {low:.3f} to {high:.3f} mm along the normal)"
-        )
-    return [start + index * where.every_mm for index in range(count)]
-
-
-def _check_own_nominals(plan: CtPlan, heights: Sequence[float]) -> None:
-    for at in plan.sections.nominal_at:
-        nearest = min(heights, key=lambda height: abs(height - at.height_mm))
-        if abs(nearest - at.height_mm) > _SAME_HEIGHT_MM:
-            raise PlanError(
-                f"{at.file}: a nominal for height {at.height_mm:g} mm, which is none of the sections; the nearest is {nearest:g} mm"
-            )
-
-
-class _Profiles:
-    """The nominal profile of each section; each file is read once."""
-
-    def __init__(self, plan: CtPlan) -> None:
-        self._plan = plan
-        self._own = {at.height_mm: at.file for at in plan.sections.nominal_at}
-        self._profiles: dict[Path, NominalProfile] = {}
-        self._asked: dict[Path, tuple[Characteristic, ...]] = {}
-        self.notes: list[str] = []
-        self._in_space: set[Path] = set()
-        where = plan.sections
-        self._load(plan.nominal.file, where.heights_mm[0] if where.heights_mm else where.from_mm or 0.0)
-        for height, path in self._own.items():
-            self._load(path, height)
-
-    @property
-    def shortest_mm(self) -> float:
-        """The length of the shortest nominal."""
-        return min(profile.length_mm for profile in self._profiles.values())
-
-    def at(self, height_mm: float) -> tuple[Path, NominalProfile]:
-        near = [path for height, path in self._own.items() if abs(height - height_mm) <= _SAME_HEIGHT_MM]
-        path = near[0] if near else self._plan.nominal.file
-        return path, self._profiles[path]
-
-    def of(self, section: Plan) -> tuple[NominalProfile, tuple[Characteristic, ...]]:
-        """The nominal of one section, and its characteristics; a solid is cut anew, and a curve in space has the section's coordinates."""
-        path = section.nominal.file
-        if path not in self._in_space:
-            return self._profiles[path], self._asked[path]
-        profile = profile_of(section)
-        return profile, asked_of(self._plan, profile)
-
-    def _load(self, path: Path, height_mm: float) -> None:
-        nominal, axes = self._plan.nominal, axes_of(self._plan.sections.normal)
-        file = load_from(nominal, path, SectionPlane(height_mm * axes.normal, axes.x, axes.normal))
-        if file.cut or file.plane is not None:
-            self._in_space.add(path)
-        if file.cut:
-            self.notes.append(f"{path.name}: a solid, which is cut at every section; its notes are of {height_mm:g} mm")
-        self.notes += [f"{path.name}: {note}" for note in file.notes]
-        self._profiles[path] = discretize_file(file, path, nominal, Discretisation())
-        self._asked[path] = asked_of(self._plan, self._profiles[path])
-        zone_of(self._plan, self._profiles[path])  # with a U that leaves nothing provable, no section need be cut
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class _Stack:
     """What the sections of a stack share. `notes` are what was assumed about the surface and the nominals."""
 
     plan: CtPlan
-    profiles: _Profiles
+    profiles: StackProfiles
     notes: tuple[str, ...]
     questions: StackQuestions
 

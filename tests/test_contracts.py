@@ -251,10 +251,10 @@ def test_the_plans_and_maps_of_a_page_can_be_read(page: str, text: str, tmp_path
 
 def test_pages_call_commands_that_exist_with_options_they_have() -> None:
     text = "".join(text for _, text in blocks("sh"))
-    calls = re.findall(r"\bcmmlink ([a-z]+) ?([^`#\n]*)", text)
+    calls = re.findall(r"\bcmmlink ((?:plan )?[a-z]+) ?([^`#\n]*)", text)
     assert {"run", "inspect", "ct", "replay"} <= {command for command, _ in calls}
     for command in {command for command, _ in calls}:
-        described = cmmlink_command(command, "--help")
+        described = cmmlink_command(*command.split(), "--help")
         assert described.code == 0, command
         used = {option for other, arguments in calls if other == command for option in re.findall(r"--[a-z-]+", arguments)}
         assert [option for option in used if option not in described.out] == [], command

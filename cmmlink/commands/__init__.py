@@ -13,15 +13,16 @@ from typing import Annotated
 
 import typer
 
+from cmmlink.commands.check import check
 from cmmlink.commands.compare import compare
 from cmmlink.commands.console import serve_console
 from cmmlink.commands.exit_codes import DEVICE_FAILED, NO_RECORD, STOPPED, UNUSABLE, fail, fail_as_asked
 from cmmlink.commands.measure import demo, inspect, run
-from cmmlink.commands.plans import example
+from cmmlink.commands.plans import example, plan
 from cmmlink.commands.proofs import verify_zone
 from cmmlink.commands.records import export, replay, runs, show, verify
 from cmmlink.commands.report import report
-from cmmlink.commands.setup import check, doctor, list_ports, nominal, prepare, simulate
+from cmmlink.commands.setup import doctor, list_ports, nominal, prepare, simulate
 from cmmlink.commands.surfaces import ManyHeights, ct
 from cmmlink.errors import PlanError, RunError, StoreError
 from cmmlink.log import keep_log, log_command, log_folder
@@ -43,6 +44,7 @@ app.command()(inspect)
 app.command(cls=ManyHeights)(ct)
 app.command()(nominal)
 app.command()(example)
+app.add_typer(plan, name="plan")
 app.command()(check)
 app.command("console")(serve_console)
 app.command()(prepare)

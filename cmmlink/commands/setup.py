@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cmmlink.commands.exit_codes import UNUSABLE, fail
-from cmmlink.commands.options import Closed, CurveNumber, Json, Layer, PlanFile, Records, SectionPlaneNumbers, records_folder, section_in
+from cmmlink.commands.options import Closed, CurveNumber, Json, Layer, Records, SectionPlaneNumbers, records_folder, section_in
 from cmmlink.commands.output import now, print_json
 from cmmlink.errors import PlanError
 from cmmlink.version import __version__
@@ -88,27 +88,6 @@ def _nominal_json(understood: "NominalFile") -> dict[str, Any]:
         "plane": None if understood.plane is None else plane_json(understood.plane),
         "notes": list(understood.notes),
     }
-
-
-def check(plan_file: PlanFile) -> int:
-    """Check a plan and the files that it names. The device is not contacted."""
-    from cmmlink.devices import connect, words_of
-    from cmmlink.from_plan import check_plan, name_place, notes_on_nominal, notes_on_temperature, zone_of
-    from cmmlink.plan import load_plan
-    from cmmlink.scratch import words_of_room
-
-    plan = load_plan(plan_file)
-    profile = check_plan(plan, plan_file)
-    with name_place(plan_file, "device"), connect(plan) as device:
-        notes = (*notes_on_nominal(plan), *notes_on_temperature(plan), *device.notes)
-    zone = zone_of(plan, profile)
-    typer.echo(f"{plan_file} can be run: {plan.part.name}, zone {zone.lower_mm:+g} .. {zone.upper_mm:+g} mm, {words_of(plan.device)}")
-    typer.echo(f"records in {words_of_room(plan.records or records_folder(None))}")
-    typer.echo(f"nominal {profile.length_mm:.3f} mm long, {len(profile)} samples, material on the {profile.material}")
-    typer.echo(f"decision rule: {zone.decision_rule}")
-    for note in notes:
-        typer.echo(f"  note: {note}")
-    return 0
 
 
 def prepare() -> int:

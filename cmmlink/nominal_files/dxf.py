@@ -74,7 +74,7 @@ def draw(path: Path, section: SectionPlane | None) -> Drawing:
         raise NominalError(f"is damaged: {_told(error)}; export it again") from None
     if left_out:
         notes.append(f"left out: {counted_names(left_out)}")
-    mm_per_unit, unit = _unit(document)
+    mm_per_unit, unit = _unit(document, path)
     release = _RELEASES.get(document.dxfversion, document.dxfversion.lower())
     return Drawing(tuple(pieces), f"dxf-{release}", mm_per_unit, unit, notes=tuple(notes))
 
@@ -110,8 +110,9 @@ def _told(error: Exception) -> str:
     return shorten(" ".join(str(error).split()) or type(error).__name__)
 
 
-def _unit(document: "Document") -> tuple[float | None, str]:
-    code = document.header.get("$INSUNITS", 0)
+def _unit(document: "Document", path: Path) -> tuple[float | None, str]:
+    """How many mm a unit is, None where the file does not say it, and its words. ezdxf puts metres into a header that is not there."""
+    code = document.header.get("$INSUNITS", 0) if b"$INSUNITS" in read_bytes(path) else 0
     if code in _UNITS:
         name, mm = _UNITS[code]
         return mm, f"{name} ($INSUNITS {code})"

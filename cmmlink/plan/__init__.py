@@ -6,6 +6,8 @@ if TYPE_CHECKING:
     from cmmlink.plan.characteristics import AskedCharacteristic, AskedDatum, AskedFilter, AskedProfile, Place
     from cmmlink.plan.cutters import CutterName
     from cmmlink.plan.deciding import PROFILE, Deciding
+    from cmmlink.plan.key_search import KeyEntry, all_keys, keys_named
+    from cmmlink.plan.mistakes import PlanMistake, find_mistakes, kind_of
     from cmmlink.plan.own_maps import map_of
     from cmmlink.plan.papers import LanguageName, PaperName, SectionPages
     from cmmlink.plan.report import ReportSettings
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
         place_of,
         with_own_maps,
     )
+    from cmmlink.plan.schema import schema_of_plans
     from cmmlink.plan.stack_characteristics import AskedOfStack
     from cmmlink.plan.surface import CtPlan, NominalAt, load_ct_plan
     from cmmlink.plan.yaml_model import Positive, Settings, line_of, read_model, words_of_allowed
@@ -33,6 +36,9 @@ else:
 
     _PLACES = {
         "cmmlink.plan.deciding": ("PROFILE", "Deciding"),
+        "cmmlink.plan.key_search": ("KeyEntry", "all_keys", "keys_named"),
+        "cmmlink.plan.schema": ("schema_of_plans",),
+        "cmmlink.plan.mistakes": ("PlanMistake", "find_mistakes", "kind_of"),
         "cmmlink.plan.own_maps": ("map_of",),
         "cmmlink.plan.papers": ("LanguageName", "PaperName", "SectionPages"),
         "cmmlink.plan.report": ("ReportSettings",),
@@ -76,6 +82,7 @@ __all__ = [
     "Device",
     "Discretisation",
     "FileDevice",
+    "KeyEntry",
     "LanguageName",
     "ModbusDevice",
     "Nominal",
@@ -84,6 +91,7 @@ __all__ = [
     "Part",
     "Place",
     "Plan",
+    "PlanMistake",
     "Positive",
     "Registration",
     "ReportSettings",
@@ -91,12 +99,17 @@ __all__ = [
     "SectionPages",
     "SerialDevice",
     "Settings",
+    "all_keys",
+    "find_mistakes",
+    "keys_named",
+    "kind_of",
     "line_of",
     "load_ct_plan",
     "load_plan",
     "map_of",
     "place_of",
     "read_model",
+    "schema_of_plans",
     "with_own_maps",
     "words_of_allowed",
 ]

@@ -41,7 +41,7 @@ def _as_list(given: object) -> object:
     return given if isinstance(given, (list, tuple)) or given is None else [given]
 
 
-Numbers = Annotated[tuple[float, ...], BeforeValidator(_as_list)]
+Numbers = Annotated[tuple[float, ...], BeforeValidator(_as_list, json_schema_input_type=float | tuple[float, ...])]
 
 
 class Place(Settings):

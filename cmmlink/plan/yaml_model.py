@@ -64,18 +64,59 @@ class Settings(BaseModel):
     )
 
 
+@dataclass(frozen=True, slots=True)
+class Mistake:
+    """What is wrong in a YAML text: the line, words for it, and the key that is meant, of the model whose key it is."""
+
+    line: int
+    words: str
+    model: type[BaseModel] | None
+    key: str
+
+    def __str__(self) -> str:
+        return f"line {self.line}: {self.words}"
+
+
 def read_model(text: str, model: type[Model]) -> Model:
     """Validate a YAML text against a model. Raises YamlError: line, key, the value found, what is allowed."""
     document = _read(text)
     try:
         return model.model_validate(document.value)
     except ValidationError as failure:
-        # Name a misspelt key first: the same mistake makes the right key missing.
-        errors = sorted(failure.errors(), key=lambda error: error["type"] not in ("extra_forbidden", "unknown_name"))
-        problems = [_explain(error, document, model) for error in errors]
-    line, message = problems[0]
-    others = f" (and {len(problems) - 1} more after this one)" if len(problems) > 1 else ""
-    raise YamlError(f"line {line}: {message}{others}")
+        mistakes = _mistakes(failure, document, model)
+    others = f" (and {len(mistakes) - 1} more after this one)" if len(mistakes) > 1 else ""
+    raise YamlError(f"{mistakes[0]}{others}")
+
+
+def mistakes_in(text: str, model: type[BaseModel]) -> tuple[Mistake, ...]:
+    """All that is wrong in a YAML text, misspelt keys first. Raises YamlError where it is no YAML of keys with values."""
+    document = _read(text)
+    try:
+        model.model_validate(document.value)
+    except ValidationError as failure:
+        return tuple(_mistakes(failure, document, model))
+    return ()
+
+
+def texts_of(text: str) -> dict[str, tuple[int, str]]:
+    """The line and the text of every value that is a text, by its dotted key; those of a list are left out. Raises YamlError."""
+    document = _read(text)
+    found: dict[str, tuple[int, str]] = {}
+    for path, line in document.lines.items():
+        value: Any = document.value
+        for part in path:
+            value = value[part]
+        if isinstance(value, str) and all(isinstance(part, str) for part in path):
+            found[".".join(map(str, path))] = (line, value)
+    return found
+
+
+def _mistakes(failure: ValidationError, document: "_Document", model: type[BaseModel]) -> list[Mistake]:
+    """Name a misspelt key first, and not the right one as well, which is missing for the same mistake."""
+    errors = sorted(failure.errors(), key=lambda error: error["type"] not in ("extra_forbidden", "unknown_name"))
+    told = [(error["type"], _explain(error, document, model)) for error in errors]
+    misspelt = {(mistake.model, mistake.key) for kind, mistake in told if kind == "extra_forbidden"}
+    return [mistake for kind, mistake in told if kind != "missing" or (mistake.model, mistake.key) not in misspelt]
 
 
 def line_of(text: str, key: str) -> int:
@@ -170,12 +211,23 @@ def _refuse(event: yaml.Event, problem: str) -> NoReturn:
     raise YamlError(f"line {_line(event)}: {problem}")
 
 
-def _explain(error: ErrorDetails, document: _Document, model: type[BaseModel]) -> tuple[int, str]:
-    """Line and message for one complaint of pydantic's."""
+def _explain(error: ErrorDetails, document: _Document, model: type[BaseModel]) -> Mistake:
+    """One complaint of pydantic's in our words."""
     path, owner, takes = _place(error["loc"], document, model)
+    line, words = _words_on(error, path, owner, takes, document)
+    meant = str(path[-1]) if path else ""
+    if error["type"] == "extra_forbidden":
+        meant = next(iter(difflib.get_close_matches(meant, _keys(owner), n=1)), "")
+    return Mistake(line, words, owner, meant)
+
+
+def _words_on(error: ErrorDetails, path: Path, owner: type[BaseModel] | None, takes: Any, document: _Document) -> tuple[int, str]:
+    """Line and message."""
     line = document.lines.get(path) or document.lines.get(path[:-1]) or 1
     key, found = _key_text(path), _shorten(error["input"])
     kind = error["type"]
+    if kind == "extra_forbidden" and str(path[-1]).isdigit():
+        return line, f"{key} is not a known key; is it what stands behind a decimal comma? Expected decimal points"
     if kind == "extra_forbidden":
         return line, f"{key} is not a known key;{_did_you_mean(str(path[-1]), _keys(owner))}"
     if kind == "unknown_name":
@@ -220,7 +272,7 @@ def _place(location: tuple[str | int, ...], document: _Document, model: type[Bas
         if isinstance(part, int):  # the place in a list, all of whose items are of one kind
             owner, here, path = None, typing.get_args(here)[0] if typing.get_origin(here) is tuple else None, (*path, part)
             continue
-        chosen = [choice for choice in _models(here) if _tag(choice) == part]
+        chosen = [choice for choice in _models(here) if type_of(choice) == part]
         if (*path, part) not in document.lines and chosen:
             here = chosen[0]
             continue
@@ -229,6 +281,19 @@ def _place(location: tuple[str | int, ...], document: _Document, model: type[Bas
         here = known.annotation if known else None
         path = (*path, part)
     return path, owner, here
+
+
+def models_in(annotation: Any) -> list[type[BaseModel]]:
+    """Every model in an annotation, those of lists and mappings among them."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [model for argument in typing.get_args(annotation) for model in models_in(argument)]
+
+
+def type_of(model: type[BaseModel]) -> str | None:
+    """The value of `type` that tells a model from others that may stand in its place; None where it has none."""
+    kind = model.model_fields.get("type")
+    return typing.get_args(kind.annotation)[0] if kind else None
 
 
 def _models(annotation: Any) -> list[type[BaseModel]]:
@@ -240,14 +305,9 @@ def _models(annotation: Any) -> list[type[BaseModel]]:
     return []
 
 
-def _tag(model: type[BaseModel]) -> str | None:
-    kind = model.model_fields.get("type")
-    return typing.get_args(kind.annotation)[0] if kind else None
-
-
 def _tags(takes: Any) -> list[str]:
     """List the values of `type` where one of several models may stand."""
-    return [tag for model in _models(takes) if (tag := _tag(model))]
+    return [tag for model in _models(takes) if (tag := type_of(model))]
 
 
 def _keys(model: type[BaseModel] | None) -> list[str]:

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from cmmlink.report.folder import prepare, write_results, write_run
     from cmmlink.report.live_table import LiveTable
     from cmmlink.report.nominal_picture import write_nominal_picture
+    from cmmlink.report.nominal_text import text_picture
     from cmmlink.report.pdf import write_report
     from cmmlink.report.picture_processes import Pictures, processes_here
     from cmmlink.report.recorded_report import input_of_replay, input_on_record
@@ -28,6 +29,7 @@ else:
         "cmmlink.report.live_table": ("LiveTable",),
         "cmmlink.report.picture_processes": ("Pictures", "processes_here"),
         "cmmlink.report.nominal_picture": ("write_nominal_picture",),
+        "cmmlink.report.nominal_text": ("text_picture",),
         "cmmlink.report.pdf": ("write_report",),
         "cmmlink.report.recorded_report": ("input_of_replay", "input_on_record"),
         "cmmlink.report.recorded_stack": ("stack_on_record",),
@@ -55,6 +57,7 @@ __all__ = [
     "print_summary",
     "processes_here",
     "stack_on_record",
+    "text_picture",
     "with_settings",
     "write_comparison_picture",
     "write_nominal_picture",

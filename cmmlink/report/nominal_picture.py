@@ -10,18 +10,15 @@ from numpy.typing import NDArray
 
 from cmmlink.errors import PlanError
 from cmmlink.nominal_files import NominalFile, material_side
+from cmmlink.report.curve_course import arrows_along, points_along
 from cmmlink.report.heading import draw_heading, fix_labels, save_picture, short_title
 from inspection import NurbsCurve
 
 Array = NDArray[np.float64]
 
 _LINE, _INSIDE, _START, _CORNER = "#3a3f45", "#eef2f6", "#2a7fa5", "#c2410c"
-_ARROWS = 8
-_A_STEP = 2e-3  # of the length: how far the tip of an arrow lies from its foot
 _LETTERS, _LINE_OF_TEXT = 128, 0.021  # of a line of notes, beside which the legend stands, and its share of the height
 _FEWEST_LINES, _MOST_LINES = 4, 14  # the legend needs as many as the fewest
-_SAMPLES_OF_A_SPAN = 24
-_MOST_SAMPLES = 100_000
 
 
 def write_nominal_picture(file: NominalFile, title: str, path: Path) -> None:
@@ -47,7 +44,7 @@ def write_nominal_picture(file: NominalFile, title: str, path: Path) -> None:
 def _facts(file: NominalFile) -> str:
     """What a reader compares with the drawing: open or closed, length, size, degree, corners, layers."""
     curve = file.curve
-    size = np.ptp(_points(curve), axis=0)
+    size = np.ptp(points_along(curve), axis=0)
     layers = f", layer {' and '.join(file.layers)}" if file.layers else ""
     ends = "closed" if curve.closed else "open"
     return (
@@ -56,16 +53,8 @@ def _facts(file: NominalFile) -> str:
     )
 
 
-def _points(curve: NurbsCurve) -> Array:
-    """Points (m, 2) of the curve, dense enough in every span of its knots to be drawn."""
-    spans = np.unique(np.clip(curve.knots, *curve.domain))
-    each = max(2, min(_SAMPLES_OF_A_SPAN, _MOST_SAMPLES // len(spans)))
-    inside = (spans[:-1, None] + np.diff(spans)[:, None] * np.linspace(0, 1, each, endpoint=False)).ravel()
-    return curve.point(np.append(inside, spans[-1]))
-
-
 def _draw_curve(axes: Axes, curve: NurbsCurve) -> None:
-    points = _points(curve)
+    points = points_along(curve)
     if material_side(curve) is not None:
         axes.fill(*points.T, color=_INSIDE, lw=0)
     axes.plot(*points.T, color=_LINE, lw=1.2)
@@ -92,17 +81,6 @@ def _draw_marks(axes: Axes, curve: NurbsCurve) -> None:
     axes.plot(*start, "o", ms=7, color=_START, label=f"start ({start[0]:.4f}, {start[1]:.4f})")
     if not curve.closed:
         axes.plot(*end, "X", ms=9, color=_START, label=f"end ({end[0]:.4f}, {end[1]:.4f})")
-    for foot, tip in zip(*_arrows(curve), strict=True):
+    for foot, tip in zip(*arrows_along(curve), strict=True):
         axes.annotate("", tip, foot, arrowprops={"arrowstyle": "-|>", "color": _START, "mutation_scale": 18})
     axes.figure.legend(loc="lower right", fontsize=9, bbox_to_anchor=(0.985, 0.01))  # beside the notes, never over the curve
-
-
-def _arrows(curve: NurbsCurve) -> tuple[Array, Array]:
-    """Feet and tips (a, 2) of short arrows, evenly along the curve."""
-    u = np.linspace(*curve.domain, 4001)
-    stations = curve.station_mm(u)
-    stations[-1] = curve.length_mm  # of a closed curve the last parameter is the first
-    wanted = curve.length_mm * (np.arange(_ARROWS) + 0.5) / _ARROWS
-    step = _A_STEP * curve.length_mm
-    feet, tips = (curve.point(np.interp(wanted + shift, stations, u)) for shift in (-step, step))
-    return feet, tips

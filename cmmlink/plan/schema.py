@@ -1,0 +1,37 @@
+"""What plans may hold, as JSON Schema: editors complete and check a plan with it while it is written."""
+
+from typing import Any
+
+from cmmlink.plan.characteristics import ProfileZone
+from cmmlink.plan.scan import Plan
+from cmmlink.plan.surface import CtPlan
+from cmmlink.plan.uncertainty import Mpe
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+
+def schema_of_plans() -> dict[str, Any]:
+    """One schema for plans of every kind: a plan of a CT surface has a mesh, one of a scan has a device."""
+    scan, surface = (_as_yaml(model.model_json_schema()) for model in (Plan, CtPlan))
+    definitions = scan.pop("$defs") | surface.pop("$defs")
+    for notation in (ProfileZone, Mpe):  # a drawing or a data sheet spells them as text
+        definitions[notation.__name__] = {"anyOf": [definitions[notation.__name__], {"type": "string"}]}
+    return {
+        "$schema": DIALECT,
+        "title": "Inspection plan of cmmlink",
+        "if": {"required": ["mesh"]},
+        "then": {"$ref": "#/$defs/CtPlan"},
+        "else": {"$ref": "#/$defs/Plan"},
+        "$defs": definitions | {"Plan": scan, "CtPlan": surface},
+    }
+
+
+def _as_yaml(schema: Any) -> Any:
+    """The same where text may look like a number, as a serial number does: an editor takes it for one, and a plan takes it as text."""
+    if isinstance(schema, list):
+        return [_as_yaml(inner) for inner in schema]
+    if not isinstance(schema, dict):
+        return schema
+    inner = {key: _as_yaml(value) for key, value in schema.items()}
+    is_text = schema.get("type") == "string" and not {"const", "enum", "format"} & set(schema)
+    return inner | {"type": ["string", "number"]} if is_text else inner
