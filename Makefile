@@ -7,18 +7,20 @@ INSTALL := $(PIP) --no-build-isolation --editable
 # The tests start a hundred processes; where Python may keep no compiled files, each of them compiles every file anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo install test checks compiled lowest platforms upgrade bench slower paper faults powercuts kills fuzz soak damage memory proofs laws audit supply-chain
+.PHONY: demo install test checks compiled lowest lowest-compiled lowest-drivers platforms upgrade bench slower paper faults powercuts kills fuzz soak damage memory proofs laws audit supply-chain
 demo: .venv/installed
 	$(BIN)/cmmlink demo --out demo-result
 
 install: .venv/all-installed
 
 # A file stays with one process, which so prepares its nominals and its browser once; tests/conftest.py has the order.
-# Three on two cores: tests often wait for a device, a page or a process of their own.
+# Three on two cores: tests often wait for a device, a page or a process of their own; threads of linear algebra would only wait for
+# one another.
+PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest
 AT_ONCE := -n 3 --dist loadfile --no-loadscope-reorder
 
 test: checks compiled
-	$(BIN)/pytest $(AT_ONCE) $(PYTEST_OPTIONS)
+	$(PYTEST) $(AT_ONCE) $(PYTEST_OPTIONS)
 	@tests/page/check $(PAGE_OPTIONS)
 
 checks: .venv/test-installed
@@ -32,14 +34,23 @@ compiled: .venv/test-installed
 	$(BIN)/python -m tests.benchmarks.warm_up
 
 # The lowest versions that pyproject.toml allows, on Python 3.11 and without the extras, must pass the fast tests: the first case of
-# every test of the three packages but of what evaluates characteristics, which uses no library itself, and of what uses one in the application:
-# plans, nominal files, reports, record, a command, the server.
+# every test of the three packages, and of what uses a library in the application: plans, nominal files, reports, record, a command, the server.
+# Left out is what says nothing of a version: what evaluates characteristics, which uses no library itself; and scans judged by the
+# hundred, by the same functions as the tests beside them. Drivers need nothing compiled, so they are tested while the inspection is.
 LOWEST_PYTHON ?= python3.11
 OF_LIBRARIES := plan nominal_files report record/test_recorder.py commands/test_inspect.py console/test_server.py
+BY_THE_HUNDRED := conclusion long_scans prefix pose_track profile_uncertainty setup_check lifted_assumptions
 lowest: .venv/lowest/installed
+	@$(MAKE) --no-print-directory -j 2 lowest-compiled lowest-drivers
+	.venv/lowest/bin/python -m pytest $(AT_ONCE) --first-case tests/inspection $(OF_LIBRARIES:%=tests/cmmlink/%) \
+		--ignore=tests/inspection/kernels/test_compiling.py --ignore=tests/inspection/evaluation \
+		$(BY_THE_HUNDRED:%=--ignore=tests/inspection/test_%.py)
+
+lowest-compiled: .venv/lowest/installed
 	.venv/lowest/bin/python -m tests.benchmarks.warm_up
-	.venv/lowest/bin/python -m pytest $(AT_ONCE) --first-case tests/inspection tests/drivers tests/simulators $(OF_LIBRARIES:%=tests/cmmlink/%) \
-		--ignore=tests/inspection/kernels/test_compiling.py --ignore=tests/inspection/evaluation
+
+lowest-drivers: .venv/lowest/installed
+	.venv/lowest/bin/python -m pytest --first-case tests/drivers tests/simulators
 
 # For every system of the README the versions of constraints.txt must exist as wheels.
 platforms: .venv/test-installed
