@@ -51,7 +51,7 @@ def characteristics_part(report: ReportInput, say: Speech, width: float) -> list
     for one in found:
         rows.append(_row(one, say))
         lines.append(len(rows))
-        rows.append([text("; ".join(filter(None, how_found(one, say))), SMALL), *[""] * (len(names) - 1)])
+        rows.append([text("; ".join(told.removesuffix(".") for told in how_found(one, say) if told), SMALL), *[""] * (len(names) - 1)])
     return [text(say("Characteristics"), TITLE), grid(rows, widths, lines=lines), Spacer(1, 6)]
 
 

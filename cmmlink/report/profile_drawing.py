@@ -22,12 +22,17 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
+Side = Literal["left", "center", "right"]
+
+_PLACE_OF: dict[Side, float] = {"left": 0.0, "center": 0.5, "right": 1.0}  # of what a label stands at, within its width
 
 NOMINAL, BAND, OPEN, UNMEASURED, NOTES, PLACES = "#3a3f45", "#dfe7ee", "#f3e3c2", "#9aa0a6", "#5b626a", "#5b4490"
 _NEAR_AN_EDGE = 0.18  # of the width: half a label
 _TEXT_PT, _SMALL_PT, _FRAME_PT = 7.0, 6.0, 0.6
 _BESIDE_PT, _BELOW_PT = 35.0, 15.0  # of the labels from their axes
 _TICK, _TICK_TEXT, _REGION, _LEVEL = 0.012, 0.03, 0.065, 0.055  # of the part's size, beyond the magnified zone
+_LETTER = 0.012  # of the part's size: the width of a letter
+_BESIDE = 0.5  # a name whose line runs more upright than this stands beside it
 _MOST_REGIONS = 6  # whose names are drawn
 
 
@@ -113,18 +118,27 @@ def draw_strip(axes: "Axes", content: PictureContent, say: Speech, basis: bool =
         text = say(
             "worst {deviation} mm at station {station} mm", deviation=say.number(deviation, "+.4f"), station=say.number(station, ".2f")
         )
-        outside = 5 if deviation >= zone.middle_mm else -11
-        side = side_of_label(station / content.length_mm)
+        above, side = deviation >= zone.middle_mm, side_of_label(station / content.length_mm)
         axes.annotate(
-            text, (station, deviation), (0, outside), textcoords="offset points", ha=side, fontsize=_TEXT_PT
-        )  # clear of the points
+            text,
+            (station, deviation),
+            (
+                float(np.clip(station, *(np.array([0.01, 0.99]) * content.length_mm))),
+                0.97 if above else 0.03,
+            ),  # in the margin, which is clear of points and of limits
+            textcoords=("data", "axes fraction"),
+            va="top" if above else "bottom",
+            ha=side,
+            fontsize=_TEXT_PT,
+            arrowprops={"arrowstyle": "-", "lw": 0.5, "color": NOTES, "shrinkA": 0, "shrinkB": 3, "relpos": (_PLACE_OF[side], 0.5)},
+        )
         axes.plot(station, deviation, "o", ms=5, mfc="none", mec=ABOVE, mew=1.0)
     axes.margins(y=0.25)
     axes.set(xlim=(0, content.length_mm), xlabel=say("station (mm)"), ylabel=say("deviation (mm)"))
     axes.set_title(content.basis if basis else "", fontsize=_TEXT_PT, y=1.0, pad=3)
 
 
-def side_of_label(share: float) -> Literal["left", "center", "right"]:
+def side_of_label(share: float) -> Side:
     """How a label is set beside a point at a share of the width, from 0 to 1, so that it stays inside the drawing."""
     return "left" if share < _NEAR_AN_EDGE else "right" if share > 1 - _NEAR_AN_EDGE else "center"
 
@@ -199,8 +213,11 @@ def _draw_region(axes: "Axes", content: PictureContent, region: NamedRegion, awa
     axes.plot(*line.T, color=PLACES, lw=1.2)
     name = region.name if len(region.name) <= 24 else region.name[:22] + "..."
     at = line[100] + 0.025 * content_size(content) * outward[100]
-    axes.text(at[0], at[1], name, fontsize=_SMALL_PT, color=NOTES, ha="center", va="center", clip_on=True, parse_math=False)
-    axes.update_datalim([at])
+    side: Side = "left" if outward[100, 0] > _BESIDE else "right" if outward[100, 0] < -_BESIDE else "center"  # clear of its line
+    axes.text(at[0], at[1], name, fontsize=_SMALL_PT, color=NOTES, ha=side, va="center", clip_on=True, parse_math=False)
+    room = np.array([_LETTER * len(name) * content_size(content), 0.0])
+    left = at - _PLACE_OF[side] * room
+    axes.update_datalim([left, left + room])  # the name as well, which else would stand over the frame
 
 
 def round_stations(length_mm: float, closed: bool) -> Iterator[float]:

@@ -14,6 +14,7 @@ from cmmlink.plan import LanguageName
 
 _FOLDER = Path(__file__).parent
 _PLACE = re.compile(r"\\{(\w+)\\}")
+_NAMED = re.compile(r"\{\w+\}")
 _NO_NUMBER = "\u2013"
 
 
@@ -23,7 +24,8 @@ class Speech:
     def __init__(self, language: LanguageName = "en") -> None:
         self.language = language
         self._catalogue = {} if language == "en" else read_catalogue(_FOLDER / f"{language}.po")
-        self._patterns = [(pattern_of(text), said) for text, said in self._catalogue.items() if "{" in text]
+        told_most = sorted(self._catalogue, key=lambda text: -len(_NAMED.sub("", text)))  # a name at its beginning makes no other sentence
+        self._patterns = [(pattern_of(text), self._catalogue[text]) for text in told_most if "{" in text]
 
     def __call__(self, text: str, /, **values: object) -> str:
         """A text of ours in this language, with the values in their places; in English where the catalogue does not have it."""

@@ -86,7 +86,7 @@ class StackInput:
     def whole(self) -> ReportInput:
         """The stack as the head of its report takes it."""
         part = {"part": self.plan.part.name, "serial_number": self.plan.part.serial_number, "device": self.plan.mesh.file.name}
-        reasons = [{"words": reason["words"]} for one in self.characteristics for reason in one["reasons"]]
+        reasons = [{"words": f"{one['name']}: {reason['words']}"} for one in self.characteristics for reason in one["reasons"]]
         out = sum(section.document["verdict"] != "conform" for section in self.sections)
         if out:
             reasons.insert(0, {"words": f"{out} of {self.asked} sections do not conform or are not proven."})

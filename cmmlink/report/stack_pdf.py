@@ -65,7 +65,7 @@ def _matrix(stack: StackInput, say: Speech, width: float) -> Iterator[Flowable]:
     shown = named[:_MOST_COLUMNS]
     yield text(say("Sections"), TITLE)
     names = ["No.", "Height (mm)", "Verdict", "Worst (mm)", "At station (mm)", "Zone error (mm)", "Coverage", "Run"]
-    widths = [26.0, 50.0, 40.0, 52.0, 58.0, 58.0, 48.0]
+    widths = [20.0, 46.0, 38.0, 50.0, 56.0, 68.0, 46.0]
     signs = min(34.0, 110.0 / len(shown)) if shown else 0.0
     widths += [width - sum(widths) - signs * len(shown), *[signs] * len(shown)]
     rows = [headed([*(say(name) for name in names), *(str(number) for number in range(1, len(shown) + 1))], (1, 3, 4, 5, 6))]

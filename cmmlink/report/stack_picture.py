@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
 from cmmlink.report.heading import draw_heading, heading_of, save_picture
@@ -68,6 +69,7 @@ def draw_map(axes: Axes, rows: Sequence[MapRow], zone: ToleranceZone, say: Speec
 
 def draw_bar(axes: Axes, zone: ToleranceZone, say: Speech) -> None:
     """Draw the limits on the bar of colours beside the map, and say what it shows."""
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: say.figures(f"{value:.4g}".replace("-", "\u2212"))))
     axes.set_ylabel(say("deviation (mm), the farthest from the zone's middle in each field"))
     for limit in (zone.lower_mm, zone.upper_mm):
         axes.axhline(limit, color="black", lw=1.2)

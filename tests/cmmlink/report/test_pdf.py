@@ -150,6 +150,8 @@ def test_every_text_of_the_catalogue_keeps_its_places_and_is_found_in_a_sentence
         .startswith("Die größte Lücke ist 1,25 mm")
     )
     assert Speech("de").sentence("who knows") == Speech("en").sentence("who knows") == "who knows"
+    told = Speech("de").sentence("upper side: 6 points lie nearer to a limit than U = 0.004 mm: neither side is proven.")
+    assert told == "upper side: 6 Punkte liegen näher an einer Grenze als U = 0,004 mm: Keine Seite ist nachgewiesen."
     assert Speech("en").number(-1e-9, "+.4f") == "+0.0000"
 
 
