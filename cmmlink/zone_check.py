@@ -23,6 +23,7 @@ _SAMPLES = 400_000
 _MOST_BOXES = 2_000_000
 _WAVE = 2048
 _SAME_MM = 2e-6  # deviations at the pose are those that were stated, to the rounding of the pose
+_SAME_SQUARE_MM2 = 1e-11  # of squares of distances, by round-off: 3 um along the curve
 _BALANCED = 1e-4  # what may be left of the sum of unit gradients: the normals of a polygon are off by its steps
 
 
@@ -89,6 +90,15 @@ class _Polygon:
         self.sag = float((self.step * smooth).max()) / 4  # an arc of this turning stands off its chord by an eighth of step times turning
         self.tree = cKDTree(self.places)
 
+    def is_at(self, places: Array, station_mm: Array) -> NDArray[np.bool_]:
+        """Whether the curve is nearest to places (k, 2) at stations (k,); where both sides are as near, two stations are."""
+        travelled = np.concatenate([[0.0], np.cumsum(self.step if self.closed else self.step[:-1])])
+        inside = (station_mm >= 0) & (station_mm <= travelled[-1] + 2 * self.reach)
+        at = np.clip(np.searchsorted(travelled[: len(self.places)], station_mm), 1, len(self.places) - 1)
+        square = [np.square(places - self.places[at - back]).sum(axis=1) for back in (0, 1)]
+        nearest = np.square(self.tree.query(places)[0])
+        return np.asarray(inside & (np.minimum(*square) <= nearest + (4 * self.reach) ** 2 + _SAME_SQUARE_MM2))
+
     def bounds(self, places: Array, moves: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Lowest and highest signed distance (k,) of places (k, 2), and where the sign may be either, as beyond an open end."""
         distance, vertex = self.tree.query(places)
@@ -125,13 +135,39 @@ def _places(points: Sequence[Mapping[str, float]]) -> Array:
     return np.array([[point["x_mm"], point["y_mm"]] for point in points], dtype=np.float64).reshape(-1, 2)
 
 
+def _moved(places: Array, angle: float, shift: Array) -> Array:
+    """Places (k, 2) turned by an angle in rad, then shifted."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.asarray(places @ np.array([[c, s], [-s, c]]) + shift)
+
+
+def _problem_of_witnesses(zone: Mapping[str, Any], curve: _Polygon, angle: float, shift: Array) -> str:
+    """What tells that the witnesses are not points that the zone holds. A point from elsewhere refutes whatever one likes."""
+    place_of: dict[Any, tuple[float, float]] = {}
+    for point in (*zone["active"], *zone["witnesses"]):
+        place = (point["x_mm"], point["y_mm"])
+        if place_of.setdefault(point["index"], place) != place:
+            return f"point {point['index']} is told to be in two places"
+    if not {point["index"] for point in zone["active"]} <= {point["index"] for point in zone["witnesses"]}:
+        return "a point that holds the zone is none of the witnesses"
+    moved = _moved(_places(zone["witnesses"]), angle, shift)
+    off = _signed_distances(curve, moved)[0] - zone["tip_radius_mm"] - zone["middle_mm"]
+    if np.abs(off).max(initial=0.0) > zone["zone_mm"] / 2 + _SAME_MM:
+        return "a witness is not in the zone at its pose, so that it is not shown to be a point that the zone is of"
+    holding = _moved(_places(zone["active"]), angle, shift)
+    stated = np.array([point["station_mm"] for point in zone["active"]], dtype=np.float64)
+    return "" if curve.is_at(holding, stated).all() else "a point that holds the zone is not at the station that is told"
+
+
 def _problem_at_pose(zone: Mapping[str, Any], active: Array, curve: _Polygon) -> str:
     """What is not as stated at the pose: the deviations of the points that hold the zone, or their balance."""
     angle, shift = math.radians(zone["pose"]["rotation_deg"]), np.array(zone["pose"]["translation_mm"], dtype=np.float64)
-    c, s = math.cos(angle), math.sin(angle)
-    moved = active @ np.array([[c, s], [-s, c]]) + shift
+    moved = _moved(active, angle, shift)
     distance, normal = _signed_distances(curve, moved)
     off = distance - zone["tip_radius_mm"] - zone["middle_mm"]
+    problem = _problem_of_witnesses(zone, curve, angle, shift)
+    if problem:
+        return problem
     stated = np.array([point["deviation_mm"] for point in zone["active"]])
     if np.abs(off - stated).max(initial=0.0) > _SAME_MM or np.abs(np.abs(stated) - zone["zone_mm"] / 2).max(initial=0.0) > _SAME_MM:
         return "the points that hold the zone are not at its limits"
