@@ -78,8 +78,11 @@ def serve_console(
     return 0
 
 
-def run_on_page(plan_file: Path, connect: "Connect", output: Output) -> int:
-    """Carry out a plan on the console's page, and stay for the next part while the page is open."""
+def run_on_page(plan_file: Path, connect: "Connect", output: Output, serial_number: str | None = None, operator: str | None = None) -> int:
+    """Carry out a plan on the console's page, and stay for the next part while the page is open.
+
+    serial_number, operator : of the first part; None leaves what the plan says
+    """
     from cmmlink.console.launch import serve, stay_while_seen
     from cmmlink.console.refused import Refused
     from cmmlink.console.station_setup import StationSetup
@@ -94,6 +97,7 @@ def run_on_page(plan_file: Path, connect: "Connect", output: Output) -> int:
         server.wait_for_page(_PAGE_OPENS_S)
         try:
             station.choose(plan_file.name)
+            station.enter(serial_number, operator)
             station.start()
         except Refused as refusal:
             raise PlanError(str(refusal)) from None

@@ -4,7 +4,10 @@ import itertools
 import math
 import sys
 import time
-from contextlib import nullcontext
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -41,12 +44,13 @@ from cmmlink.commands.options import (
     section_in,
 )
 from cmmlink.commands.output import Output, now, report_outcome, stop_on_ctrl_c
+from cmmlink.commands.series import NextPart
 from cmmlink.errors import PlanError
 from cmmlink.words import printable
 from inspection import FitName, Material, Method
 
 if TYPE_CHECKING:
-    from cmmlink.devices import Connect
+    from cmmlink.devices import Connect, Connected
     from cmmlink.plan import Plan
     from inspection import NominalProfile
 
@@ -112,6 +116,9 @@ def _defect(text: str, length_mm: float) -> tuple[float, float]:
 
 def run(
     plan_file: PlanFile,
+    serial: Annotated[str | None, typer.Option("--serial", metavar="S", help="The serial number of this part.")] = None,
+    operator: Annotated[str | None, typer.Option("--operator", metavar="O", help="Who measures.")] = None,
+    count_up: Annotated[bool, typer.Option("--next", help="The serial number after the last one that was recorded of this part.")] = False,
     headless: Headless = False,
     out: Out = None,
     records: Records = None,
@@ -127,9 +134,22 @@ def run(
 
     plan = load_plan(plan_file)
     profile = check_plan(plan, plan_file)
-    prepare(out or plan.out)
     output = Output(headless, as_json, out or plan.out, records or plan.records, no_browser)
-    return run_on_page(plan_file, connect, output) if output.on_page else _run(plan, profile, connect, output)
+    part = NextPart(serial, operator, count_up)
+    plan, notes = part.of(plan, records_folder(output.records), asks=not as_json)
+    prepare(output.out)
+    connect_part = partial(_connect_part, connect, plan.part.serial_number, notes)
+    if output.on_page:
+        entered = (plan.part.serial_number, plan.operator) if part.is_asked_for else (None, None)
+        return run_on_page(plan_file, connect_part, output, *entered)
+    return _run(plan, profile, connect_part, output)
+
+
+@contextmanager
+def _connect_part(connect: "Connect", serial_number: str | None, notes: tuple[str, ...], plan: "Plan") -> Iterator["Connected"]:
+    """Connect the device of a plan; what is known of the part with this serial number stands beside its verdict."""
+    with connect(plan) as device:
+        yield replace(device, notes=(*notes, *device.notes)) if plan.part.serial_number == serial_number else device
 
 
 def _run(plan: "Plan", profile: "NominalProfile", connect: "Connect", output: Output) -> int:

@@ -40,7 +40,9 @@ AllowUnseen = Annotated[
 Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for deviations.csv, result.json and profile.png.")]
 Records = Annotated[Path | None, typer.Option("--records", metavar="DIR", help="Folder of the run records.")]
 NoRecord = Annotated[bool, typer.Option("--no-record", help="Keep no record of it.")]
-RunName = Annotated[str, typer.Argument(metavar="RUN", help="The id of a run, the beginning of one, or last.")]
+RunName = Annotated[
+    str, typer.Argument(metavar="RUN", help="A run: its id or the beginning, its counter, a serial number, last, or last~1.")
+]
 Unit = Annotated[UnitName | None, typer.Option("--unit", help="Unit of the points, above what their file states.")]
 NominalUnit = Annotated[UnitName | None, typer.Option("--nominal-unit", help="Unit of the nominal file, in place of --scale.")]
 PlaneName = Literal["xy", "xz", "yz"]

@@ -1,13 +1,12 @@
 """What the operator chose and entered for the next part."""
 
-import re
 from dataclasses import dataclass, replace
 
 from cmmlink.console.choice import CheckedPlan, Choice
 from cmmlink.console.device_test import UNTESTED
 from cmmlink.console.protocol import DeviceTest
 from cmmlink.console.refused import Refused, answer_errors
-from cmmlink.plan import FileDevice
+from cmmlink.plan import FileDevice, next_serial_number
 
 _LONGEST_NAME = 120
 
@@ -63,17 +62,8 @@ class Entry:
         if self.address and not isinstance(plan.device, FileDevice):
             with answer_errors():
                 plan = plan.with_address(self.address)
-        part = plan.part.model_copy(update={"serial_number": self.serial_number or None})
-        return CheckedPlan(plan.model_copy(update={"part": part, "operator": self.operator or None}), checked.profile)
-
-
-def next_serial_number(serial_number: str) -> str:
-    """Count the last number in a serial number up by one, keeping its width: B-0099 becomes B-0100."""
-    found = re.fullmatch(r"(.*?)(\d+)(\D*)", serial_number)
-    if not found:
-        return ""
-    head, digits, tail = found.groups()
-    return f"{head}{int(digits) + 1:0{len(digits)}d}{tail}"
+        with answer_errors():
+            return CheckedPlan(plan.with_part(self.serial_number, self.operator), checked.profile)
 
 
 def _printable(text: str, what: str) -> str:

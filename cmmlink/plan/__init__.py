@@ -28,6 +28,7 @@ if TYPE_CHECKING:
         with_own_maps,
     )
     from cmmlink.plan.schema import schema_of_plans
+    from cmmlink.plan.serial_numbers import SerialNumbers, next_serial_number
     from cmmlink.plan.stack_characteristics import AskedOfStack
     from cmmlink.plan.surface import CtPlan, NominalAt, load_ct_plan
     from cmmlink.plan.yaml_model import Positive, Settings, line_of, read_model, words_of_allowed
@@ -37,6 +38,7 @@ else:
     _PLACES = {
         "cmmlink.plan.deciding": ("PROFILE", "Deciding"),
         "cmmlink.plan.key_search": ("KeyEntry", "all_keys", "keys_named"),
+        "cmmlink.plan.serial_numbers": ("SerialNumbers", "next_serial_number"),
         "cmmlink.plan.schema": ("schema_of_plans",),
         "cmmlink.plan.mistakes": ("PlanMistake", "find_mistakes", "kind_of"),
         "cmmlink.plan.own_maps": ("map_of",),
@@ -98,6 +100,7 @@ __all__ = [
     "Section",
     "SectionPages",
     "SerialDevice",
+    "SerialNumbers",
     "Settings",
     "all_keys",
     "find_mistakes",
@@ -107,6 +110,7 @@ __all__ = [
     "load_ct_plan",
     "load_plan",
     "map_of",
+    "next_serial_number",
     "place_of",
     "read_model",
     "schema_of_plans",

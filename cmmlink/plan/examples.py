@@ -15,8 +15,9 @@ from cmmlink.plan.surface import CtPlan
 from cmmlink.plan.yaml_model import models_in, type_of
 
 SCAN = """
-part: {name: blade 7, serial_number: "0042"}
+part: {name: blade 7, serial_number: "B-0042"}
 operator: A. Weber
+serial_number: {required: true, pattern: B-####}
 nominal: {file: blade.dat, scale: 100}
 tolerance: {lower_mm: -0.05, upper_mm: 0.05, uncertainty_mm: 0.004}
 device: {type: serial, address: COM3}
@@ -155,7 +156,7 @@ tolerance: {lower_mm: -0.1, upper_mm: 0.1}
 sections: {every_mm: 0.5, from_mm: 10, to_mm: 90}
 registration: {fit: best-fit, method: exact, coverage_min: 0.95}
 out: "results/{part}_{run}"
-report: {language: en, paper: a4}
+report: {language: en, paper: a4, section_pages: not-conform}
 records: records
 """
 

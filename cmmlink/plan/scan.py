@@ -10,12 +10,13 @@ from math import hypot
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
+from pydantic import AfterValidator, Field, TypeAdapter, ValidationError, ValidationInfo, field_validator, model_validator
 
 from cmmlink.buffer import CAPACITY_POINTS
 from cmmlink.errors import PlanError, YamlError
 from cmmlink.plan.deciding import Deciding
 from cmmlink.plan.report import REPORT, ReportSettings
+from cmmlink.plan.serial_numbers import SERIAL_NUMBER, SerialNumbers
 from cmmlink.plan.yaml_model import Positive, Settings, Text, line_of, read_model
 from cmmlink.result_folder import check_placeholders
 from drivers import AxisName, PointFileError, UnitName, device_address, read_text, shipped_maps
@@ -269,11 +270,15 @@ class Discretisation(Settings):
     step_min: float = Field(default=1e-4, gt=0, lt=1, description="the smallest step between samples, as a share of the parameter's range")
 
 
+Operator: TypeAdapter[str | None] = TypeAdapter(Text | None)
+
+
 class Plan(Deciding):
     """One inspection: what, against what, with what, and where the results go."""
 
     part: Part = Field(description="a mapping with the part's name")
     operator: Text | None = Field(default=None, description="who measures")
+    serial_number: SerialNumbers | None = Field(default=None, description=SERIAL_NUMBER)
     nominal: Nominal = Field(description="a mapping with the nominal's file")
     device: Device = Field(description="a mapping with the device's type and address")
     probe: Probe = Field(default=Probe(), description="the tip of the probe")
@@ -284,6 +289,29 @@ class Plan(Deciding):
     out: ResultFolder | None = Field(default=Path("results/{part}/{serial}_{run}"), description=OUT)
     report: ReportSettings = Field(default=ReportSettings(), description=REPORT)
     records: Path | None = Field(default=None, description=RECORDS)
+
+    @field_validator("serial_number")
+    @classmethod
+    def _spelled_so(cls, asked: SerialNumbers | None, info: ValidationInfo) -> SerialNumbers | None:
+        part: Part | None = info.data.get("part")
+        if asked is not None and part is not None and part.serial_number and (problem := asked.problem_with(part.serial_number)):
+            raise ValueError(f"a pattern that part.serial_number has: {problem}")
+        return asked
+
+    def with_part(self, serial_number: str, operator: str | None = None) -> "Plan":
+        """Give the same plan for one part, and who measures it. Raises PlanError for a serial number that it does not allow.
+
+        operator : None leaves the plan's
+        """
+        problem = self.serial_number.problem_with(serial_number) if self.serial_number is not None else ""
+        if problem:
+            raise PlanError(problem)
+        given = {"name": self.part.name, "serial_number": serial_number or None}
+        try:
+            part, who = Part.model_validate(given), Operator.validate_python(self.operator if operator is None else operator or None)
+        except ValidationError:
+            raise PlanError("a serial number and the name of an operator are printable text on one line") from None
+        return self.model_copy(update={"part": part, "operator": who})
 
     def with_address(self, address: str) -> "Plan":
         """Give the same plan with its device at another address. Raises PlanError for an address that is none."""

@@ -4,6 +4,7 @@ from typing import Any
 
 from cmmlink.plan.characteristics import ProfileZone
 from cmmlink.plan.scan import Plan
+from cmmlink.plan.serial_numbers import SerialNumbers
 from cmmlink.plan.surface import CtPlan
 from cmmlink.plan.uncertainty import Mpe
 
@@ -14,7 +15,7 @@ def schema_of_plans() -> dict[str, Any]:
     """One schema for plans of every kind: a plan of a CT surface has a mesh, one of a scan has a device."""
     scan, surface = (_as_yaml(model.model_json_schema()) for model in (Plan, CtPlan))
     definitions = scan.pop("$defs") | surface.pop("$defs")
-    for notation in (ProfileZone, Mpe):  # a drawing or a data sheet spells them as text
+    for notation in (ProfileZone, Mpe, SerialNumbers):  # they may be spelled as text as well
         definitions[notation.__name__] = {"anyOf": [definitions[notation.__name__], {"type": "string"}]}
     return {
         "$schema": DIALECT,

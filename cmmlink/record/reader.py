@@ -5,8 +5,9 @@ Where that cannot be written, it is read as interrupted all the same.
 """
 
 import dataclasses
+import re
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
@@ -92,14 +93,62 @@ def list_runs(folder: Path, now: Callable[[], datetime]) -> list[dict[str, Any]]
         return [_entry(store, begin, end) for begin, end in store.begins_and_ends()]
 
 
+def earlier_run(folder: Path, part: str, serial_number: str, now: Callable[[], datetime]) -> str | None:
+    """The id of the newest run of a part with a serial number, None where it was not measured yet."""
+    return next((run for run, serial in _newest_parts(folder, part, now) if serial == serial_number), None)
+
+
+def last_serial_number(folder: Path, part: str, now: Callable[[], datetime]) -> str | None:
+    """The serial number of the newest run of a part that has one."""
+    return next((serial for _, serial in _newest_parts(folder, part, now) if serial), None)
+
+
+def _newest_parts(folder: Path, part: str, now: Callable[[], datetime]) -> Iterator[tuple[str, str]]:
+    """The id and the serial number of each run of a part, newest first; damaged headers tell nothing."""
+    if not has_records(folder):
+        return
+    with open_to_read(folder, now) as store:
+        for begin, _ in reversed(store.begins_and_ends()):
+            found, serial_number = _part_of(store, begin)
+            if found == part:
+                yield str(begin.run), serial_number
+
+
 def find_run(store: Store, name: str) -> str:
-    """The id of the run that `name` means: an id, the beginning of one, or `last`. Raises RunError."""
-    runs = [str(begin.run) for begin, _ in store.begins_and_ends()]
-    found = runs[-1:] if name == "last" else [run for run in runs if run == name] or [run for run in runs if run.startswith(name)]
+    """The id of the run that `name` means. Raises RunError where none is meant, or several are.
+
+    name : an id, the beginning of one, its counter (12 for ...-0012), `last`, `last~1` for the one before it, or a serial number
+    """
+    begins = [begin for begin, _ in store.begins_and_ends()]
+    found = _runs_named(store, begins, name)
     if len(found) == 1:
         return found[0]
-    what = f"{len(found)} runs begin with {name!r}: {', '.join(found[:5])}" if found else f"there is no run {name!r}"
+    what = f"{len(found)} runs are meant by {name!r}: {', '.join(found[:5])}" if found else f"there is no run {name!r}"
     raise RunError(f"{store.path}: {what}; `cmmlink runs` lists them")
+
+
+def _runs_named(store: Store, begins: Sequence[Record], name: str) -> list[str]:
+    """The ids of the runs that a name may mean: by the first of its meanings that there is."""
+    runs = [str(begin.run) for begin in begins]
+    back = re.fullmatch(r"last(?:~([0-9]{1,9}))?", name)
+    if back:
+        place = len(runs) - 1 - int(back[1] or 0)
+        return runs[place : place + 1] if place >= 0 else []
+    if name in runs:
+        return [name]
+    counter = int(name) if re.fullmatch(r"[0-9]{1,6}", name) else None
+    counted = [run for run in runs if (tail := run.rpartition("-")[2]).isdecimal() and int(tail) == counter]
+    with_serial = [str(begin.run) for begin in begins if _part_of(store, begin)[1] == name]
+    return sorted({*counted, *with_serial}) or [run for run in runs if run.startswith(name)]
+
+
+def _part_of(store: Store, begin: Record) -> tuple[str, str]:
+    """The part and the serial number of a run; a header that is damaged tells neither."""
+    try:
+        header = {} if is_damaged(begin) else _document(store, begin)
+    except StoreError:
+        return "", ""
+    return str(header.get("part") or ""), str(header.get("serial_number") or "")
 
 
 def find_stack(store: Store, name: str) -> tuple[str, list[str]]:

@@ -3,8 +3,9 @@ from pathlib import Path
 import pytest
 
 from cmmlink.console.choice import check_choice
-from cmmlink.console.entry import Entry, next_serial_number
+from cmmlink.console.entry import Entry
 from cmmlink.console.refused import Refused
+from cmmlink.plan.serial_numbers import next_serial_number
 
 from .played import PLAN, write_plan
 
