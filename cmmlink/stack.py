@@ -37,6 +37,7 @@ from cmmlink.section_run import (
     refuse_section,
 )
 from cmmlink.stack_characteristics import JudgedSection, StackQuestions, stack_characteristic_json
+from cmmlink.stack_fit import fit_sections, placed_at
 from cmmlink.stack_inputs import Open3DOnUse, StackProfiles, check_own_nominals, heights_of, read_surface
 from cmmlink.words import utc_words
 from drivers.surface import (
@@ -50,7 +51,7 @@ from drivers.surface import (
     SurfaceSection,
     cut_surface,
 )
-from inspection import NominalProfile, StackCharacteristicResult, Verdict
+from inspection import NominalProfile, Reason, RigidTransform, StackCharacteristicResult, Verdict
 
 _log = logging.getLogger(__name__)
 
@@ -178,7 +179,10 @@ def inspect_stack(
     StoreError when the record cannot be kept.
     """
     check_fixed_place(plan)
-    began, profiles, questions = now(), StackProfiles(plan), StackQuestions(plan)
+    began, profiles, doubt = now(), StackProfiles(plan), None
+    if plan.stack_fit == "common":
+        check_fixed_place(placed_at(plan, RigidTransform.identity()))
+    questions = StackQuestions(plan if plan.stack_fit == "each" else placed_at(plan, RigidTransform.identity()))
     with ExitStack() as opened:
         open3d = Open3DOnUse(opened)
         mesh = read_surface(plan, open3d)
@@ -195,8 +199,17 @@ def inspect_stack(
         read_in = [f"{plan.mesh.file.name}: read in {plan.mesh.unit}, as asked"] if plan.mesh.unit else []
         notes = [*read_in, *mesh.warnings, *profiles.notes, *notes_on_temperature(plan), *notes_on_zone(plan)]
         sections: list[SectionOutcome] = []
-        for cut in _slices(plan, mesh, heights, open3d, notes, profiles.shortest_mm):
-            stack = _Stack(plan, profiles, tuple(notes), questions)
+        slices = _slices(plan, mesh, heights, open3d, notes, profiles.shortest_mm)
+        if plan.stack_fit == "common":
+            cuts = list(slices)
+            alone = _Stack(plan, profiles, tuple(notes), StackQuestions(plan.model_copy(update={"stack_characteristics": ()})))
+            measured = [_inspect(alone, k + 1, cut, None, clock, stop) for k, cut in enumerate(cuts) if not (k and stop.is_set())]
+            common = fit_sections(plan, measured, len(cuts))
+            plan, doubt, slices = common.plan, common.doubt, iter(cuts)
+            profiles, questions = profiles.asked_by(plan), StackQuestions(plan)
+            notes.append(common.words)
+        for cut in slices:
+            stack = _Stack(plan, profiles, tuple(notes), questions, doubt)
             sections.append(_inspect(stack, len(sections) + 1, cut, record, clock, stop))
             on_section(sections[-1])
             if stop.is_set():
@@ -212,12 +225,13 @@ def inspect_stack(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Stack:
-    """What the sections of a stack share. `notes` are what was assumed about the surface and the nominals."""
+    """What the sections of a stack share. `notes` are what was assumed about the surface and the nominals, `doubt` is of all sections."""
 
     plan: CtPlan
     profiles: StackProfiles
     notes: tuple[str, ...]
     questions: StackQuestions
+    doubt: Reason | None = None
 
 
 def _slices(
@@ -273,15 +287,14 @@ def _inspect(
         spacing_mm = profile.length_mm / _LEAST_POINTS
         warnings.append(f"a coarse surface: points were set between its corners, no farther apart than {spacing_mm:.3f} mm")
     started = run_started(plan, surface_words(plan), simulated=False, notes=(*stack.notes, *warnings))
-    with recorder_of(record, number, cut, section, chosen.doubt) as recorder:
+    doubt = chosen.doubt or stack.doubt
+    with recorder_of(record, number, cut, section, doubt) as recorder:
         if outline.refusal is not None:
             run = refuse_section(count_points(chosen.judged), outline.refusal, started, recorder, clock())
         else:
             source = ContourSource(chosen.judged, surface)
             numbers = stack.questions.numbers(profile)
-            run = measure_section(
-                source, section, profile, asked, started, recorder, doubt=chosen.doubt, clock=clock, stop=stop, numbers=numbers
-            )
+            run = measure_section(source, section, profile, asked, started, recorder, doubt=doubt, clock=clock, stop=stop, numbers=numbers)
     if run.refusal is not None:
         warnings.append(str(run.refusal))
     return SectionOutcome(cut, chosen.judged, path, profile, started, run, tuple(warnings), recorder.evidence if recorder else None)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from copy import copy
 from pathlib import Path
 
 import numpy as np
@@ -106,6 +107,15 @@ class StackProfiles:
             return self._profiles[path], self._asked[path]
         profile = profile_of(section)
         return profile, asked_of(self._plan, profile)
+
+    def asked_by(self, plan: CtPlan) -> "StackProfiles":
+        """The same nominals, with the characteristics of another plan."""
+        other = copy(self)
+        other._plan = plan
+        other._asked = {path: asked_of(plan, profile) for path, profile in self._profiles.items()}
+        for profile in self._profiles.values():
+            zone_of(plan, profile)
+        return other
 
     def _load(self, path: Path, height_mm: float) -> None:
         nominal, axes = self._plan.nominal, axes_of(self._plan.sections.normal)

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     )
     from inspection.characteristics.thickness import EdgeThicknessMethod, ThicknessMethod, edge_thickness, maximum_thickness
     from inspection.coarse import register_coarse
+    from inspection.common_fit import CommonFit, SectionToFit, fit_together
     from inspection.compensation import Compensation
     from inspection.conclusion import Missing, Reason, reasons_of_abort
     from inspection.consumption import fit_least_consumption
@@ -110,6 +111,7 @@ else:
         "inspection.coarse": ("register_coarse",),
         "inspection.compensation": ("Compensation",),
         "inspection.conclusion": ("Missing", "Reason", "reasons_of_abort"),
+        "inspection.common_fit": ("CommonFit", "SectionToFit", "fit_together"),
         "inspection.consumption": ("fit_least_consumption",),
         "inspection.consumption_proof": ("certify_consumption",),
         "inspection.datum": ("DatumFeature", "DatumFeatures", "FoundDatum"),
@@ -193,6 +195,7 @@ __all__ = [
     "CharacteristicResult",
     "ChordAngleMethod",
     "ChordMethod",
+    "CommonFit",
     "ComparedAirfoil",
     "ComparedValue",
     "Compensation",
@@ -260,6 +263,7 @@ __all__ = [
     "SectionKind",
     "SectionPlane",
     "SectionShare",
+    "SectionToFit",
     "SectionValue",
     "StackCharacteristic",
     "StackCharacteristicResult",
@@ -310,6 +314,7 @@ __all__ = [
     "fit_least_consumption",
     "fit_minimum_zone",
     "fit_stacking_axis",
+    "fit_together",
     "judge_stack",
     "largest_by_noise_mm",
     "maximum_camber",

@@ -6,11 +6,12 @@ from these descriptions.
 
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from cmmlink.errors import PlanError, YamlError
+from cmmlink.plan.characteristics import AskedProfile
 from cmmlink.plan.cutters import CutterName
 from cmmlink.plan.deciding import Deciding, check_names
 from cmmlink.plan.report import REPORT, ReportSettings
@@ -93,12 +94,33 @@ class CtPlan(Deciding):
     sections: Sections = Field(description="a mapping with heights_mm or every_mm")
     cut: Cut = Field(default=Cut(), description="how the surface is cut")
     registration: Registration = Field(default=Registration(), description="how the points of a section come onto its nominal")
+    stack_fit: Literal["each", "common"] = Field(
+        default="each",
+        validate_default=True,
+        description="what places the sections: each its own fit, or one common best fit of all of them (common), where each is then judged "
+        "as at a known pose; by weights arc-length every millimetre of profile counts alike in it, whichever section it is of",
+    )
     stack_characteristics: tuple[AskedOfStack, ...] = Field(
         default=(), description="what is evaluated of all sections together, each with a verdict of its own; the part has the worst of all"
     )
     out: ResultFolder | None = Field(default=None, description=OUT)
     report: ReportSettings = Field(default=ReportSettings(), description=REPORT)
     records: Path | None = Field(default=None, description=RECORDS)
+
+    @field_validator("stack_fit")
+    @classmethod
+    def _fit_of_least_squares(cls, stack_fit: str, info: ValidationInfo) -> str:
+        registration: Registration | None = info.data.get("registration")
+        if stack_fit == "common" and registration is not None:
+            if registration.fit == "none":
+                raise ValueError("each where the pose is known: a datum places all sections already")
+            if registration.fit == "minimum-zone" or registration.reject_outliers:
+                raise ValueError("each where registration asks for a minimum zone or for outliers: a common fit is of least squares")
+        if stack_fit == "common" and info.data.get("tolerance") is None and info.data.get("characteristics"):
+            first = next((one for one in info.data["characteristics"] if isinstance(one, AskedProfile)), None)
+            if first is not None and first.fit != "none":
+                raise ValueError(f"each, or fit none of {first.name}: with a fit of its own it is not judged where the common fit puts it")
+        return stack_fit
 
     @field_validator("stack_characteristics")
     @classmethod
