@@ -242,7 +242,7 @@ def test_a_corner_far_off_costs_no_points_out_of_proportion(tmp_path: Path, spli
 def test_a_blade_as_obj_is_judged_as_the_same_blade_as_stl_and_needs_no_open3d(
     tmp_path: Path, spline: BSpline, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("cmmlink.stack.Open3DProcess", None)
+    monkeypatch.setattr("cmmlink.stack_inputs.Open3DProcess", None)
     triangles = tube(outline_points(spline), np.array([0.0, 20.0]))
     rows = [f"v {x!r} {y!r} {z!r}" for x, y, z in triangles.reshape(-1, 3).tolist()]
     rows += ["l 1 900", "p 1", *(f"f {3 * i + 1} {3 * i + 2} {3 * i + 3}" for i in range(len(triangles)))]
@@ -341,7 +341,7 @@ def test_a_cutter_that_breaks_down_in_the_middle_is_replaced_and_it_is_said(
         def cut(self, triangles: NDArray[np.float64]) -> NDArray[np.float64]:
             raise Open3DMissing("the process with Open3D ended (exit status -11)")
 
-    monkeypatch.setattr("cmmlink.stack.Open3DProcess", Breaking)
+    monkeypatch.setattr("cmmlink.stack_inputs.Open3DProcess", Breaking)
     stack = inspect(plan_of(*blade, {"heights_mm": (5.0, 6.0)}, cut={"cutter": "open3d"}))
     assert [section.slice.cutter for section in stack.sections] == ["numpy", "numpy"]
     assert any("cut by numpy: the process with Open3D ended" in note for note in stack.notes)
