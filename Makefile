@@ -34,11 +34,12 @@ compiled: .venv/test-installed
 	$(BIN)/python -m tests.benchmarks.warm_up
 
 # The lowest versions that pyproject.toml allows, on Python 3.11 and without the extras, must pass the fast tests: the first case of
-# every test of the three packages, and of what uses a library in the application: plans, nominal files, reports, record, a command, the server.
+# every test of the three packages, and of what uses a library in the application: plans, nominal files, exports, reports, record, a command,
+# the server.
 # Left out is what says nothing of a version: what evaluates characteristics, which uses no library itself; and scans judged by the
 # hundred, by the same functions as the tests beside them. Drivers need nothing compiled, so they are tested while the inspection is.
 LOWEST_PYTHON ?= python3.11
-OF_LIBRARIES := plan nominal_files report record/test_recorder.py commands/test_inspect.py console/test_server.py
+OF_LIBRARIES := plan nominal_files exports report record/test_recorder.py commands/test_inspect.py console/test_server.py
 BY_THE_HUNDRED := conclusion long_scans prefix pose_track profile_uncertainty setup_check lifted_assumptions
 lowest: .venv/lowest/installed
 	@$(MAKE) --no-print-directory -j 2 lowest-compiled lowest-drivers

@@ -11,7 +11,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from cmmlink.errors import PlanError
@@ -25,8 +25,9 @@ _LOOK_S = 0.02
 class NewFiles:
     """The files of one context, as `new_files` gives it."""
 
-    def __init__(self, place: Path) -> None:
-        self._place = place
+    def __init__(self, folder: Path, place: Path, alone: bool) -> None:
+        """`folder` is where they will stand, `place` where they are written; `alone` says that nobody else moves files there meanwhile."""
+        self._folder, self._place, self._alone = folder, place, alone
         self._asked: list[tuple[str, ...]] = []
 
     def __call__(self, name: str) -> Path:
@@ -45,6 +46,11 @@ class NewFiles:
             path.parent.mkdir(parents=True, exist_ok=True)
         return paths
 
+    def standing(self, name: str) -> Path | None:
+        """The file of that name that the new one takes the place of, where it may be added to; None where it makes way, or is not there."""
+        path = self._folder / name
+        return path if self._alone and path.exists() else None
+
     @property
     def names(self) -> list[str]:
         """The names of the files, in the order in which they were asked for."""
@@ -54,36 +60,43 @@ class NewFiles:
         """Take what was asked for last as not whole."""
         del self._asked[-1:]
 
-    def move(self, folder: Path) -> None:
+    def move(self) -> None:
         """Let every file take its place."""
         for name in self.names:
-            (folder / name).parent.mkdir(exist_ok=True)
-            (self._place / name).replace(folder / name)
+            (self._folder / name).parent.mkdir(exist_ok=True)
+            (self._place / name).replace(self._folder / name)
 
 
 @contextmanager
-def new_files(folder: Path, make_way: Callable[[Path], object] = lambda _: None, patience_s: float = PATIENCE_S) -> Iterator[NewFiles]:
+def new_files(
+    folder: Path, make_way: Callable[[Path], object] = lambda _: None, patience_s: float = PATIENCE_S, *, alone: bool = False
+) -> Iterator[NewFiles]:
     """Write files that take their places in a folder, which is created, when the context ends.
 
     make_way   : called with the folder before they do, so that what stands there can be kept
     patience_s : how long another process may be moving its files
+    alone      : no other process moves its files meanwhile: for files that are written from those that stand there
 
     Raises OSError where they cannot be written, PlanError where another process does not get done.
     """
     folder.mkdir(parents=True, exist_ok=True)
     _remove_left_behind(folder)
     place = Path(tempfile.mkdtemp(prefix=_PREFIX, dir=folder))
-    files = NewFiles(place)
+    files = NewFiles(folder, place, alone)
     try:
-        try:
-            yield files
-        except BaseException:
-            files.drop_last()
-            raise
-        finally:
-            with _alone_in(folder, patience_s):
+        with ExitStack() as held:
+            if alone:
+                held.enter_context(_alone_in(folder, patience_s))
+            try:
+                yield files
+            except BaseException:
+                files.drop_last()
+                raise
+            finally:
+                if not alone:
+                    held.enter_context(_alone_in(folder, patience_s))
                 make_way(folder)
-                files.move(folder)
+                files.move()
     finally:
         shutil.rmtree(place, ignore_errors=True)
 

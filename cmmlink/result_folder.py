@@ -15,6 +15,7 @@ _PLACEHOLDER = re.compile(r"\{(\w*)\}")
 _OF_A_RUN = (
     "result.json", "deviations.csv", "characteristics.csv", "zone.json", "uncertainty.csv", "profile.png", "profile.svg", "report.pdf",
     "sections.csv", "stack.png", "stack.svg",
+    "result.qif", "result.dfq", "result.xlsx", "result.csv", "result-characteristics.csv", "result-points.csv",
 )  # fmt: skip
 _SECTIONS = "section-*_*mm"
 _LONGEST_NAME = 80

@@ -1,7 +1,7 @@
 """The result as the JSON object of `--json` and `result.json`: stable keys, numbers or null."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from cmmlink.characteristics_json import characteristic_json
 from cmmlink.events import Counts, RunStarted
 from cmmlink.uncertainty_tables import uncertainty_json
+from cmmlink.version import RESULT_SCHEMA
 from inspection import Verdict
 
 if TYPE_CHECKING:
@@ -91,6 +92,18 @@ def density_notes(counts: NDArray[np.int64], length_mm: float) -> list[str]:
         f"the points lie {densest / sparse:.0f} times as dense at station {at:.1f} .. {at + length_mm / _PLACES:.1f} mm as elsewhere: "
         "with weights by points a fit follows them"
     ]
+
+
+def run_document(
+    found: Mapping[str, Any], started: RunStarted, notes: Sequence[str], ending: str, measured_at: str, evidence: Mapping[str, Any]
+) -> dict[str, Any]:
+    """What result.json says of a run, whether it has just ended or is on record.
+
+    found    : the result, as `result_json` gives it
+    evidence : what ties it to its record; nothing where nothing was recorded
+    """
+    told = {"notes": list(notes), "ending": ending, "measured_at": measured_at}
+    return {"schema": RESULT_SCHEMA, **found, **identity_json(started), **told, **evidence}
 
 
 def identity_json(started: RunStarted) -> dict[str, Any]:

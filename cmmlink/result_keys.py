@@ -20,8 +20,10 @@ from cmmlink.inspection_keys import (
     Worst,
     Zone,
 )
+from cmmlink.version import ResultSchema
 from cmmlink.words import VerdictName
 
+SCHEMA = "the version of these keys, in which none goes or changes its meaning, but keys may be added; docs/result.schema.json describes it"
 State = Literal["complete", "interrupted", "aborted", "running", "damaged"]
 
 
@@ -67,6 +69,7 @@ class Inspected(JsonObject):
 class Measured(Inspected):
     """The result of a run that was not recorded (`--no-record`): also how the run ended, what was measured, by whom and with what."""
 
+    schema_urn: ResultSchema = Field(alias="schema", description=SCHEMA)
     measured_at: str = Field(description="when the run began, in UTC, like 2026-03-14T15:09:26.000Z")
     ending: Ending = Field(description="how the run ended; aborted by the operator (then the verdict is uncertain), or interrupted")
     part: str = Field(description="the name of the part")
@@ -98,6 +101,7 @@ class Change(JsonObject):
 class Replayed(Inspected):
     """The result of `replay`: also how it compares with the recorded one."""
 
+    schema_urn: ResultSchema = Field(alias="schema", description=SCHEMA)
     measured_at: str = Field(description="when the recorded run began, in UTC")
     ending: Ending = Field(description="how the recorded run ended")
     replay_of: str = Field(description="the id of the recorded run")
@@ -147,6 +151,7 @@ class StackCharacterised(Characterised):
 class StackInspected(JsonObject):
     """The result of `ct`: the surface, and its sections."""
 
+    schema_urn: ResultSchema = Field(alias="schema", description=SCHEMA)
     verdict: VerdictName = Field(
         description="the verdict of the worst section or characteristic of the stack; at best uncertain where sections are missing"
     )
@@ -303,7 +308,8 @@ class Shown(JsonObject):
 class Exported(JsonObject):
     """The answer of `export`."""
 
-    run: str = Field(description="the id of the run")
+    run: str = Field(description="the id of the run, of several the first")
+    runs: list[str] = Field(description="the ids of all runs that were exported")
     files: list[str] = Field(
         description="the files that were written; result.json of a run that did not come to its end has the key `ending` as well"
     )

@@ -21,7 +21,7 @@ from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan import FileDevice, Plan
 from cmmlink.record import PATIENCE_S, QUEUE_BYTES, Recorder, RecordReference, RunInputs, open_to_record
 from cmmlink.result_folder import folder_of
-from cmmlink.result_json import density_notes, density_of, identity_json, result_json, stations_of
+from cmmlink.result_json import density_notes, density_of, result_json, run_document, stations_of
 from cmmlink.run_log import log_event
 from cmmlink.scratch import scratch_in, words_of_room
 from cmmlink.words import utc_words
@@ -70,8 +70,8 @@ class FinishedRun:
     def result_json(self) -> dict[str, Any]:
         """The run as `--json` and result.json hold it."""
         evidence = asdict(self.evidence) if self.evidence else {}
-        found = result_json(self.outcome.result, self.outcome.counts) | identity_json(self.started) | {"notes": self.notes}
-        return found | {"ending": self.outcome.ending, "measured_at": utc_words(self.began)} | evidence
+        found = result_json(self.outcome.result, self.outcome.counts)
+        return run_document(found, self.started, self.notes, self.outcome.ending, utc_words(self.began), evidence)
 
     def folder_of(self, pattern: Path) -> Path:
         """The folder of this run's results, its placeholders filled in; without a record the run is named by when it began."""

@@ -19,7 +19,7 @@ from cmmlink.events import Arrived, Counts, RunFinished, RunStarted
 from cmmlink.from_plan import inspection_of
 from cmmlink.outline import Outline, place_of
 from cmmlink.pipeline import RunOutcome, run_inspection
-from cmmlink.plan import CtPlan, FileDevice, Plan, Section
+from cmmlink.plan import NO_RESULTS, CtPlan, FileDevice, Plan, Section
 from cmmlink.record import Recorder, RunInputs, Store
 from cmmlink.words import VERDICT_WORDS
 from drivers import MeshError, Rejected, ScanClosed, ScanOpened, ScanSource
@@ -49,7 +49,7 @@ def plan_of_section(plan: CtPlan, cut: SurfaceSection, nominal: Path) -> Plan:
         gap_max_mm=plan.gap_max_mm,
         end_allowance_mm=plan.end_allowance_mm,
         allow=plan.allow,
-        out=None,
+        out=NO_RESULTS,
         report=plan.report,
     )
 

@@ -39,6 +39,7 @@ from cmmlink.section_run import (
 from cmmlink.stack_characteristics import JudgedSection, StackQuestions, stack_characteristic_json
 from cmmlink.stack_fit import fit_sections, placed_at
 from cmmlink.stack_inputs import Open3DOnUse, StackProfiles, check_own_nominals, heights_of, read_surface
+from cmmlink.version import RESULT_SCHEMA
 from cmmlink.words import utc_words
 from drivers.surface import (
     Contour,
@@ -138,6 +139,7 @@ class StackOutcome:
         """The stack as JSON holds it."""
         slices = [section.result_json() for section in self.sections]
         return {
+            "schema": RESULT_SCHEMA,
             "verdict": self.verdict.word,
             "complete": self.complete,
             "ending": self.ending,

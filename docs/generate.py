@@ -1,12 +1,13 @@
 """Write the pages of docs that come from the models: `python docs/generate.py`; a test compares them with what stands there."""
 
 import inspect
+import json
 from collections.abc import Callable, Mapping, Set
 from dataclasses import replace
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
-from pydantic import BaseModel
+from pydantic import BaseModel, TypeAdapter
 
 import cmmlink
 import drivers
@@ -14,6 +15,7 @@ import inspection
 import simulators
 from cmmlink import deviations_csv, uncertainty_tables
 from cmmlink.comparison_keys import Compared
+from cmmlink.exports import tables
 from cmmlink.plan.reference import Group, groups_of, table
 from cmmlink.plan.scan import Plan
 from cmmlink.plan.surface import CtPlan
@@ -33,6 +35,7 @@ from cmmlink.result_keys import (
     Verified,
     ZonesVerified,
 )
+from cmmlink.version import RESULT_SCHEMA
 from drivers.codecs import decoders
 from drivers.codecs.register_map import PATTERNS, POINTS_FIELDS, POP_FIELDS, STATUS_FIELDS, RegisterMap
 
@@ -99,7 +102,8 @@ RESULTS = """
 
 Every command that takes `--json` prints one object on one line of standard output, and nothing else. Its keys are stable: keys are
 added, not renamed. Lengths are in mm, deviations are positive out of material, and coordinates are those of the nominal. `result.json` in
-the folder of `--out` holds the same object.
+the folder of `--out` holds the same object. Its key `schema` names its version, and [result.schema.json](result.schema.json) is the JSON
+schema of it.
 """
 
 PYTHON = """
@@ -134,6 +138,9 @@ TABLES: tuple[tuple[str, Mapping[str, str]], ...] = (
     ("`sections.csv` of `ct`: a line for every section", stack_folder.SECTION_COLUMNS),
     ("`stack.csv` of `ct`: a line for every section and characteristic of the stack", stack_folder.STACK_COLUMNS),
     ("`contours.csv` of a section: a line for every contour point", stack_folder.CONTOUR_COLUMNS),
+    ("Runs, in `csv` and `xlsx` of `export --format`: a line for every run or section", tables.RUN_COLUMNS),
+    ("Characteristics in them: a line for every characteristic", tables.CHARACTERISTIC_COLUMNS),
+    ("Points in them: a line for every received point", tables.POINT_COLUMNS),
     ("`points.csv` and `points.npy` of `export`: a line for every point", export.POINT_COLUMNS),
     ("`wire.csv` of `export`: a line for every read", export.WIRE_COLUMNS),
 )
@@ -170,8 +177,13 @@ def page(intro: str, model: type[BaseModel]) -> str:
 
 def named(title: str, meanings: Mapping[str, str]) -> str:
     """A table of names and their meanings under a title."""
-    rows = [f"| `{name}` | {meaning[0].upper()}{meaning[1:]}. |" for name, meaning in meanings.items()]
+    rows = [f"| `{name}` | {meaning[0].upper()}{meaning[1:]}. |" for name, meaning in _without_bars(meanings).items()]
     return "\n".join([f"## {title}", "", "| name | meaning |", "| --- | --- |", *rows, ""])
+
+
+def _without_bars(meanings: Mapping[str, str]) -> Mapping[str, str]:
+    """The meanings as cells of a table, which a | would end."""
+    return {name: meaning.replace("|", "\\|") for name, meaning in meanings.items()}
 
 
 def _part(group: Group) -> str:
@@ -183,7 +195,7 @@ def results() -> str:
     described: set[str] = set()  # what an earlier object described
     parts = []
     for title, model, base in OBJECTS:
-        known = set(base.model_fields) if base else set()
+        known = {field.alias or name for name, field in base.model_fields.items()} if base else set()
         own, *inner = groups_of(model)
         keys = tuple(key for key in own.keys if key.name not in known)
         fresh = [group for group in inner if group.meaning not in described]
@@ -218,11 +230,22 @@ def _register_map() -> str:
     return "\n".join([page(REGISTER_MAP, RegisterMap), named("The four patterns", PATTERNS), *fields])
 
 
+def result_schema() -> str:
+    """The JSON schema of result.json. Keys may be added without another version, so a reader has to pass over what it does not know."""
+    found: dict[str, Any] = TypeAdapter(Recorded | Measured | Replayed | StackInspected).json_schema()
+    for model in found["$defs"].values():
+        if "properties" in model:
+            model.pop("additionalProperties", None)
+    head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "$id": RESULT_SCHEMA, "title": "The result of cmmlink, result.json"}
+    return json.dumps(head | found, indent=1) + "\n"
+
+
 PAGES: dict[str, Callable[[], str]] = {
     "plan.md": _plan,
     "ct-plan.md": lambda: page(CT_PLAN, CtPlan),
     "register-map.md": _register_map,
     "results.md": results,
+    "result.schema.json": result_schema,
     "python.md": front_doors,
 }
 

@@ -129,7 +129,7 @@ def inspect_surface(
     from cmmlink.stack import inspect_stack
 
     plan = load_ct_plan(file)
-    prepare(plan.out)
+    prepare(plan.out.folder)
     stack = inspect_stack(
         plan,
         clock=time.monotonic,
@@ -138,9 +138,9 @@ def inspect_surface(
         on_start=on_start,
         on_section=lambda section: on_section(_section(plan, section, file.name)),
     )
-    folder = None if plan.out is None else stack.folder_of(plan.out, plan)
+    folder = None if plan.out.folder is None else stack.folder_of(plan.out.folder, plan)
     if folder is not None:
-        write_stack(folder, stack, plan.zone, plan.part.name)
+        write_stack(folder, stack, plan.zone, plan.part.name, plan=plan)
     worst = max(section.verdict for section in stack.sections)
     count = sum(section.verdict is worst for section in stack.sections)
     words = f"{count} of {stack.asked} sections of {plan.mesh.file.name} {VERDICT_WORDS[worst]}"
@@ -174,7 +174,7 @@ def _write_for(out: Path | None = None) -> "Callable[[Plan, FinishedRun], None]"
     from cmmlink.report import write_run
 
     def write(plan: "Plan", run: "FinishedRun") -> None:
-        folder = out or plan.out
+        folder = out or plan.out.folder
         if folder is not None and run.outcome.measured:
             write_run(run.folder_of(folder), run)
 

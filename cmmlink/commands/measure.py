@@ -134,7 +134,7 @@ def run(
 
     plan = load_plan(plan_file)
     profile = check_plan(plan, plan_file)
-    output = Output(headless, as_json, out or plan.out, records or plan.records, no_browser)
+    output = Output(headless, as_json, out or plan.out.folder, records or plan.records, no_browser)
     part = NextPart(serial, operator, count_up)
     plan, notes = part.of(plan, records_folder(output.records), asks=not as_json)
     prepare(output.out)

@@ -1,4 +1,4 @@
-"""Commands on what was recorded: list, show, export, evaluate again, verify."""
+"""Commands on what was recorded: list, show, evaluate again, verify."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -12,6 +12,7 @@ from cmmlink.commands.exit_codes import EXIT_OF, NO_RECORD, UNUSABLE, fail
 from cmmlink.commands.options import Json, Out, Records, RunName, records_folder
 from cmmlink.commands.output import now, print_json, terminal
 from cmmlink.errors import PlanError
+from cmmlink.version import RESULT_SCHEMA
 from cmmlink.words import headline_of, local_words, printable, section_words, utc_words
 from inspection import Method, Verdict
 
@@ -95,25 +96,6 @@ def _say(text: str) -> None:
     typer.echo(printable(text))
 
 
-def export(
-    name: RunName,
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files.")],
-    records: Records = None,
-    as_json: Json = False,
-) -> int:
-    """Write a recorded run as csv, npy, json and raw bytes."""
-    from cmmlink.record import export_run, find_run, open_to_read
-
-    with open_to_read(records_folder(records), now) as store:
-        run_id = find_run(store, name)
-        written = export_run(store, run_id, out)
-    if as_json:
-        print_json({"run": run_id, "files": [str(path) for path in written]})
-    else:
-        typer.echo("\n".join(str(path) for path in written))
-    return 0
-
-
 def replay(
     name: RunName,
     tolerance: Annotated[tuple[float, float] | None, typer.Option(metavar="LO HI", help="Evaluate with another tolerance, mm.")] = None,
@@ -129,7 +111,11 @@ def replay(
     with open_to_read(records_folder(records), now) as store:
         recorded = recorded_run(store, find_run(store, name))
         again = replay_run(store, recorded, decoder_of, tolerance=tolerance, method=method)
-    document = again.result_json | {"replay_of": recorded.run, "chain_sha256": recorded.chain_sha256, "identical": again.identical}
+    document = {"schema": RESULT_SCHEMA, **again.result_json} | {
+        "replay_of": recorded.run,
+        "chain_sha256": recorded.chain_sha256,
+        "identical": again.identical,
+    }
     document |= {"ending": again.outcome.ending, "measured_at": utc_words(datetime.fromisoformat(recorded.header["started"]))}
     document |= {"notes": list(again.notes)}
     document |= {"changed": [asdict(change) for change in again.changed], "differs": [asdict(change) for change in again.differs]}

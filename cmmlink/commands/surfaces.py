@@ -186,7 +186,7 @@ def _inspect_stack(plan: "CtPlan", output: Output, pictures: bool, no_record: bo
 
     from cmmlink.report import Pictures, SectionPictures, prepare, write_stack
 
-    pattern = output.out or plan.out
+    pattern = output.out or plan.out.folder
     prepare(pattern)
     bar = _SectionBar(Console(stderr=True), visible=not output.as_json and sys.stderr.isatty())
     with Pictures() as processes:

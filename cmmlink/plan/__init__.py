@@ -6,11 +6,13 @@ if TYPE_CHECKING:
     from cmmlink.plan.characteristics import AskedCharacteristic, AskedDatum, AskedFilter, AskedProfile, Place
     from cmmlink.plan.cutters import CutterName
     from cmmlink.plan.deciding import PROFILE, Deciding
+    from cmmlink.plan.formats import FormatName
     from cmmlink.plan.key_search import KeyEntry, all_keys, keys_named
     from cmmlink.plan.mistakes import PlanMistake, find_mistakes, kind_of
     from cmmlink.plan.own_maps import map_of
     from cmmlink.plan.papers import LanguageName, PaperName, SectionPages
     from cmmlink.plan.report import ReportSettings
+    from cmmlink.plan.results import NO_RESULTS, Results
     from cmmlink.plan.scan import (
         Datum,
         Device,
@@ -41,9 +43,11 @@ else:
         "cmmlink.plan.serial_numbers": ("SerialNumbers", "next_serial_number"),
         "cmmlink.plan.schema": ("schema_of_plans",),
         "cmmlink.plan.mistakes": ("PlanMistake", "find_mistakes", "kind_of"),
+        "cmmlink.plan.formats": ("FormatName",),
         "cmmlink.plan.own_maps": ("map_of",),
         "cmmlink.plan.papers": ("LanguageName", "PaperName", "SectionPages"),
         "cmmlink.plan.report": ("ReportSettings",),
+        "cmmlink.plan.results": ("NO_RESULTS", "Results"),
         "cmmlink.plan.scan": (
             "Datum",
             "Device",
@@ -71,6 +75,7 @@ else:
 
 
 __all__ = [
+    "NO_RESULTS",
     "PROFILE",
     "AskedCharacteristic",
     "AskedDatum",
@@ -84,6 +89,7 @@ __all__ = [
     "Device",
     "Discretisation",
     "FileDevice",
+    "FormatName",
     "KeyEntry",
     "LanguageName",
     "ModbusDevice",
@@ -97,6 +103,7 @@ __all__ = [
     "Positive",
     "Registration",
     "ReportSettings",
+    "Results",
     "Section",
     "SectionPages",
     "SerialDevice",

@@ -16,21 +16,13 @@ from cmmlink.buffer import CAPACITY_POINTS
 from cmmlink.errors import PlanError, YamlError
 from cmmlink.plan.deciding import Deciding
 from cmmlink.plan.report import REPORT, ReportSettings
+from cmmlink.plan.results import OUT, Results, ResultsOrFolder
 from cmmlink.plan.serial_numbers import SERIAL_NUMBER, SerialNumbers
 from cmmlink.plan.yaml_model import Positive, Settings, Text, line_of, read_model
-from cmmlink.result_folder import check_placeholders
 from drivers import AxisName, PointFileError, UnitName, device_address, read_text, shipped_maps
 from inspection import FitName, Material, Method
 
 Vector = tuple[float, float, float]
-
-
-def _with_known_placeholders(folder: Path) -> Path:
-    check_placeholders(folder)
-    return folder
-
-
-ResultFolder = Annotated[Path, AfterValidator(_with_known_placeholders)]
 
 
 def _address(text: str) -> str:
@@ -47,10 +39,6 @@ _SILENCE = "how long a device may send nothing before it counts as failed"
 _RECONNECT = "how long a lost link is tried again while the run goes on"
 _PARITY = "the parity of a serial port: none, even or odd"
 RECORDS = "the folder of the run records; null: the user's own. A console keeps all its runs in one folder"
-OUT = (
-    "the folder for the results, like results/{part}/{serial}_{run}, seen from the plan; null: no results are written. What an earlier "
-    "run left in the same folder is moved aside, never overwritten"
-)
 _AXIS = "what makes points of the distances of a one-dimensional sensor"
 _LEAST_SINE = 1e-3  # between x axis and normal: below it the direction of x in the plane is noise
 
@@ -286,7 +274,7 @@ class Plan(Deciding):
     registration: Registration = Field(default=Registration(), description="how the points come onto the nominal")
     discretisation: Discretisation = Field(default=Discretisation(), description="how finely the nominal is sampled")
     buffer_points: int = Field(default=CAPACITY_POINTS, ge=1, description="how many points may wait between the device and the inspection")
-    out: ResultFolder | None = Field(default=Path("results/{part}/{serial}_{run}"), description=OUT)
+    out: ResultsOrFolder = Field(default=Results(), description=OUT)
     report: ReportSettings = Field(default=ReportSettings(), description=REPORT)
     records: Path | None = Field(default=None, description=RECORDS)
 
@@ -362,7 +350,7 @@ def _with_paths_from(folder: Path, plan: Plan) -> Plan:
         update={
             "nominal": plan.nominal.model_copy(update={"file": folder / plan.nominal.file}),
             "device": device,
-            "out": folder / plan.out if plan.out else None,
+            "out": plan.out.with_path_from(folder),
             "records": folder / plan.records if plan.records else None,
             "report": plan.report.with_path_from(folder),
         }

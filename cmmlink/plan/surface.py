@@ -15,7 +15,8 @@ from cmmlink.plan.characteristics import AskedProfile
 from cmmlink.plan.cutters import CutterName
 from cmmlink.plan.deciding import Deciding, check_names
 from cmmlink.plan.report import REPORT, ReportSettings
-from cmmlink.plan.scan import OUT, RECORDS, Nominal, Part, Registration, ResultFolder, Unit
+from cmmlink.plan.results import NO_RESULTS, OUT, ResultsOrFolder
+from cmmlink.plan.scan import RECORDS, Nominal, Part, Registration, Unit
 from cmmlink.plan.stack_characteristics import AskedOfStack
 from cmmlink.plan.yaml_model import Positive, Settings, read_model
 from drivers import PointFileError, mm_per, read_text
@@ -103,7 +104,7 @@ class CtPlan(Deciding):
     stack_characteristics: tuple[AskedOfStack, ...] = Field(
         default=(), description="what is evaluated of all sections together, each with a verdict of its own; the part has the worst of all"
     )
-    out: ResultFolder | None = Field(default=None, description=OUT)
+    out: ResultsOrFolder = Field(default=NO_RESULTS, description=f"{OUT}; so it is without this key")
     report: ReportSettings = Field(default=ReportSettings(), description=REPORT)
     records: Path | None = Field(default=None, description=RECORDS)
 
@@ -153,7 +154,7 @@ def load_ct_plan(path: Path) -> CtPlan:
             "mesh": plan.mesh.model_copy(update={"file": folder / plan.mesh.file}),
             "nominal": plan.nominal.model_copy(update={"file": folder / plan.nominal.file}),
             "sections": plan.sections.model_copy(update={"nominal_at": own}),
-            "out": folder / plan.out if plan.out else None,
+            "out": plan.out.with_path_from(folder),
             "records": folder / plan.records if plan.records else None,
             "report": plan.report.with_path_from(folder),
         }

@@ -166,6 +166,9 @@ def _facts_of_result(document: Mapping[str, Any], say: Speech) -> Iterator[tuple
     )
     yield say("Decision rule and U"), say.sentence(document["tolerance"]["decision_rule"])
     yield say("Fit"), fit_words(document, say)
+    if gap is None:  # earlier versions looked for none
+        yield say("Coverage"), say("{coverage} of the profile", coverage=n(document["coverage"], ".1%"))
+        return
     yield (
         say("Coverage"),
         say(

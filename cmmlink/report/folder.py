@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cmmlink.characteristics import is_short_form
 from cmmlink.characteristics_csv import write_characteristics
@@ -23,6 +23,9 @@ from cmmlink.run import FinishedRun
 from cmmlink.uncertainty_tables import write_uncertainty
 from cmmlink.zone_file import zone_document
 from inspection import InspectionResult, NominalProfile
+
+if TYPE_CHECKING:
+    from cmmlink.exports import MeasuredPart
 
 
 def prepare(pattern: Path | None) -> None:
@@ -49,6 +52,7 @@ def write_results(
     title: str,
     pictures: Pictures | None = None,
     report: ReportInput | None = None,
+    part: "MeasuredPart | None" = None,
 ) -> list[str]:
     """Write result.json and, when points were judged, deviations.csv and the picture. Returns their names; raises PlanError.
 
@@ -58,6 +62,8 @@ def write_results(
     Where a budget was stated, uncertainty.csv is written as well.
 
     pictures : draws the picture, in another process where one was started
+
+    part : what the further formats are written from that its plan names, as result.FORMAT; None writes none
 
     What an earlier run left there is moved aside, into a folder of its own; the new files take its place together.
     """
@@ -76,6 +82,10 @@ def write_results(
             _write_tables(result, document, profile, files)
         for name, sheet, drawing in begun:
             pictures.write(drawing, partial(_give, sheet), files(name))
+        if part is not None:
+            from cmmlink.exports import write_exports  # noqa: PLC0415 - most runs have no further formats
+
+            write_exports([part], [name for name in part.plan.out.formats if name != "json"], files, "result")
     return files.names
 
 
@@ -103,7 +113,12 @@ def _said_at_foot(document: dict[str, Any]) -> str:
 def write_run(folder: Path, run: FinishedRun, pictures: Pictures | None = None) -> list[str]:
     """Write the files of a finished run, as `FinishedRun.folder_of` names its folder. Returns their names; raises PlanError."""
     report = input_of(run)
-    return write_results(folder, dict(report.document), run.outcome.result, run.profile, run.title, pictures, report)
+    part = None
+    if run.plan.out.formats:
+        from cmmlink.exports import part_of_run  # noqa: PLC0415 - most runs have no further formats
+
+        part = part_of_run(run)
+    return write_results(folder, dict(report.document), run.outcome.result, run.profile, run.title, pictures, report, part)
 
 
 @contextmanager

@@ -176,8 +176,8 @@ def _conditions(report: ReportInput, say: Speech) -> Iterator[tuple[str, str]]:
         yield say("Pose, nominal from section"), _pose_words(document["registration"], say)
         for other in document["registration"]["other_poses"]:
             yield say("The part fits as well"), _pose_words(other, say)
-        gap = document["largest_gap"]
-        yield say("Largest gap"), say("a flat of up to {hidden} mm could hide there", hidden=say.number(gap["could_hide_mm"], ".3g"))
+        if gap := document["largest_gap"]:
+            yield say("Largest gap"), say("a flat of up to {hidden} mm could hide there", hidden=say.number(gap["could_hide_mm"], ".3g"))
     for found in document["characteristics"]:
         if found["certificate"] is not None:
             for number, line in enumerate(found["certificate"]["words"].splitlines()):

@@ -83,7 +83,7 @@ def scan_on_record(document: Mapping[str, Any], zone: ToleranceZone, blocks: Blo
         zone,
         _VERDICTS[document["verdict"]],
         document["coverage"],
-        document["largest_gap"]["allowed_mm"],
+        document["largest_gap"]["allowed_mm"] if document["largest_gap"] else np.inf,  # earlier versions knew no gaps
         document["out_of_tolerance"],
         document["fit"],
         document["method"],

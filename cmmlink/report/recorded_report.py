@@ -1,21 +1,17 @@
 """What the report of a recorded run is made of: the result as it was recorded, its points, its plan and its nominal."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
-from datetime import datetime
 from typing import Any, get_args
 
-from cmmlink.errors import StoreError
-from cmmlink.events import Counts, RunStarted
-from cmmlink.record import RecordedRun, Replay, Store, end_missing, recorded_plan, recorded_profile, recorded_run, software, unpack_judged
+from cmmlink.events import RunStarted
+from cmmlink.exports import document_on_record, judged_rows, sound_run
+from cmmlink.record import RecordedRun, Replay, Store, end_missing, recorded_plan, recorded_profile, software
 from cmmlink.report.judged_scan import scan_on_record
 from cmmlink.report.picture_content import content_of
 from cmmlink.report.report_input import ReportInput, places_in, regions_in
-from cmmlink.result_json import density_notes, density_of, identity_json, result_json
-from cmmlink.words import utc_words
-from inspection import DecisionRule, JudgedRows, ToleranceZone
-
-_HASHES = ("plan_sha256", "nominal_sha256", "software")
+from cmmlink.result_json import identity_json
+from inspection import DecisionRule, ToleranceZone
 
 
 def input_on_record(store: Store, run: str) -> ReportInput:
@@ -23,35 +19,17 @@ def input_on_record(store: Store, run: str) -> ReportInput:
 
     Raises StoreError where its record was altered or cannot be read.
     """
-    altered, _, _ = store.first_alteration(run)
-    if altered is not None:
-        raise StoreError(f"{store.path}: {altered}; of what was altered there is no report")
-    recorded = recorded_run(store, run)
+    recorded = sound_run(store, run)
     plan = recorded_plan(recorded)
     profile = recorded_profile(plan, recorded)
+    document = document_on_record(store, recorded, profile)
     end = recorded.end or end_missing(store, run)
-    found = recorded.result or result_json(None, Counts(received=end["received"] or 0, rejected=end["received"] or 0))
-    started = RunStarted.from_header(recorded.header)
-
-    def blocks() -> Iterator[JudgedRows]:
-        return (unpack_judged(record.body) for record in store.records(run, "deviations"))
-
-    scan = scan_on_record(found, zone_in(found["tolerance"]), blocks) if found["rule"] is not None and found["judged"] else None
-    density = density_of([scan.station_mm] if scan is not None else [], profile.length_mm)
-    notes = [*started.notes, *density_notes(density, profile.length_mm)]
-    document = found | identity_json(started) | {"notes": notes} | {"ending": end["state"]} | _identity(recorded)
     report = ReportInput(document, plan, end["message"] or "")
-    if scan is None:
+    if recorded.result is None or not document["judged"]:
         return report
+    scan = scan_on_record(document, zone_in(document["tolerance"]), lambda: judged_rows(store, run))
     regions, places = regions_in(document), places_in(document)
     return replace(report, content=content_of(scan, profile, report.title, end["state"], regions=regions, places_mm=places))
-
-
-def _identity(recorded: RecordedRun) -> dict[str, Any]:
-    header = recorded.header
-    measured_at = utc_words(datetime.fromisoformat(header["started"]))
-    hashes = {key: header[key] for key in _HASHES if key in header}
-    return {"measured_at": measured_at, "run": recorded.run, "chain_sha256": recorded.chain_sha256, **hashes}
 
 
 def zone_in(tolerance: Mapping[str, Any]) -> ToleranceZone:

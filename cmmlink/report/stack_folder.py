@@ -12,6 +12,7 @@ from cmmlink.characteristics_json import number
 from cmmlink.csv_rows import Texts, write_rows
 from cmmlink.deviations_csv import write_deviations
 from cmmlink.errors import PlanError
+from cmmlink.exports import part_of_stack, write_exports
 from cmmlink.plan import CtPlan
 from cmmlink.report.section_pictures import SectionPictures
 from cmmlink.result_files import new_files
@@ -71,7 +72,7 @@ def write_stack(
 
     Of a stack with characteristics there are characteristics.csv and, with the value of each section, stack.csv as well.
 
-    plan     : says how report.pdf looks, which is written beside pictures; None writes none
+    plan     : says how report.pdf looks, which is written beside pictures, and in which further formats; None writes none of these
     pictures : draws those of the sections; None where no picture is wanted
     """
     try:
@@ -101,6 +102,8 @@ def write_stack(
                     from cmmlink.report.stack_pdf import write_stack_report  # noqa: PLC0415 - it loads reportlab
 
                     write_stack_report(input_of_stack(stack, plan), files("report.pdf"))
+            if plan is not None and plan.out.formats:
+                write_exports([part_of_stack(stack, plan)], [name for name in plan.out.formats if name != "json"], files, "result")
     except OSError as error:
         raise PlanError(f"{folder}: the results cannot be written ({error.strerror}); choose another folder with --out") from None
 

@@ -15,10 +15,10 @@ from tests.cmmlink.recorded import Script, record, scan_arrivals
 
 ROOT = Path(__file__).resolve().parents[3]
 DEVICES, PAGE, PICTURES = {"pymodbus", "serial"}, {"starlette", "uvicorn", "websockets", "ssl", "asyncio"}, {"matplotlib", "reportlab"}
-CAD = {"ezdxf", "OCP"}
+CAD, BOOKS = {"ezdxf", "OCP"}, {"xlsxwriter"}
 MATHS, PLANS, SPEECH = {"numpy", "scipy", "numba", "llvmlite"}, {"yaml", "cmmlink.plan.scan"}, {"rich"}
 SCIPY = {f"scipy.{part}" for part in ("interpolate", "linalg", "optimize", "sparse", "spatial", "special")}  # a third of a second together
-HEAVY = SCIPY | DEVICES | PAGE | PICTURES | MATHS | PLANS | SPEECH | CAD | {"simulators", "sqlite3"}
+HEAVY = SCIPY | DEVICES | PAGE | PICTURES | MATHS | PLANS | SPEECH | CAD | BOOKS | {"simulators", "sqlite3"}
 
 IN_ONE_PROCESS = """
 import contextlib, io, json, sys
@@ -69,4 +69,13 @@ def test_points_are_inspected_without_devices_page_and_pictures_and_pictures_dra
     noisy = write_points(tmp_path / "noisy.csv", oval_points(np.random.default_rng(1).normal(0.0, 0.003, 360)))
     ((_, _, least),) = loaded_by(("inspect", noisy, "--nominal", nominal, *TOLERANCE, "--no-record", "--json"))
     assert least & SCIPY == set()
-    assert drawn & (DEVICES | PAGE | CAD | {"simulators"}) == set()
+    assert drawn & (DEVICES | PAGE | CAD | BOOKS | {"simulators"}) == set()
+
+
+def test_a_workbook_alone_loads_what_writes_workbooks(tmp_path: Path) -> None:
+    record(tmp_path, Script(*scan_arrivals()))
+    export = ("export", "last", "--records", tmp_path, "--out", tmp_path / "out", "--format")
+    others, (code, _, book) = loaded_by(*((*export, name) for name in ("qif", "xlsx")))
+    assert (others[0], code) == (0, 0)
+    watched = BOOKS | PICTURES | PAGE | DEVICES | CAD | {"simulators"}
+    assert (others[2] & watched, book & watched) == (set(), BOOKS)

@@ -56,7 +56,7 @@ def test_options_take_the_place_of_every_question(tmp_path: Path, oval: Path) ->
     assert cmmlink("plan", "new", oval, "-o", tmp_path / "a.yaml", *told, "--nominal-unit", "um").code == 0
     plan = load_plan(tmp_path / "a.yaml")
     assert (plan.part.name, plan.zone.lower_mm, plan.zone.upper_mm, plan.probe.tip_radius_mm) == ("cam", -0.1, 0.2, 0.5)
-    assert (plan.nominal.unit, plan.out) == ("um", tmp_path / "out/{run}")
+    assert (plan.nominal.unit, plan.out.folder) == ("um", tmp_path / "out/{run}")
     assert "is there already" in cmmlink("plan", "new", oval, "-o", tmp_path / "a.yaml", *told).refused()
     assert cmmlink("plan", "new", oval, "-o", tmp_path / "a.yaml", *told, "--overwrite").code == 0
     assert load_plan(tmp_path / "a.yaml").nominal.unit is None
