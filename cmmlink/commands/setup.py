@@ -15,6 +15,7 @@ from cmmlink.commands.output import now, print_json
 from cmmlink.errors import PlanError
 from cmmlink.version import __version__
 from drivers import LinkError, UnitName
+from inspection import NominalError
 
 if TYPE_CHECKING:
     from cmmlink.nominal_files import NominalFile
@@ -35,7 +36,13 @@ def nominal(
     """Show what was understood of a nominal file."""
     from cmmlink.nominal_files import load_nominal
 
-    understood = load_nominal(file, scale, closed, unit, layer=layer, curve=curve, section=_plane_from(section))
+    plane = _plane_from(section)
+    try:
+        understood = load_nominal(file, scale, closed, unit, layer=layer, curve=curve, section=plane)
+    except NominalError as error:
+        if out is not None and (drawn := _draw_all(file, plane, out)):
+            raise NominalError(f"{error}; {out} shows {drawn} curves with their numbers") from None
+        raise
     if out is not None:
         _draw(understood, file, out)
     if as_json:
@@ -50,11 +57,28 @@ def nominal(
 
 
 def _draw(understood: "NominalFile", file: Path, out: Path) -> None:
-    if out.suffix.lower() != ".png":
-        raise PlanError(f"--out {out}: expected the name of a picture that ends in .png")
     from cmmlink.report import write_nominal_picture
 
+    _require_picture(out)
     write_nominal_picture(understood, file.name, out)
+
+
+def _draw_all(file: Path, plane: "SectionPlane | None", out: Path) -> int:
+    """Draw the curves of a drawing of which none could be taken, each with its number. Returns how many; 0 where there are not several."""
+    from cmmlink.nominal_files import curves_in
+
+    _require_picture(out)
+    curves = curves_in(file, plane)
+    if len(curves) > 1:
+        from cmmlink.report import write_curves_picture
+
+        write_curves_picture(curves, file.name, out)
+    return len(curves) if len(curves) > 1 else 0
+
+
+def _require_picture(out: Path) -> None:
+    if out.suffix.lower() != ".png":
+        raise PlanError(f"--out {out}: expected the name of a picture that ends in .png")
 
 
 def _plane_from(section: tuple[float, ...] | None) -> "SectionPlane | None":
@@ -135,6 +159,7 @@ def _look_after_all(say: Callable[[str], None], records: Path | None) -> int:
     from cmmlink.demo import plan_file as demo_plan_file
     from cmmlink.devices import serial_ports
     from cmmlink.from_plan import profile_of
+    from cmmlink.nominal_files.solids import words_on_kernel
     from cmmlink.plan import load_plan
     from cmmlink.scratch import words_of_room
     from inspection import rehearse
@@ -149,6 +174,7 @@ def _look_after_all(say: Callable[[str], None], records: Path | None) -> int:
     if writable:
         say(f"records in {words_of_room(folder)}")
     say(f"serial ports: {', '.join(name for name, _ in serial_ports()) or 'none found'}")
+    say(words_on_kernel())
     whole = look_after_open3d(say)
     return 0 if whole and writable else UNUSABLE
 

@@ -11,6 +11,7 @@ file and nothing else:
 
 import importlib
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
@@ -24,7 +25,7 @@ from drivers import PointFileError, UnitName, mm_per, read_bytes, read_text
 from inspection import NominalError, NurbsCurve, SectionPlane, check_curve
 
 if TYPE_CHECKING:
-    from cmmlink.nominal_files.drawing import Drawing
+    from cmmlink.nominal_files.drawing import Drawing, DrawnCurve
 
 _START = 4096  # bytes of a drawing that are looked at before it is read
 _ALMOST_CLOSED = 0.05  # of the length: the widest gap, as of a blunt trailing edge, at which a curve still has an inside
@@ -130,6 +131,17 @@ def _drawn(
     asked = mm_per(unit) if unit else None if scale == 1.0 else scale
     found = nominal_of(drawing, Choice(layer, curve), asked, closed, section)
     return NominalFile(found.curve, drawing.source_format, found.notes, found.layers, found.plane, drawing.cut)
+
+
+def curves_in(path: Path, section: SectionPlane | None = None) -> "list[DrawnCurve]":
+    """All curves of a drawing, longest first; none of a file that is no drawing, or cannot be read."""
+    from cmmlink.nominal_files.drawing import curves_of  # noqa: PLC0415 - only drawings need it
+
+    with suppress(NominalError, PointFileError):
+        reader = _format_of(path)
+        if isinstance(reader, DrawingFormat):
+            return curves_of(reader.draw(path, section))
+    return []
 
 
 def known_suffixes() -> list[str]:

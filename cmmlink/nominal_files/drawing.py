@@ -19,6 +19,7 @@ _FLAT = 1e-6  # of the size: how far a plane curve may leave its plane
 _LYING = 0.5  # the z of a normal: planes whose normal has more are looked at from above
 _SHOWN = 8
 _DIGITS = 9
+_MOST_DRAWN = 4000  # points of a piece on a picture
 _ROUNDS = 20
 _SMALLEST_MM, _LARGEST_MM = 1e-2, 1e6
 _OPEN = 0.25  # of the size: a chain with a larger gap between its ends is an open profile
@@ -87,6 +88,37 @@ def nominal_of(drawing: Drawing, choice: Choice, scale: float | None, closed: bo
     layers = tuple(chain.layers) if drawing.has_layers else ()
     said = [unit_note, *drawing.notes, *found.notes, *_on_choice(found, chain, layers), *notes]
     return Found(curve, plane, layers, tuple(said))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DrawnCurve:
+    """One of the curves of a drawing: its number, what tells it from the others, its points (k, 3) in the drawing's unit, its loose place.
+
+    loose : where a gap or a fork is (3,); None where there is none
+    """
+
+    number: int
+    words: str
+    points: Array
+    closed: bool
+    loose: Array | None
+
+
+def curves_of(drawing: Drawing) -> list[DrawnCurve]:
+    """All curves of a drawing, longest first, as `curve` counts them, whether one of them is a nominal or not."""
+    found = []
+    for number, chain in enumerate(chains_of(drawing.pieces).chains, start=1):
+        points = np.vstack([piece.derivatives(_drawn_at(piece), 0)[0] for piece in chain.pieces])
+        loose = chain.fork if chain.fork is not None else chain.gap[1] if chain.gap is not None else None
+        found.append(DrawnCurve(number, _words(chain, drawing.has_layers), points, chain.closed, loose))
+    return found
+
+
+def _drawn_at(piece: Piece) -> Array:
+    """Parameters of a piece that are dense enough to be drawn."""
+    spans = np.unique(piece.knots)
+    each = max(2, min(24, _MOST_DRAWN // len(spans)))
+    return np.unique((spans[:-1, None] + np.diff(spans)[:, None] * np.linspace(0, 1, each + 1)).ravel())
 
 
 def _factor(drawing: Drawing, scale: float | None) -> tuple[float, str]:

@@ -8,7 +8,7 @@ from cmmlink.nominal_files.chains import counted_names
 from cmmlink.nominal_files.drawing import Drawing, words_of_plane
 from cmmlink.nominal_files.pieces import Piece
 from drivers import CadError
-from drivers.cad import CadCurves, Kind, read_cad
+from drivers.cad import CadCurves, Kind, OcctProcess, read_cad
 from inspection import NominalError, SectionPlane
 
 _XY = ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
@@ -26,6 +26,16 @@ def drawing_by_kernel(
     to_unit = np.array([1 / (mm_per_unit or 1.0)] * 3 + [1.0])
     pieces = [Piece(curve.degree, curve.poles * to_unit, curve.knots, name=f"edge {i}") for i, curve in enumerate(read.curves, 1)]
     return Drawing(tuple(pieces), source_format, mm_per_unit, unit, has_layers=False, cut=read.cut, notes=tuple(_notes(read, section)))
+
+
+def words_on_kernel() -> str:
+    """Whether STEP and solids can be read on this computer, in a sentence; Open CASCADE is loaded to know."""
+    try:
+        with OcctProcess() as process:
+            process.load()
+    except CadError as error:
+        return f"STEP and solids cannot be read: {error}"
+    return "Open CASCADE: loaded; STEP files and sections of solids can be read"
 
 
 def _notes(read: CadCurves, section: SectionPlane | None) -> list[str]:

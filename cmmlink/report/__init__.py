@@ -7,6 +7,7 @@ TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer 
 
 if TYPE_CHECKING:
     from cmmlink.report.comparison_picture import write_comparison_picture
+    from cmmlink.report.curves_picture import write_curves_picture
     from cmmlink.report.folder import prepare, write_results, write_run
     from cmmlink.report.live_table import LiveTable
     from cmmlink.report.nominal_picture import write_nominal_picture
@@ -28,6 +29,7 @@ else:
         "cmmlink.report.folder": ("prepare", "write_results", "write_run"),
         "cmmlink.report.live_table": ("LiveTable",),
         "cmmlink.report.picture_processes": ("Pictures", "processes_here"),
+        "cmmlink.report.curves_picture": ("write_curves_picture",),
         "cmmlink.report.nominal_picture": ("write_nominal_picture",),
         "cmmlink.report.nominal_text": ("text_picture",),
         "cmmlink.report.pdf": ("write_report",),
@@ -60,6 +62,7 @@ __all__ = [
     "text_picture",
     "with_settings",
     "write_comparison_picture",
+    "write_curves_picture",
     "write_nominal_picture",
     "write_report",
     "write_results",

@@ -71,6 +71,13 @@ class OcctProcess:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self._child.close()
 
+    def load(self) -> None:
+        """Wait until Open CASCADE is loaded. Raises CadError, which says how to install it, where it cannot be."""
+        try:
+            self._greet()
+        except ChildProcessError as error:
+            raise CadError(f"Open CASCADE, which reads STEP, cannot be loaded: {error}") from error
+
     def read(self, path: Path, kind: Kind, origin_mm: Sequence[float], normal: Sequence[float]) -> CadCurves:
         """Read the curves of a file; of faces alone, those of their section by the plane. Raises CadError: the cause and what to do."""
         if self._child.ended:

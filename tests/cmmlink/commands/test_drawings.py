@@ -75,6 +75,11 @@ def test_nominal_shows_what_was_understood_and_lists_what_can_be_chosen(drawing:
     refused = cmmlink("nominal", drawing)
     assert (refused.code, refused.out) == (2, "")
     assert "holds 2 closed curves; expected nominal.layer or nominal.curve (--layer, --curve)" in refused.err
+    picture = drawing.parent / "curves.png"
+    numbered = cmmlink("nominal", drawing, "--out", picture)
+    assert (numbered.code, numbered.out) == (2, "")
+    assert numbered.err.endswith(f"; {picture} shows 2 curves with their numbers\n")
+    assert imread(picture).shape[:2] == (880, 1320)
     shown = json.loads(cmmlink("nominal", drawing, "--curve", 2, "--json").out)
     assert (shown["layers"], shown["closed"], shown["source_format"]) == (["PROFILE"], True, "dxf-r2010")
     np.testing.assert_allclose(shown["plane"]["normal"], PLANE.normal, atol=1e-12)

@@ -55,7 +55,9 @@ def test_the_command_says_what_was_looked_at(monkeypatch: pytest.MonkeyPatch) ->
     said: list[str] = []
     monkeypatch.setattr("typer.echo", said.append)
     monkeypatch.setattr("cmmlink.commands.open3d_doctor.look_after_open3d", lambda say: say("Open3D: looked at") is None)
+    monkeypatch.setattr("cmmlink.nominal_files.solids.words_on_kernel", lambda: "Open CASCADE: looked at")
     assert setup.doctor() == 0
+    assert said[-2] == "Open CASCADE: looked at"
     assert said[0].startswith("cmmlink ")
     assert said[1:2] == ["inspection: compiled and working"]
     assert said[-1] == "Open3D: looked at"

@@ -14,6 +14,7 @@ from tests.cmmlink.recorded import Script, record, scan_arrivals
 @pytest.fixture(autouse=True)
 def _no_look_at_open3d(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cmmlink.commands.open3d_doctor.look_after_open3d", lambda say: say("Open3D: looked at") is None)
+    monkeypatch.setattr("cmmlink.nominal_files.solids.words_on_kernel", lambda: "Open CASCADE: looked at")
 
 
 def bundled(file: Path, records: Path) -> tuple[Ended, dict[str, bytes]]:
