@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from reportlab import rl_config
 from reportlab.lib.pagesizes import A4, LETTER
 from reportlab.lib.units import mm
 from reportlab.lib.utils import ImageReader
@@ -34,6 +35,7 @@ def write_report(report: ReportInput, path: Path) -> None:
 
 def build_pages(path: Path, report: ReportInput, say: Speech, pages: Callable[[float, float], Sequence[Flowable]]) -> None:
     """Write pages with their heads and feet; `pages` gives what stands on them for the width and the height of what is between."""
+    rl_config.useA85 = 0  # pages as bytes: to spell them as text takes a third of the time, and a quarter more room
     paper = _PAPERS[report.settings.paper]
     width, height = paper[0] - 2 * _MARGIN, paper[1] - 2 * _MARGIN - _HEAD - _FOOT
     frame = Frame(_MARGIN, _MARGIN + _FOOT, width, height, 0, 0, 0, 0)

@@ -40,8 +40,8 @@ LOADING = (
     "loading, 0.75: numba with 17 compiled loops 0.3, data classes and plan models 0.25, numpy, typer and rich 0.2; "
     "the nominal 0.08, judging 0.05"
 )
-DRAWING = "the same; pictures and report by another process, which loads matplotlib and reportlab meanwhile, 0.4, and then draws 0.55"
-MILLION = "loading 0.75, numpy reads the text 0.6, judging 1.0, then pictures and report 0.65 beside deviations.csv 0.4"
+DRAWING = "the same; pictures and report by another process, which loads matplotlib and reportlab meanwhile, 0.4, and then draws 0.5"
+MILLION = "loading 0.75, numpy reads the text 0.6, judging 1.0, then pictures and report 0.5 beside deviations.csv 0.4"
 MILLIONS = "all but loading goes with the points: numpy reads the text 0.6 a million, judging 1.0, deviations.csv 0.4"
 PICTURES = "100 pictures, 0.15 each, half of it matplotlib's layout of text: 15 of 22 on two cores, which are busy to the end"
 COMPILER = "LLVM's optimiser, in two processes at once; `cmmlink prepare` does it beforehand"
