@@ -146,6 +146,12 @@ def plane_of(section: Section) -> SectionPlane:
     return SectionPlane(np.array(section.origin_mm), np.array(section.x_axis), np.array(section.normal))
 
 
+def notes_on_datum(plan: Plan) -> tuple[str, ...]:
+    """Where a known pose was taken over from."""
+    datum = plan.registration.datum
+    return (datum.words,) if datum is not None and datum.words is not None else ()
+
+
 def notes_on_temperature(plan: Plan | CtPlan) -> tuple[str, ...]:
     """What was made of the temperature of the part."""
     return (plan.warmth.words,) if plan.warmth is not None else ()

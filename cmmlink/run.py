@@ -16,7 +16,7 @@ from typing import Any
 from cmmlink.characteristics import notes_on_zone
 from cmmlink.devices import Connected
 from cmmlink.events import RunStarted, Sink
-from cmmlink.from_plan import inspection_of, notes_on_nominal, notes_on_temperature, run_started, with_section, zone_of
+from cmmlink.from_plan import inspection_of, notes_on_datum, notes_on_nominal, notes_on_temperature, run_started, with_section, zone_of
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan import FileDevice, Plan
 from cmmlink.record import PATIENCE_S, QUEUE_BYTES, Recorder, RecordReference, RunInputs, open_to_record
@@ -107,7 +107,7 @@ def carry_out(
     A device that fails does not raise: the outcome says so. Raises StoreError when the record cannot be kept, PlanError when
     the plan cannot be carried out, and whatever a sink raises.
     """
-    assumed, plan = (*notes_on_nominal(plan), *notes_on_temperature(plan)), with_section(plan)
+    assumed, plan = (*notes_on_nominal(plan), *notes_on_datum(plan), *notes_on_temperature(plan)), with_section(plan)
     _log.info("nominal %s, %s, %s", plan.nominal.file, zone_of(plan, profile), plan.registration)
     followed = bool(sinks) or not isinstance(plan.device, FileDevice)
     rehearse(profile, plan.registration.method, plan.registration.reject_outliers, not followed)

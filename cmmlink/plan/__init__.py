@@ -5,6 +5,7 @@ TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer 
 if TYPE_CHECKING:
     from cmmlink.plan.characteristics import AskedCharacteristic, AskedDatum, AskedFilter, AskedProfile, Place
     from cmmlink.plan.cutters import CutterName
+    from cmmlink.plan.datum import Datum
     from cmmlink.plan.deciding import PROFILE, Deciding
     from cmmlink.plan.formats import FormatName
     from cmmlink.plan.key_search import KeyEntry, all_keys, keys_named
@@ -14,7 +15,6 @@ if TYPE_CHECKING:
     from cmmlink.plan.report import ReportSettings
     from cmmlink.plan.results import NO_RESULTS, Results
     from cmmlink.plan.scan import (
-        Datum,
         Device,
         Discretisation,
         FileDevice,
@@ -48,8 +48,8 @@ else:
         "cmmlink.plan.papers": ("LanguageName", "PaperName", "SectionPages"),
         "cmmlink.plan.report": ("ReportSettings",),
         "cmmlink.plan.results": ("NO_RESULTS", "Results"),
+        "cmmlink.plan.datum": ("Datum",),
         "cmmlink.plan.scan": (
-            "Datum",
             "Device",
             "Discretisation",
             "FileDevice",

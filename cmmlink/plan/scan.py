@@ -5,7 +5,8 @@ from these descriptions. A further device is a further model with its own `type`
 """
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from math import hypot
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -14,6 +15,7 @@ from pydantic import AfterValidator, Field, TypeAdapter, ValidationError, Valida
 
 from cmmlink.buffer import CAPACITY_POINTS
 from cmmlink.errors import PlanError, YamlError
+from cmmlink.plan.datum import Datum
 from cmmlink.plan.deciding import Deciding
 from cmmlink.plan.report import REPORT, ReportSettings
 from cmmlink.plan.results import OUT, Results, ResultsOrFolder
@@ -206,13 +208,6 @@ class Section(Settings):
         return x_axis
 
 
-class Datum(Settings):
-    """A known pose: the motion that brings section coordinates onto the nominal."""
-
-    rotation_deg: float = Field(default=0.0, description="the rotation about the section's origin, counterclockwise")
-    translation_mm: tuple[float, float] = Field(default=(0.0, 0.0), description="the translation after the rotation")
-
-
 class Registration(Settings):
     """How the points come onto the nominal, and how much of it they must cover."""
 
@@ -320,7 +315,24 @@ def load_plan(path: Path) -> Plan:
         plan = read_model(text, Plan)
     except YamlError as error:
         raise PlanError(f"{path}: {error}") from None
-    return _with_paths_from(path.resolve().parent, plan)
+    plan = _with_paths_from(path.resolve().parent, plan)
+    with naming(path, "registration.datum.result"):
+        return plan.model_copy(update={"registration": with_fixture(plan.registration, plan.nominal.file)})
+
+
+def with_fixture(registration: Registration, nominal: Path) -> Registration:
+    """The registration with the pose of the run that its datum names, if it names one. Raises ValueError for one that cannot be."""
+    datum = registration.datum
+    return registration if datum is None else registration.model_copy(update={"datum": datum.taken_over(nominal)})
+
+
+@contextmanager
+def naming(path: Path, key: str) -> Iterator[None]:
+    """Turn a ValueError about a key's value into a PlanError with file, line and key."""
+    try:
+        yield
+    except ValueError as error:
+        raise PlanError(f"{place_of(path, key)}: {error}") from None
 
 
 def place_of(path: Path, key: str) -> str:
@@ -346,8 +358,12 @@ def _with_paths_from(folder: Path, plan: Plan) -> Plan:
     device = with_own_maps(plan.device, lambda own: str(folder / own))
     if isinstance(device, FileDevice):
         device = device.model_copy(update={"file": folder / device.file})
+    datum = plan.registration.datum
+    if datum is not None and datum.result is not None:
+        datum = datum.model_copy(update={"result": folder / datum.result})
     return plan.model_copy(
         update={
+            "registration": plan.registration.model_copy(update={"datum": datum}),
             "nominal": plan.nominal.model_copy(update={"file": folder / plan.nominal.file}),
             "device": device,
             "out": plan.out.with_path_from(folder),

@@ -16,7 +16,7 @@ from cmmlink.plan.cutters import CutterName
 from cmmlink.plan.deciding import Deciding, check_names
 from cmmlink.plan.report import REPORT, ReportSettings
 from cmmlink.plan.results import NO_RESULTS, OUT, ResultsOrFolder
-from cmmlink.plan.scan import RECORDS, Nominal, Part, Registration, Unit
+from cmmlink.plan.scan import RECORDS, Nominal, Part, Registration, Unit, place_of
 from cmmlink.plan.stack_characteristics import AskedOfStack
 from cmmlink.plan.yaml_model import Positive, Settings, read_model
 from drivers import PointFileError, mm_per, read_text
@@ -149,6 +149,9 @@ def load_ct_plan(path: Path) -> CtPlan:
         raise PlanError(f"{path}: {error}") from None
     folder = path.resolve().parent
     own = tuple(at.model_copy(update={"file": folder / at.file}) for at in plan.sections.nominal_at)
+    datum = plan.registration.datum
+    if datum is not None and datum.result is not None:
+        raise PlanError(f"{place_of(path, 'registration.datum.result')}: a pose is taken over by plans of scans alone")
     return plan.model_copy(
         update={
             "mesh": plan.mesh.model_copy(update={"file": folder / plan.mesh.file}),

@@ -14,7 +14,8 @@ from cmmlink.demo import plan_file
 from cmmlink.events import RunStarted, Sink
 from cmmlink.from_plan import inspection_of, profile_of
 from cmmlink.pipeline import RunOutcome, run_inspection
-from cmmlink.plan.scan import Datum, Plan, Registration, load_plan
+from cmmlink.plan.datum import Datum
+from cmmlink.plan.scan import Plan, Registration, load_plan
 from cmmlink.record.reader import open_to_record
 from cmmlink.record.recorder import Acknowledged, Recorder, RunInputs
 from drivers.codecs.ascii_frames import AsciiDecoder

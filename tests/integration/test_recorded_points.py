@@ -12,7 +12,8 @@ from cmmlink.demo import part_path, plan_file
 from cmmlink.events import Event, Judged, RunStarted
 from cmmlink.from_plan import inspection_of, profile_of
 from cmmlink.pipeline import RunOutcome, run_inspection
-from cmmlink.plan.scan import Datum, Plan, Registration, load_plan
+from cmmlink.plan.datum import Datum
+from cmmlink.plan.scan import Plan, Registration, load_plan
 from drivers.source import Arrival, PointBatch, ScanClosed, ScanOpened
 from inspection import InspectionResult, NominalProfile, register
 from simulators.motion import Motion, walk
