@@ -19,6 +19,7 @@ from inspection import NominalError
 
 if TYPE_CHECKING:
     from cmmlink.nominal_files import NominalFile
+    from cmmlink.nominal_files.drawing import DrawnCurve
     from inspection import SectionPlane
 
 
@@ -34,13 +35,13 @@ def nominal(
     as_json: Json = False,
 ) -> int:
     """Show what was understood of a nominal file."""
-    from cmmlink.nominal_files import load_nominal
+    from cmmlink.nominal_files import curves_in, load_nominal
 
     plane = _plane_from(section)
     try:
         understood = load_nominal(file, scale, closed, unit, layer=layer, curve=curve, section=plane)
     except NominalError as error:
-        if out is not None and (drawn := _draw_all(file, plane, out)):
+        if out is not None and (drawn := _draw_all(curves_in(file, scale, unit, layer, plane), file, out)):
             raise NominalError(f"{error}; {out} shows {drawn} curves with their numbers") from None
         raise
     if out is not None:
@@ -63,12 +64,9 @@ def _draw(understood: "NominalFile", file: Path, out: Path) -> None:
     write_nominal_picture(understood, file.name, out)
 
 
-def _draw_all(file: Path, plane: "SectionPlane | None", out: Path) -> int:
+def _draw_all(curves: "list[DrawnCurve]", file: Path, out: Path) -> int:
     """Draw the curves of a drawing of which none could be taken, each with its number. Returns how many; 0 where there are not several."""
-    from cmmlink.nominal_files import curves_in
-
     _require_picture(out)
-    curves = curves_in(file, plane)
     if len(curves) > 1:
         from cmmlink.report import write_curves_picture
 

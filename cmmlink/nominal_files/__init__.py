@@ -133,14 +133,17 @@ def _drawn(
     return NominalFile(found.curve, drawing.source_format, found.notes, found.layers, found.plane, drawing.cut)
 
 
-def curves_in(path: Path, section: SectionPlane | None = None) -> "list[DrawnCurve]":
-    """All curves of a drawing, longest first; none of a file that is no drawing, or cannot be read."""
+def curves_in(
+    path: Path, scale: float = 1.0, unit: UnitName | None = None, layer: str | None = None, section: SectionPlane | None = None
+) -> "list[DrawnCurve]":
+    """All curves of a drawing, or of a layer of it, longest first; none of a file that is no drawing, or cannot be read."""
     from cmmlink.nominal_files.drawing import curves_of  # noqa: PLC0415 - only drawings need it
 
     with suppress(NominalError, PointFileError):
         reader = _format_of(path)
         if isinstance(reader, DrawingFormat):
-            return curves_of(reader.draw(path, section))
+            asked = mm_per(unit) if unit else None if scale == 1.0 else scale
+            return curves_of(reader.draw(path, section), asked, layer)
     return []
 
 

@@ -92,9 +92,10 @@ def nominal_of(drawing: Drawing, choice: Choice, scale: float | None, closed: bo
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DrawnCurve:
-    """One of the curves of a drawing: its number, what tells it from the others, its points (k, 3) in the drawing's unit, its loose place.
+    """One of the curves of a drawing: its number, what tells it from the others, its points (k, 3), its loose place.
 
     loose : where a gap or a fork is (3,); None where there is none
+    unit  : that of its points and its length: mm, or what says that it is not known
     """
 
     number: int
@@ -102,15 +103,22 @@ class DrawnCurve:
     points: Array
     closed: bool
     loose: Array | None
+    unit: str
 
 
-def curves_of(drawing: Drawing) -> list[DrawnCurve]:
-    """All curves of a drawing, longest first, as `curve` counts them, whether one of them is a nominal or not."""
-    found = []
-    for number, chain in enumerate(chains_of(drawing.pieces).chains, start=1):
+def curves_of(drawing: Drawing, scale: float | None, layer: str | None = None) -> list[DrawnCurve]:
+    """All curves of a drawing, longest first, as `curve` counts them, whether one of them is a nominal or not.
+
+    scale : mm per unit, above what the file states; None: as it states
+    layer : that of the curves that are counted; None: every one
+    """
+    factor, found = scale or drawing.mm_per_unit, []
+    unit = "mm" if factor else "units of the file"
+    pieces = [_scaled(piece, factor or 1.0) for piece in _on_layer(drawing, layer)]
+    for number, chain in enumerate(chains_of(pieces).chains, start=1):
         points = np.vstack([piece.derivatives(_drawn_at(piece), 0)[0] for piece in chain.pieces])
         loose = chain.fork if chain.fork is not None else chain.gap[1] if chain.gap is not None else None
-        found.append(DrawnCurve(number, _words(chain, drawing.has_layers), points, chain.closed, loose))
+        found.append(DrawnCurve(number, _words(chain, drawing.has_layers, unit), points, chain.closed, loose, unit))
     return found
 
 
@@ -178,7 +186,7 @@ def _listed(chains: tuple[Chain, ...], has_layers: bool) -> str:
     return "; ".join([*shown, *more])
 
 
-def _words(chain: Chain, has_layers: bool) -> str:
+def _words(chain: Chain, has_layers: bool, unit: str = "mm") -> str:
     """What tells one chain from another."""
     count = len(chain.pieces)
     layers = f", layer {' and '.join(chain.layers)}" if has_layers else ""
@@ -186,8 +194,8 @@ def _words(chain: Chain, has_layers: bool) -> str:
     if chain.fork is not None:
         ending = f", ends in a fork at {_place(chain.fork)}, where more than two ends meet"
     elif chain.gap is not None:
-        ending = f", with a gap of {chain.gap[0]:.4g} mm at {_place(chain.gap[1])}"
-    return f"{'closed' if chain.closed else 'open'}, {chain.length:.6g} mm, {count} piece{'' if count == 1 else 's'}{layers}{ending}"
+        ending = f", with a gap of {chain.gap[0]:.4g} {unit} at {_place(chain.gap[1])}"
+    return f"{'closed' if chain.closed else 'open'}, {chain.length:.6g} {unit}, {count} piece{'' if count == 1 else 's'}{layers}{ending}"
 
 
 def _place(point: Array) -> str:

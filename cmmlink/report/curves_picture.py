@@ -1,4 +1,4 @@
-"""The picture of a drawing with several curves: each with the number that `curve` takes, where it begins, and what is loose about it."""
+"""The picture of a drawing with several curves: each with the number that `curve` takes, its beginning, and what is loose about it."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -27,12 +27,15 @@ def write_curves_picture(curves: Sequence[DrawnCurve], title: str, path: Path) -
         x, y = curve.points[:, first], curve.points[:, second]
         axes.plot(x, y, color=colour, lw=1.4, ls="-" if curve.closed else (0, (6, 2)))
         axes.plot(x[0], y[0], "o", ms=5, color=colour)
-        axes.annotate(str(curve.number), (x[0], y[0]), (5, 5), textcoords="offset points", color=colour, fontsize=12, fontweight="bold")
+        middle = len(x) // 2  # several may begin at one fork
+        axes.annotate(
+            str(curve.number), (x[middle], y[middle]), (5, 5), textcoords="offset points", color=colour, fontsize=12, fontweight="bold"
+        )
         if curve.loose is not None:
             axes.plot(curve.loose[first], curve.loose[second], "o", ms=12, mfc="none", mec="#b42318", mew=1.5)
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.08)
-    axes.set(xlabel=f"{'xyz'[first]} (unit of the file)", ylabel=f"{'xyz'[second]} (unit of the file)")
+    axes.set(xlabel=f"{'xyz'[first]} ({curves[0].unit})", ylabel=f"{'xyz'[second]} ({curves[0].unit})")
     told = [f"curve {curve.number}: {curve.words}" for curve in listed]
     more = [f"and {len(curves) - len(listed)} shorter ones"] if len(curves) > len(listed) else []
     figure.text(0.03, 0.015, "\n".join([*told, *more]), va="bottom", fontsize=8, family="monospace", parse_math=False)

@@ -8,7 +8,9 @@ import pytest
 from ezdxf.filemanagement import new
 from matplotlib.image import imread
 from numpy.typing import NDArray
+from scipy.special import ellipe
 
+from cmmlink.nominal_files import curves_in
 from inspection import SectionPlane
 from tests.cmmlink.command import cmmlink
 from tests.cmmlink.oval_part import write_points
@@ -80,6 +82,9 @@ def test_nominal_shows_what_was_understood_and_lists_what_can_be_chosen(drawing:
     assert (numbered.code, numbered.out) == (2, "")
     assert numbered.err.endswith(f"; {picture} shows 2 curves with their numbers\n")
     assert imread(picture).shape[:2] == (880, 1320)
+    inches, unknown = (curves_in(drawing), curves_in(drawing, scale=2.0))
+    assert [curve.words.split(",")[1] for curve in inches] == [f" {18 * np.pi * 25.4:.6g} mm", f" {80 * ellipe(0.64):.6g} mm"]
+    assert np.ptp(unknown[0].points, axis=0)[0] == pytest.approx(36, abs=0.01)
     shown = json.loads(cmmlink("nominal", drawing, "--curve", 2, "--json").out)
     assert (shown["layers"], shown["closed"], shown["source_format"]) == (["PROFILE"], True, "dxf-r2010")
     np.testing.assert_allclose(shown["plane"]["normal"], PLANE.normal, atol=1e-12)
