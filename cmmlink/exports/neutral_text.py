@@ -13,7 +13,7 @@ MOST_LETTERS = 16_000  # a cell of a spreadsheet holds 32,767 units of UTF-16, a
 _SIGNS = "=+@\uff1d\uff0b\uff20"  # the last three are their wide forms, which some versions take for the same
 _MINUS = "\\-\uff0d"
 _AT_START = re.compile(rf"^(?=\s*[{_SIGNS}{_MINUS}])")
-_NEW_CELL = re.compile(rf"(;\s*)(?=[{_SIGNS}])")
+_NEW_CELL = re.compile(rf"(;[\s\"']*)(?=[{_SIGNS}{_MINUS}])")  # quotes that the first cell began with count for nothing in a new one
 
 
 def neutral(text: str) -> str:
