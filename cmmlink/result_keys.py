@@ -90,6 +90,30 @@ class Recorded(Measured):
     software: dict[str, str] = Field(description="the versions of everything that the result depends on")
 
 
+class Failure(JsonObject):
+    """Why there is no result."""
+
+    kind: str = Field(description="the kind of failure: unusable, not-measured, device-failed or no-record")
+    message: str = Field(description="what, where, and what to do")
+    exit_status: int = Field(description="the exit status")
+
+
+class FileInspected(JsonObject):
+    """What came of one of several files."""
+
+    file: str = Field(description="the file, as it was named")
+    exit_status: int = Field(description="the exit status that it would have by itself")
+    result: dict[str, Any] | None = Field(description="its result, with the keys of `inspect` above; null where there is none")
+    error: Failure | None = Field(description="why there is no result; null where there is one")
+
+
+class FilesInspected(JsonObject):
+    """What `inspect` prints of several files."""
+
+    exit_status: int = Field(description="the worst of the exit statuses: 5, then 1, 4, 2, 3 and 0")
+    files: list[FileInspected] = Field(description="the files, in the order in which they were named")
+
+
 class Change(JsonObject):
     """A value that is not as it was in the recorded run."""
 

@@ -23,6 +23,7 @@ from cmmlink.record import export
 from cmmlink.report import stack_folder
 from cmmlink.result_keys import (
     Exported,
+    FilesInspected,
     Inspected,
     Measured,
     Recorded,
@@ -117,6 +118,7 @@ OBJECTS: tuple[tuple[str, type[BaseModel], type[BaseModel] | None], ...] = (
     ("Of every inspection", Inspected, None),
     ("`inspect --no-record`: further keys", Measured, Inspected),
     ("`inspect`, `run` and `demo`: further keys", Recorded, Measured),
+    ("`inspect` of several files", FilesInspected, None),
     ("`replay`: further keys", Replayed, Inspected),
     ("`ct`", StackInspected, None),
     ("`nominal`", Understood, None),

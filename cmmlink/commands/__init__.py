@@ -18,8 +18,9 @@ from cmmlink.commands.compare import compare
 from cmmlink.commands.console import serve_console
 from cmmlink.commands.exit_codes import DEVICE_FAILED, NO_RECORD, STOPPED, UNUSABLE, fail, fail_as_asked
 from cmmlink.commands.export import export
-from cmmlink.commands.measure import demo, inspect, run
+from cmmlink.commands.measure import demo, run
 from cmmlink.commands.plans import example, plan
+from cmmlink.commands.point_files import inspect
 from cmmlink.commands.proofs import verify_zone
 from cmmlink.commands.records import replay, runs, show, verify
 from cmmlink.commands.report import report

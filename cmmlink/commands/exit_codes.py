@@ -28,10 +28,14 @@ def say(message: str) -> None:
     sys.stderr.write(f"cmmlink: {printable(message)}\n")
 
 
+def kind_of_failure(error: Exception, code: int) -> str:
+    """The word that JSON has for what went wrong."""
+    return "not-measured" if isinstance(error, NotMeasured) else _KIND_OF[code]
+
+
 def fail_as_asked(error: Exception, code: int) -> int:
     """The same for an error that leaves no result; where --json was asked for, a JSON object on standard output says it as well."""
     if "--json" in sys.argv[1:]:
-        kind = "not-measured" if isinstance(error, NotMeasured) else _KIND_OF[code]
-        sys.stdout.write(json.dumps({"error": {"kind": kind, "message": str(error), "exit_status": code}}) + "\n")
+        sys.stdout.write(json.dumps({"error": {"kind": kind_of_failure(error, code), "message": str(error), "exit_status": code}}) + "\n")
         sys.stdout.flush()
     return fail(f"{error} (NOT MEASURED)" if isinstance(error, NotMeasured) else str(error), code)

@@ -23,11 +23,6 @@ class NextPart:
     operator: str | None
     count_up: bool
 
-    @property
-    def is_asked_for(self) -> bool:
-        """Whether anything was said of the part."""
-        return self.count_up or self.serial_number is not None or self.operator is not None
-
     def of(self, plan: "Plan", records: Path, *, asks: bool) -> "tuple[Plan, tuple[str, ...]]":
         """The plan of this part, and notes on it. Raises PlanError for a serial number that the plan does not allow.
 

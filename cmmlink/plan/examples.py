@@ -155,7 +155,8 @@ nominal: {file: blade.dat, scale: 60}
 tolerance: {lower_mm: -0.1, upper_mm: 0.1}
 sections: {every_mm: 0.5, from_mm: 10, to_mm: 90}
 registration: {fit: best-fit, method: exact, coverage_min: 0.95}
-out: "results/{part}_{run}"
+out: {folder: "results/{part}_{run}", formats: [qif, dfq]}
+stack_fit: each
 report: {language: en, paper: a4, section_pages: not-conform}
 records: records
 """

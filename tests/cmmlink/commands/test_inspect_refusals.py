@@ -80,7 +80,7 @@ WRONG_OPTIONS = [
     (("--coverage-min", 2), r"Invalid value for '--coverage-min': .*less than or equal to 1"),
     (("--reject-outliers",), r"--reject-outliers: expected false where fit is none: outliers are found by fitting the other points"),
     (("--metod", "exact"), r"No such option: --metod.*--method"),
-    (("further.csv",), r"Got unexpected extra argument"),
+    (("further.csv",), r"further.csv: no such file"),
     (("--out",), r"Option '--out' requires an argument"),
 ]
 
