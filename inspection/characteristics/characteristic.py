@@ -158,6 +158,7 @@ class CharacteristicResult:
     datum        : the features that it was placed by, where these were measured
     places_mm    : places of a number of the section, for a drawing, with their names
     notes        : what the method had to assume
+    drawing      : how far the drawn section may mislead about a number of it, in the unit
     """
 
     name: str
@@ -188,6 +189,7 @@ class CharacteristicResult:
     datum: FoundDatum | None = None
     places_mm: tuple[tuple[str, float, float], ...] = ()
     notes: tuple[str, ...] = ()
+    drawing: float = 0.0
 
 
 def consumption_of(deviation: float, lower: float, upper: float) -> float:

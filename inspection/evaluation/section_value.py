@@ -238,6 +238,7 @@ def judge_value(asked: SectionCharacteristic, basis: Basis, outlines: ActualOutl
         coverage=measured.coverage,
         gap_mm=measured.gap.length_mm,
         datum=measured_datum,
+        drawing=drawing,
         places_mm=places,
         notes=(*value.notes, *(actual.notes[:1] if actual is not None else ()), *_words_of_drawing(drawing, nominal.unit), *how),
     )

@@ -43,6 +43,19 @@ def uncertainty_of_stack(asked: StackCharacteristic, sections: Sequence[Measured
     return np.array([_of_axis(asked, heights[known], moved[known], numbers[known, 2])])
 
 
+def drawing_of_stack(asked: StackCharacteristic, sections: Sequence[MeasuredSection]) -> float:
+    """How far the drawn sections may mislead about a taper, at worst; other values of a stack stand on best fits, which need no drawing."""
+    if asked.type != "taper":
+        return 0.0
+    (number,) = asked.numbers
+    found = [(section.height_mm, section.numbers[number.name]) for section in sections if section.numbers]
+    known = [(height, one.drawing) for height, one in found if math.isfinite(one.value)]
+    if len(known) < 2:
+        return 0.0
+    heights, drawings = (np.array(column) for column in zip(*known, strict=True))
+    return float(np.abs(_slopes(heights)) @ drawings)
+
+
 def _u(section: MeasuredSection, name: str) -> float:
     return section.numbers[name].uncertainty if section.numbers else math.nan
 

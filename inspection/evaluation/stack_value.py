@@ -23,7 +23,7 @@ from inspection.characteristics.stack_characteristic import (
     StackCharacteristicResult,
 )
 from inspection.conclusion import Reason
-from inspection.evaluation.stack_uncertainty import ADDED, uncertainty_of_stack
+from inspection.evaluation.stack_uncertainty import ADDED, drawing_of_stack, uncertainty_of_stack
 from inspection.rigid import RigidTransform
 from inspection.tolerance import DecisionRule, decision_words
 from inspection.verdict import Verdict
@@ -83,6 +83,12 @@ def _judge(
         verdict_of(one, asked.lower, asked.upper, guard) if is_proven else Verdict.UNCERTAIN
         for one, is_proven, guard in zip(deviation.tolist(), proven.tolist(), guards.tolist(), strict=True)
     ]
+    drawing = drawing_of_stack(asked, sections)
+    misled = [
+        verdict is not Verdict.UNCERTAIN and verdict_of(one, asked.lower, asked.upper, guard + drawing) is not verdict
+        for verdict, one, guard in zip(verdicts, deviation.tolist(), guards.tolist(), strict=True)
+    ]
+    verdicts = [Verdict.UNCERTAIN if doubted else verdict for verdict, doubted in zip(verdicts, misled, strict=True)]
     verdict = max(verdicts) if lost is None else max(*verdicts, Verdict.UNCERTAIN)
     worst = _worst(deviation, uncertainty, verdicts, asked)
     asked, added = replace(asked, uncertainty=float(np.nan_to_num(uncertainty[worst]))), not asked.uncertainty and uncertainty[worst] > 0
@@ -91,7 +97,10 @@ def _judge(
     told = [] if lost is None else [lost]
     if _lies_straight(asked, len(sections)):
         told.append(Reason("no-value", "Two sections lie on a straight line whatever the part is; cut a third one."))
-    if verdicts[worst] is not Verdict.CONFORM and proven[worst]:
+    if misled[worst]:
+        words = f"It is nearer to a limit than the {drawing:.2g} by which the sections that were drawn may mislead"
+        told.insert(0, Reason("within-uncertainty", f"{words}; measure their edges more densely."))
+    elif verdicts[worst] is not Verdict.CONFORM and proven[worst]:
         told.insert(0, _limit_reason(asked, values, (nominal, float(deviation[worst]), float(values.value[worst])), verdicts[worst], at))
     reasons = (*told, *_told_doubts(sections, doubts)) if verdict is not Verdict.CONFORM else ()
     found = CharacteristicResult(
@@ -111,7 +120,8 @@ def _judge(
         reasons=reasons,
         fit="none" if asked.type == "taper" else "datum" if asked.datum is not None else "best fit of each section",
         region_words="stack" if not heights else "each section",
-        notes=(*values.notes, ADDED) if added else values.notes,
+        notes=(*values.notes, *([f"the drawn sections may mislead by {drawing:.2g}"] if drawing else []), *([ADDED] if added else [])),
+        drawing=drawing,
     )
     rows = zip(heights, values.value.tolist(), deviation.tolist(), verdicts, strict=True) if heights else ()
     return StackCharacteristicResult(found, at, tuple(SectionShare(*row) for row in rows))

@@ -140,6 +140,27 @@ def test_taper_is_the_slope_of_a_length_beside_that_of_its_nominal() -> None:
     assert drawn.verdict is Verdict.NONCONFORM
 
 
+def test_a_taper_is_doubted_by_what_the_drawn_sections_may_mislead_by() -> None:
+    asked = KINDS["taper"]
+    drawn = [
+        replace(section, numbers={name: replace(one, drawing=0.05) for name, one in section.numbers.items()}) for section in sections(asked)
+    ]
+    z = HEIGHTS - HEIGHTS.mean()
+    by = 0.05 * np.abs(z).sum() / (z @ z)  # every section off by 0.05 mm, in the worst way
+    value = judged(asked).found.deviation
+    for limit, verdict in (
+        (value + 1.01 * by, Verdict.CONFORM),
+        (value + 0.99 * by, Verdict.UNCERTAIN),
+        (value - 0.99 * by, Verdict.UNCERTAIN),
+    ):
+        found = judged(replace(asked, lower=-math.inf, upper=limit), drawn).found
+        assert found.verdict is verdict
+        assert [reason.kind for reason in found.reasons] == ["within-uncertainty"] * (verdict is not Verdict.CONFORM)
+    assert judged(replace(asked, lower=-math.inf, upper=value - 1.01 * by), drawn).found.verdict is Verdict.NONCONFORM
+    unknown = [replace(one, numbers={name: replace(n, drawing=math.inf) for name, n in one.numbers.items()}) for one in drawn]
+    assert judged(replace(asked, lower=-math.inf, upper=100.0), unknown).found.verdict is Verdict.UNCERTAIN
+
+
 @pytest.mark.parametrize("name", KINDS)
 def test_a_value_near_a_limit_is_proven_neither_way(name: str) -> None:
     value = judged(replace(KINDS[name], lower=-math.inf, upper=-100.0)).found.deviation  # the one that goes farthest up
