@@ -43,7 +43,7 @@ LOADING = (
 DRAWING = "the same; pictures and report by another process, which loads matplotlib and reportlab meanwhile, 0.4, and then draws 0.5"
 MILLION = "loading 0.75, numpy reads the text 0.6, judging 1.0, then pictures and report 0.5 beside deviations.csv 0.4"
 MILLIONS = "all but loading goes with the points: numpy reads the text 0.6 a million, judging 1.0, deviations.csv 0.4"
-PICTURES = "100 pictures, 0.15 each, half of it matplotlib's layout of text: 15 of 22 on two cores, which are busy to the end"
+PICTURES = "100 pictures by matplotlib, 0.15 each, half of it to lay out text: 15 of the 22 that two cores share"
 COMPILER = "LLVM's optimiser, in two processes at once; `cmmlink prepare` does it beforehand"
 
 # Runs a command line in a process that tells at its end how much memory it held at most.
