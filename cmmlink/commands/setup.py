@@ -122,6 +122,7 @@ def prepare() -> int:
     profile = profile_of(load_plan(demo_plan_file()))
     rehearse(profile, "veaw", reject_outliers=True)  # the method and the fit that need the most
     rehearse(profile)
+    profile.curve.few_derivatives(0.5, 2)  # by which characteristics look for places on a section
     folder = compiled_code_folder()
     if folder is None:
         return fail("no folder for compiled code can be written, so that every command compiles anew", UNUSABLE)

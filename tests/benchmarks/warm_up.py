@@ -8,11 +8,12 @@ from tests.inspection import profiles
 
 
 def compile_kernels() -> None:
-    """Compile the projections and the registration by every method, or load them from the cache."""
+    """Compile the projections and the registration by every method and what characteristics ask, or load them from the cache."""
     nominal = discretize(profiles.p3(), samples=400)
     for method in get_args(Method):
         rehearse(nominal, method, reject_outliers=True)
         register_fine(nominal.points_mm, nominal, RigidTransform.identity(), method=method)
+    nominal.curve.few_derivatives(0.5, 2)
 
 
 if __name__ == "__main__":

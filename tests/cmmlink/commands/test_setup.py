@@ -125,6 +125,7 @@ before, nominal = compiled(), discretize(profiles.p3(), samples=400)
 for method in get_args(Method):
     rehearse(nominal, method, reject_outliers=True)
     rehearse(nominal, method)
+nominal.curve.few_derivatives(0.5, 2)  # asked by characteristics
 after = compiled()
 print(sum(after.values()), *(name for name in after if after[name] != before.get(name)))
 """
