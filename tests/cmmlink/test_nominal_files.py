@@ -95,4 +95,5 @@ def test_missing_file_folder_and_bad_scale_are_refused(tmp_path: Path) -> None:
 
 
 def test_formats_are_found_by_looking() -> None:
-    assert known_suffixes() == [".asc", ".csv", ".dat", ".dxf", ".iges", ".igs", ".p21", ".step", ".stp", ".txt", ".xyz", ".yaml", ".yml"]
+    read = ".asc .csv .dat .dxf .iges .igs .json .p21 .qif .step .stp .txt .xyz .yaml .yml"
+    assert known_suffixes() == read.split()
