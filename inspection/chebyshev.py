@@ -178,15 +178,17 @@ class _Problem(NamedTuple):
         k = len(units)
         low = np.maximum((self.freedoms.lower - amounts) * units, -trust_mm)
         high = np.minimum((self.freedoms.upper - amounts) * units, trust_mm)
-        working = np.flatnonzero(np.abs(value) >= _WORKING_SHARE * np.abs(value).max())
+        largest, unit = float(np.abs(value).max()), trust_mm or 1.0  # it is zero where all points lie on the nominal
+        working = np.flatnonzero(np.abs(value) >= _WORKING_SHARE * largest)
         while True:
-            slack, of_work = -np.ones(len(working)), J[working]
+            # In units of the trust region, counted from the largest value: the solver errs by 1e-7, whatever the numbers stand for.
+            slack, of_work, value_of_work = -np.ones(len(working)), J[working], value[working]
             A = np.vstack([np.column_stack([of_work, slack]), np.column_stack([-of_work, slack])])
-            b = np.concatenate([-value[working], value[working]])
-            bounds = [*zip(low.tolist(), high.tolist(), strict=True), (0, None)]
+            b = np.concatenate([largest - value_of_work, largest + value_of_work]) / unit
+            bounds = [*zip((low / unit).tolist(), (high / unit).tolist(), strict=True), (None, None)]
             result = linprog([0] * k + [1], A_ub=A, b_ub=b, bounds=bounds, method="highs")
-            solution = np.asarray(result.x)  # the program always has one: q = 0 with t = max |value|
-            step, promised = solution[:k], float(solution[k])
+            solution = unit * np.asarray(result.x)  # the program always has one: to stay
+            step, promised = solution[:k], largest + float(solution[k])
             size = np.abs(value + J @ step)
             new = np.setdiff1d(np.flatnonzero(size > promised + _ROUND_OFF * (1 + promised)), working, assume_unique=True)
             if not new.size:

@@ -10,13 +10,17 @@ from scipy.interpolate import make_interp_spline
 from inspection import (
     CharacteristicResult,
     InspectionError,
+    LineProfile,
     LiveInspection,
     NominalProfile,
     NurbsCurve,
     Outline,
+    Region,
     SectionCharacteristic,
     ToleranceZone,
+    VaryingZone,
     Verdict,
+    ZoneCertificate,
     discretize,
     find_airfoil,
     find_camber_line,
@@ -119,3 +123,23 @@ def test_a_window_that_runs_into_the_sides_gives_no_radius_of_the_edge(edge: Edg
         asked = SectionCharacteristic("radius", "edge-radius", "circle", -1.0, 1.0, edge=edge, window_deg=window)
         with pytest.raises(InspectionError, match=f"window of {window:g} degrees reaches .* into its sides"):
             with_nominal(asked, lambda: outline)
+
+
+@pytest.mark.parametrize("count", [800, 8000])
+def test_a_smooth_flank_has_a_settled_minimum_zone_however_densely_it_was_measured(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The last steps are shorter than what the solver of linear programs errs by: it took its errors for gains, and never settled."""
+    monkeypatch.setattr("inspection.evaluation.placing._MOST_BOXES", 256)
+    profile = blade()
+    length = profile.length_mm
+    station = (np.arange(count) + 0.5) / count * length
+    u = np.interp(station, profile.station_mm, profile.parameter)
+    normal = profile.outward * left_normal(profile.curve, u)
+    form = 0.012 * np.sin(8 * np.pi * station / length + 0.4) + 0.01 * np.cos(18 * np.pi * station / length)
+    zone = VaryingZone.constant(-0.05, 0.05, length, True)
+    flank = LineProfile("flank", zone, region=Region(0.1 * length, 0.35 * length), fit="minimum-zone")
+    live = LiveInspection(profile, WIDE, provisional=False, characteristics=[flank], tip_radius_mm=1.0)
+    live.add(profile.curve.point(u) + (1.0 + form)[:, None] * normal)
+    (found,) = live.finish().characteristics
+    assert found.verdict is Verdict.CONFORM
+    assert isinstance(found.certificate, ZoneCertificate)
+    assert len(found.certificate.multipliers) == 4
