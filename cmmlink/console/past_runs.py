@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from cmmlink.characteristic_rows import characteristics_at_end, worst_words
 from cmmlink.console.paper_process import make_comparison, make_report
 from cmmlink.console.protocol import RunRow
 from cmmlink.endings import Ended
@@ -167,6 +168,7 @@ def _row_of(entry: dict[str, Any], result: dict[str, Any]) -> RunRow:
         headline.words,
         headline.shape,
         entry["state"] == "complete" and verdict is not None,
+        "" if verdict in (None, Verdict.CONFORM) else worst_words(characteristics_at_end(result).rows),
         worst.get("deviation_mm"),
         worst.get("station_mm"),
         zone.get("lower_mm"),

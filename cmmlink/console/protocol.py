@@ -179,6 +179,7 @@ class RunRow:
 
     section     : which section of a surface it is, in words; empty for a run of a device
     word, shape : the verdict, or how early the run ended, and its sign; `counted`: the scan came to its end with a verdict
+    of          : of several characteristics, which gave a verdict that is not conform, by name; else empty
     """
 
     run: str
@@ -193,6 +194,7 @@ class RunRow:
     word: str
     shape: Shape
     counted: bool
+    of: str
     worst_mm: float | None
     worst_station_mm: float | None
     lower_mm: float | None

@@ -233,7 +233,7 @@ export interface CharacteristicList {
   readonly type: "characteristics";
 }
 
-/** One line of the station's history. `worst_mm` is the deviation farthest from the middle of the zone. section : which section of a surface it is, in words; empty for a run of a device word, shape : the verdict, or how early the run ended, and its sign; `counted`: the scan came to its end with a verdict */
+/** One line of the station's history. `worst_mm` is the deviation farthest from the middle of the zone. section : which section of a surface it is, in words; empty for a run of a device word, shape : the verdict, or how early the run ended, and its sign; `counted`: the scan came to its end with a verdict of : of several characteristics, which gave a verdict that is not conform, by name; else empty */
 export interface RunRow {
   readonly run: string;
   readonly began: string;
@@ -247,6 +247,7 @@ export interface RunRow {
   readonly word: string;
   readonly shape: "conform" | "not-proven" | "not-conform" | "ended-early" | "none";
   readonly counted: boolean;
+  readonly of: string;
   readonly worst_mm: number | null;
   readonly worst_station_mm: number | null;
   readonly lower_mm: number | null;

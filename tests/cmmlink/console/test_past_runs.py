@@ -11,6 +11,8 @@ from cmmlink.errors import RunError, StoreError
 from cmmlink.events import RunFinished
 from cmmlink.record import Draft, Record, Store
 from cmmlink.words import local_words
+from tests.cmmlink.command import cmmlink
+from tests.cmmlink.oval_part import oval_points, write_nominal, write_points
 from tests.cmmlink.recorded import Script, no_decoder, record, scan_arrivals, today
 
 
@@ -74,3 +76,15 @@ def test_runs_are_listed_newest_first_with_their_own_limits(past: PastRuns) -> N
     assert newest.lower_mm is not None
     assert newest.upper_mm is not None
     assert newest.lower_mm < newest.upper_mm
+
+
+def test_a_line_of_the_history_names_the_characteristic_that_failed(tmp_path: Path, past: PastRuns) -> None:
+    write_nominal(tmp_path / "oval.yaml")
+    write_points(tmp_path / "points.csv", oval_points(0.01))
+    (tmp_path / "plan.yaml").write_text(
+        "part: {name: oval}\nnominal: {file: oval.yaml}\ndevice: {type: file, file: points.csv}\nrecords: records\nout: null\n"
+        "registration: {datum: {rotation_deg: 0.0}}\ntolerance: {lower_mm: -0.05, upper_mm: 0.05}\ncharacteristics:\n"
+        "  - {name: loose, type: line-profile, zone: 0.1, fit: none}\n  - {name: tight, type: line-profile, zone: 0.01, fit: none}\n"
+    )
+    assert cmmlink("run", tmp_path / "plan.yaml", "--json").code == 1
+    assert [(row.word, row.of) for row in past.runs()] == [("NOT CONFORM", "tight")]
