@@ -12,7 +12,7 @@ from inspection.fine import MISFIT, ranked_poses, register_fine
 from inspection.kernels import GrowingSums
 from inspection.nominal import NominalProfile
 from inspection.registration import Registration
-from inspection.rigid import RigidTransform, rotation_about
+from inspection.rigid import RigidTransform, turned_about
 from inspection.scan_rows import ScanRows
 from inspection.signed_deviations import deviations
 from inspection.terms import Terms
@@ -57,7 +57,7 @@ class PoseTrack:
         self._sums.add(rows.foot[places], rows.normal[places], off, rows.station[block], rows.verdicts[block])
         self._sums.move()
         x, y, angle = self._sums.motion.tolist()
-        pose = rotation_about(self._centre, angle, np.array([x, y])).after(self._start)
+        pose = turned_about(self._start, self._centre, angle, x, y)
         self.registration = replace(self.registration, nominal_from_section=pose)
         self._reserve_mm = None
 

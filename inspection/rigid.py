@@ -24,7 +24,7 @@ class RigidTransform:
 
     def __post_init__(self) -> None:
         translation = np.array(self.translation_mm, dtype=np.float64)
-        if translation.shape != (2,) or not all(map(math.isfinite, (self.rotation_rad, *translation.tolist()))):
+        if translation.shape != (2,) or not (math.isfinite(self.rotation_rad) and all(map(math.isfinite, translation.tolist()))):
             raise ValueError(f"need a finite angle and a translation (2,), got {self.rotation_rad} and {self.translation_mm}")
         translation.setflags(write=False)
         object.__setattr__(self, "rotation_rad", float(self.rotation_rad))
@@ -55,9 +55,7 @@ class RigidTransform:
 
     def after(self, first: "RigidTransform") -> "RigidTransform":
         """The motion that makes `first` and then this one."""
-        angle = self.rotation_rad + first.rotation_rad
-        x, y = _turn(first.translation_mm, self.rotation_rad)
-        return RigidTransform(float(np.arctan2(np.sin(angle), np.cos(angle))), np.array([x, y]) + self.translation_mm)
+        return _after(self.rotation_rad, *self.translation_mm.tolist(), first)
 
 
 def rotate(vectors: Array, angle_rad: float) -> Array:
@@ -77,9 +75,28 @@ def _turn(vector: Array, angle_rad: float) -> tuple[float, float]:
     return c * x - s * y, s * x + c * y
 
 
+def _after(rotation_rad: float, x_mm: float, y_mm: float, first: RigidTransform) -> RigidTransform:
+    """The motion that makes `first`, then a rotation about the origin, then a shift."""
+    angle = rotation_rad + first.rotation_rad
+    x, y = _turn(first.translation_mm, rotation_rad)
+    return RigidTransform(float(np.arctan2(np.sin(angle), np.cos(angle))), np.array([x + x_mm, y + y_mm]))
+
+
 def rotation_about(centre_mm: Array, angle_rad: float, shift_mm: Array) -> RigidTransform:
     """Rotation about a centre (2,), then a shift (2,)."""
-    return RigidTransform(angle_rad, centre_mm + shift_mm - np.array(_turn(centre_mm, angle_rad)))
+    return RigidTransform(angle_rad, np.array(_shift_about(centre_mm, angle_rad, *shift_mm.tolist())))
+
+
+def turned_about(first: RigidTransform, centre_mm: Array, angle_rad: float, x_mm: float, y_mm: float) -> RigidTransform:
+    """The motion that makes `first`, then a rotation about a centre (2,), then a shift: one motion for two, in less than half the time."""
+    return _after(angle_rad, *_shift_about(centre_mm, angle_rad, x_mm, y_mm), first)
+
+
+def _shift_about(centre_mm: Array, angle_rad: float, x_mm: float, y_mm: float) -> tuple[float, float]:
+    """The shift of a motion that turns about a centre (2,) and then shifts."""
+    x, y = centre_mm.tolist()
+    turned_x, turned_y = _turn(centre_mm, angle_rad)
+    return x + x_mm - turned_x, y + y_mm - turned_y
 
 
 def best_motion(source_mm: Array, target_mm: Array) -> RigidTransform:

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inspection.kernels.compiling import kernel
+from inspection.kernels.compiling import brief_kernel
 from inspection.kernels.layout import (
     COUNT,
     SLOPE_TURN,
@@ -97,7 +97,7 @@ class GrowingSums:
         return float(_spread(places_mm, normals, station_mm, scatter, self._frame[0], self._sums, self._marks))
 
 
-@kernel
+@brief_kernel
 def _grow(
     foot: Any,
     normal: Any,
@@ -135,12 +135,12 @@ def _grow(
     change[1] = previous
 
 
-@kernel
+@brief_kernel
 def _move(sums: Any, frame: Any, motion: Any) -> None:
     motion[0], motion[1], motion[2], _ = newton_step(sums, frame[2])
 
 
-@kernel
+@brief_kernel
 def _spread(places: Any, normals: Any, station: Any, scatter: float, frame: Any, sums: Any, marks: Any) -> float:
     covariance = np.empty((3, 3))
     fill_covariance(sums, frame[2], scatter, covariance)

@@ -5,7 +5,7 @@ import pytest
 
 from inspection import RigidTransform
 from inspection.kernels.rows import place_rows
-from inspection.rigid import best_motion, rotate, rotation_about
+from inspection.rigid import best_motion, rotate, rotation_about, turned_about
 from tests.inspection import profiles
 
 
@@ -29,7 +29,10 @@ def test_motions_of_one_place_are_those_of_many_to_the_last_bit() -> None:
         motion, first = RigidTransform(angle, shift), RigidTransform(0.3, centre)
         assert np.array_equal(motion.after(first).translation_mm, motion.apply(centre[None])[0])
         assert np.array_equal(motion.inverse().translation_mm, -rotate(shift[None], -angle)[0])
-        assert np.array_equal(rotation_about(centre, angle, shift).translation_mm, centre + shift - rotate(centre[None], angle)[0])
+        about = rotation_about(centre, angle, shift)
+        assert np.array_equal(about.translation_mm, centre + shift - rotate(centre[None], angle)[0])
+        both = turned_about(motion, centre, angle, *shift.tolist())
+        assert (both.rotation_rad, *both.translation_mm) == (about.after(motion).rotation_rad, *about.after(motion).translation_mm)
 
 
 def test_best_motion_is_the_known_one_and_no_other_is_better() -> None:
