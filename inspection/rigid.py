@@ -55,7 +55,8 @@ class RigidTransform:
 
     def after(self, first: "RigidTransform") -> "RigidTransform":
         """The motion that makes `first` and then this one."""
-        return _after(self.rotation_rad, *self.translation_mm.tolist(), first)
+        x, y = self.translation_mm.tolist()
+        return _after(self.rotation_rad, x, y, first)
 
 
 def rotate(vectors: Array, angle_rad: float) -> Array:
