@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from drivers.errors import PointFileError
 from drivers.files.column_choice import AxisName, axes_of, choose_axes, refuse_places
 from drivers.files.plain_rows import Room
-from drivers.files.stated_units import MM_PER_UNIT, UNITS, UnitName, units_of_names
+from drivers.files.stated_units import MM_PER_UNIT, UnitName, units_of_names
 from drivers.files.text_table import Array, Columns, count_of, parse_columns, read_bytes, read_plain, read_text, refuse_long_text
 from drivers.source import Arrival, PointBatch, ScanClosed, ScanOpened
 
@@ -159,7 +159,7 @@ class _Asked:
 def _read_table(table: Columns, asked: _Asked) -> PointFile:
     chosen, notes = choose_axes(table, asked.columns)
     points, found = _points(table.values, chosen, asked, _mm_per_unit(table, asked.scale, asked.unit), table.line_numbers)
-    unit = [*asked.notes, *_note_of_other_unit(table, asked.scale, asked.unit)]
+    unit = [*asked.notes, *_note_of_unit(table, asked.scale, asked.unit)]
     return PointFile(points, (*table.notes, *notes, *unit, *found))
 
 
@@ -175,11 +175,11 @@ def points_of(columns: Columns, scale: float, unit: UnitName | None = None) -> t
     factor = _mm_per_unit(columns, scale, unit)
     for axis, place in chosen.items():
         points[:, "xyz".index(axis)] = convert_to_mm(columns.values[:, [place]], columns.line_numbers, factor)[:, 0]
-    return points, (*columns.notes, *notes, *_note_of_other_unit(columns, scale, unit))
+    return points, (*columns.notes, *notes, *_note_of_unit(columns, scale, unit))
 
 
 def _mm_per_unit(table: Columns | None, scale: float, unit: UnitName | None) -> float:
-    """How many mm a unit of the file is: as asked, else as the file states it. Raises PointFileError where it states another than mm."""
+    """How many mm a unit of the file is: as asked, else as the file states it. Raises PointFileError where it states more than one."""
     if unit is not None:
         if scale not in (1.0, MM_PER_UNIT[unit]):
             raise PointFileError(f"unit {unit} and scale {scale:g} are both given; expected one of them")
@@ -191,19 +191,17 @@ def _mm_per_unit(table: Columns | None, scale: float, unit: UnitName | None) -> 
     if len(kinds) > 1:
         second, first = list(kinds.values())[-2:]
         raise PointFileError(f"{first.place} {first.word}, but {second.place} {second.word}; expected one unit: give the unit")
-    only = kinds.popitem()[1]
-    if only.unit == "mm":
-        return 1.0
-    by_name = f"the unit {only.unit}, or " if only.unit in UNITS else ""
-    raise PointFileError(f"{only.place} {only.word}; expected mm: give {by_name}the scale {only.mm:g}")
+    return kinds.popitem()[1].mm
 
 
-def _note_of_other_unit(table: Columns, scale: float, unit: UnitName | None) -> list[str]:
-    """Say where the text states another unit than the one, or the scale, that was asked for."""
+def _note_of_unit(table: Columns, scale: float, unit: UnitName | None) -> list[str]:
+    """Say which unit the text states, where it is no mm, and whether it was followed: not where another one or a scale was asked for."""
     asked_mm = MM_PER_UNIT[unit] if unit else scale
     others = [each for each in (*units_of_names(table.names), *table.units) if each.mm != asked_mm]
-    if not others or (unit is None and scale == 1.0):
+    if not others:
         return []
+    if unit is None and scale == 1.0:
+        return [f"{others[0].place} {others[0].word}: read in {others[0].unit}"]
     return [f"{others[0].place} {others[0].word}: not followed, since {f'unit {unit}' if unit else f'scale {scale:g}'} was asked for"]
 
 

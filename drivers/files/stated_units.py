@@ -6,10 +6,9 @@ A text that states nothing is in millimetres. What it states is read here and no
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal
 
 UnitName = Literal["mm", "um", "inch"]
-UNITS = get_args(UnitName)
 MM_PER_UNIT = {"mm": 1.0, "um": 0.001, "inch": 25.4, "cm": 10.0, "m": 1000.0, "thou": 0.0254, "ft": 304.8}
 
 _WORDS = {
@@ -37,6 +36,7 @@ _SENTENCES = tuple(
     )
 )
 _AXIS_NAME = re.compile(rf"([xyz])(?![a-z0-9])(?:.*?{_START}({_ANY})[\])]?$)?", re.IGNORECASE)
+_MEASURED = re.compile(r"(?:^|(?<=[\s_.-]))(?:actual|act|ist|measured|meas)(?=$|[\s_.\[(-])[\s_.-]*", re.IGNORECASE)
 _VECTOR_FILE = re.compile(r"XYZIJK(?P<metric>\s*[,;]?\s*METRIC)?\b", re.IGNORECASE)
 
 
@@ -60,14 +60,23 @@ def mm_per(unit: UnitName) -> float:
 
 
 def axis_letters(names: Sequence[str]) -> list[str]:
-    """Return which axis each name of a column is: x, y, z, or nothing."""
-    axes = [_AXIS_NAME.match(name) for name in names]
+    """Return which axis each name of a column is: x, y, z, or nothing.
+
+    Where columns are called actual, measured or ist, like `X Actual` beside `X Nominal`, those alone are axes.
+    """
+    axes = [_AXIS_NAME.match(name) for name in _measured_ones(names)]
     return [axis[1].lower() if axis else "" for axis in axes]
+
+
+def _measured_ones(names: Sequence[str]) -> list[str]:
+    """The names without the word for measured, and nothing in place of the others, where such a word stands beside an axis."""
+    plain = [_MEASURED.sub("", name).rstrip(" _.-") if _MEASURED.search(name) else "" for name in names]
+    return plain if any(map(_AXIS_NAME.match, plain)) else list(names)
 
 
 def units_of_names(names: Sequence[str]) -> list[StatedUnit]:
     """Units that the names of columns give to coordinates: x_mm, Y [inch]."""
-    axes = [axis for axis in map(_AXIS_NAME.match, names) if axis and axis[2]]
+    axes = [axis for axis in map(_AXIS_NAME.match, _measured_ones(names)) if axis and axis[2]]
     return [StatedUnit(f"the header gives {axis[1]} in", axis[2], _UNIT_OF[axis[2].lower()]) for axis in axes]
 
 

@@ -177,10 +177,11 @@ INCHES = {
 
 
 @pytest.mark.parametrize("form", INCHES)
-def test_a_unit_stated_in_words_is_asked_about_and_taken_when_given(tmp_path: Path, form: str) -> None:
+def test_a_unit_stated_in_words_is_taken_and_said_and_one_that_is_given_goes_above_it(tmp_path: Path, form: str) -> None:
     path = written(tmp_path, INCHES[form])
-    with pytest.raises(PointFileError, match=r"expected mm: give the unit inch, or the scale 25\.4$"):
-        read_points(path)
+    as_stated = read_points(path)
+    np.testing.assert_array_equal(as_stated.points_mm, POINTS * 25.4)
+    assert len([note for note in as_stated.notes if note.endswith(": read in inch")]) == 1
     np.testing.assert_array_equal(read_points(path, unit="inch").points_mm, POINTS * 25.4)
     np.testing.assert_array_equal(read_points(path, scale=25.4).points_mm, POINTS * 25.4)
     as_mm = read_points(path, unit="mm")
@@ -295,7 +296,7 @@ BAD: dict[str, tuple[str | bytes, str]] = {
     "index without a name": ("0 1.5 2.5 3.5\n1 2.5 3.5 4.5\n2 3.5 4.5 5.5\n", "the first column counts the rows"),
     "other names": ("a;b;c\n1;2;3\n4;5;6\n", "the header names no columns x and y: a, b, c"),
     "two x": ("x,y,x\n1.5,2,3\n4,5,6\n", "more than one column x"),
-    "inches": ("x [inch],y [inch]\n1.5,2\n4,5\n", "the header gives x in inch; expected mm: give the unit inch, or the scale 25.4"),
+    "two units": ("x [inch],y [mm]\n1.5,2\n4,5\n", "the header gives y in mm, but the header gives x in inch; expected one unit"),
 }
 
 
@@ -332,9 +333,10 @@ def test_column_names_of_millimetres(name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "factor"), [("x_m", 1000), ("X [cm]", 10), ("x(um)", 0.001), ("x [\u00b5m]", 0.001), ("x in", 25.4), ("X inch", 25.4)]
 )
-def test_column_names_of_other_units_are_refused_with_the_scale(name: str, factor: float) -> None:
-    with pytest.raises(PointFileError, match=f"expected mm: give .*the scale {factor:g}$"):
-        points_of(parse_columns(f"n;y;{name}\n7;2;1.5\n8;4;3.5\n"), 1.0)
+def test_column_names_of_other_units_are_followed_and_said(name: str, factor: float) -> None:
+    points, notes = points_of(parse_columns(f"n;y;{name}\n7;2;1.5\n8;4;3.5\n"), 1.0)
+    np.testing.assert_allclose(points, np.array([[1.5, 2, 0], [3.5, 4, 0]]) * factor, rtol=1e-15)
+    assert [note for note in notes if note.startswith("the header gives") and ": read in " in note]
 
 
 def test_unit_in_the_header_is_taken_with_a_scale(tmp_path: Path) -> None:
