@@ -205,7 +205,8 @@ def _inspect_stack(plan: "CtPlan", output: Output, pictures: bool, no_record: bo
                 _print_stack(terminal(), stack)
     if folder is not None and not output.as_json:
         drawn = ", stack.png, stack.svg, report.pdf" if pictures else ""
-        typer.echo(f"results in {folder}: result.json, sections.csv, a folder for each section{drawn}")
+        further = "".join(f", result.{name}" for name in plan.out.formats if name != "json")
+        typer.echo(f"results in {folder}: result.json, sections.csv, a folder for each section{drawn}{further}")
     return EXIT_OF[stack.verdict]
 
 

@@ -18,7 +18,7 @@ _OF_ONE: Mapping[FormatName, Write] = {"qif": write_qif, "json": write_json}
 
 
 def write_exports(parts: Sequence[MeasuredPart], formats: Sequence[FormatName], files: NewFiles, stem: str) -> None:
-    """Write parts in each of the formats, as STEM.FORMAT; where there are many, a format for one has a file STEM-RUN.FORMAT for each.
+    """Write parts in each of the formats, as STEM.FORMAT; where there are many, a format for one has a file RUN.FORMAT for each.
 
     Raises PlanError where runs cannot be added to a file that is there, OSError where a file cannot be written.
     """
@@ -27,4 +27,4 @@ def write_exports(parts: Sequence[MeasuredPart], formats: Sequence[FormatName], 
             _OF_MANY[name](parts, files, stem)
         else:
             for part in parts:
-                _OF_ONE[name]([part], files, stem if len(parts) == 1 else f"{stem}-{part.run}")
+                _OF_ONE[name]([part], files, stem if len(parts) == 1 else part.run)

@@ -6,17 +6,35 @@ import threading
 import zipfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from cmmlink.result_folder import make_room
 from tests.cmmlink.command import cmmlink
 from tests.cmmlink.exports.conftest import Measured
 from tests.cmmlink.exports.schemas import check_qif, check_result
+from tests.cmmlink.exports.tables_of import sheets_of
+from tests.cmmlink.oval_part import oval_points, write_nominal
 from tests.cmmlink.record.test_old_records import RECORD
 from tests.cmmlink.recorded import Script, record, scan_arrivals
+from tests.drivers.surface.meshes import binary_stl, tube, write
 
 FORMATS = ("qif", "dfq", "xlsx", "csv", "json")
 FILES = ("result.qif", "result.dfq", "result.xlsx", "result.csv", "result-characteristics.csv", "result-points.csv")
+
+NAMES_OF_A_SECTION = ("profile", "largest deviation", "smallest deviation")
+STACK = """
+part: {name: blade}
+mesh: {file: a.stl}
+nominal: {file: oval.yaml}
+tolerance: {lower_mm: -0.05, upper_mm: 0.05}
+registration: {datum: {}}
+sections: {heights_mm: [3, 6]}
+stack_characteristics: [{name: bent, type: displacement, upper_mm: 0.05}]
+cut: {cutter: numpy}
+records: records
+out: {folder: out, formats: [qif, dfq, xlsx]}
+"""
 
 
 def test_a_run_writes_the_formats_of_its_plan_and_the_record_gives_the_same_bytes(measured: Measured, tmp_path: Path) -> None:
@@ -62,6 +80,23 @@ def test_a_run_without_a_verdict_is_told_as_such_in_every_format(tmp_path: Path,
     assert ",uncertain,uncertain," in files[".csv"].read_text(encoding="utf-8-sig")
     values = re.findall(r"K0002/\d+ (\d+)", files[".dfq"].read_text(encoding="utf-8"))
     assert values == {2: [], 300: ["255" if ending == "aborted" else "0"] * 3}[points]
+
+
+def test_the_sections_of_a_surface_are_one_part(tmp_path: Path) -> None:
+    write_nominal(tmp_path / "oval.yaml")
+    write(tmp_path / "a.stl", binary_stl(tube(oval_points(0.0), np.array([0.0, 9.0]))))
+    (tmp_path / "plan.yaml").write_text(STACK, encoding="utf-8")
+    result = cmmlink("ct", tmp_path / "plan.yaml", "--no-pictures", "--json").json()
+    check_result(result)
+    assert check_qif(tmp_path / "out" / "result.qif") == ["PASS", "PASS", "PASS", "PASS", "PASS"]
+    rows = sheets_of(tmp_path / "out" / "result.xlsx")
+    assert [(row["height_mm"], row["run"], row["chain_sha256"]) for row in rows["runs"]] == [
+        (section["height_mm"], section["run"], section["chain_sha256"]) for section in result["slices"]
+    ]
+    values = [one["value"] for section in result["slices"] for one in section["characteristics"]] + [result["characteristics"][0]["value"]]
+    assert [row["value"] for row in rows["characteristics"]] == pytest.approx(values, rel=1e-15)
+    names = re.findall(r"K2002/\d+ (.*)", (tmp_path / "out" / "result.dfq").read_text(encoding="utf-8"))
+    assert names == [f"{name} at {height}" for height in ("3.000", "6.000") for name in NAMES_OF_A_SECTION] + ["bent"]
 
 
 def test_a_run_of_an_earlier_version_is_exported_with_its_own_numbers(tmp_path: Path) -> None:

@@ -117,7 +117,7 @@ def test_many_runs_are_rows_of_one_table(measured: Measured, tmp_path: Path, kin
     assert [(float(row["row"]), row["run"]) for row in tables["runs"]] == [(1, runs[0]), (2, runs[1])]
     assert [float(row["row"]) for row in tables["characteristics"]] == [1, 1, 1, 2, 2, 2]
     assert [float(point["row"]) for point in tables["points"]] == [1] * 360 + [2] * 360
-    assert {path.name for path in tmp_path.glob("*.json")} == {f"runs-{run}.json" for run in runs[:2]}
+    assert {path.name for path in tmp_path.glob("*.json")} == {f"{run}.json" for run in runs[:2]}
 
 
 def test_the_rows_of_a_stack_name_their_heights_and_its_own_characteristics(measured: Measured, tmp_path: Path) -> None:
