@@ -120,6 +120,7 @@ device:
   silence_s: 5
   reconnect_s: 30
   axis: {follow: {type: modbus, address: "192.168.1.11:502", map: my-axis.yaml}}
+registration: {datum: {result: fixture/result.json}}
 """
 
 _FILE = """
