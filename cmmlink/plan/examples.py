@@ -130,7 +130,10 @@ tolerance: {lower_mm: -0.05, upper_mm: 0.05}
 device: {type: file, file: points.csv, columns: {x: 2, y: 3}, unit: inch, invalid: [-9999]}
 """
 
-_FILE_WITH_SCALE = _FILE.replace("unit: inch", "scale: 25.4")
+_FILE_WITH_SCALE = (
+    _FILE.replace("unit: inch", "scale: 25.4")
+    + "registration: {datum: {result: fixture/result.json, run: 20260314-150926-0001, chain_sha256: 0f3a}}\n"
+)
 
 _SURFACE = """
 part: {name: blade 8}
