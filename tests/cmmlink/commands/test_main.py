@@ -51,7 +51,7 @@ def test_a_name_that_the_terminal_has_no_letters_for_costs_no_verdict(nominal: P
 
 
 def test_what_is_missing_is_named(nominal: Path) -> None:
-    assert cmmlink("inspect").refused() == "Missing argument 'POINTS'; `cmmlink inspect --help` shows what is allowed"
+    assert cmmlink("inspect").refused() == "Missing argument 'POINTS...'; `cmmlink inspect --help` shows what is allowed"
     assert cmmlink("inspect", "p.csv", *TOLERANCE).refused().startswith("Missing option '--nominal'; ")
     assert cmmlink("inspect", "p.csv", "--nominal", nominal).refused().startswith("Missing option '--tolerance'; ")
     assert cmmlink("inspect", "p.csv", "--nominal", nominal, "--tolerance", -0.05).refused().startswith("Option '--tolerance' requires 2")
