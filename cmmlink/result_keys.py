@@ -130,7 +130,9 @@ class Replayed(Inspected):
     ending: Ending = Field(description="how the recorded run ended")
     replay_of: str = Field(description="the id of the recorded run")
     chain_sha256: str = Field(description="the hash of the run's last record")
-    identical: bool | None = Field(description="whether the result is the recorded one to the last bit; null where none was recorded")
+    identical: bool | None = Field(
+        description="whether all of the recorded result is found again to the last bit; null where none was recorded"
+    )
     changed: list[Change] = Field(description="the settings and software that are not those of the recorded run")
     differs: list[Change] = Field(description="what of the result is not as recorded")
     notes: list[str] = Field(description="what was assumed about the nominal and the points when they were recorded, and their density")

@@ -19,7 +19,7 @@ from cmmlink.events import RunStarted, Sink
 from cmmlink.from_plan import inspection_of, profile_of
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan import Device, Plan, read_model
-from cmmlink.record.bodies import PlacedArrival
+from cmmlink.record.bodies import PlacedArrival, pack_document
 from cmmlink.record.reader import RecordedRun, arrivals_of, points_of, reads_of
 from cmmlink.record.recorder import judged_bodies, result_sha256, software
 from cmmlink.record.shapes import plain_name
@@ -99,11 +99,8 @@ def replay_run(
     )
     reading.raise_failure(recorded.run, outcome)
     replayed = result_json(outcome.result, outcome.counts)
-    identical = None
-    if recorded.end is not None and recorded.end["result_sha256"]:
-        identical = result_sha256(replayed, (body for _, body in judged_bodies(outcome.result))) == recorded.end["result_sha256"]
     changes = (*_settings_changed(plan, changed), *_software_changed(recorded.header["software"]))
-    differs = _differences(recorded.result, replayed) if not identical else ()
+    identical, differs = _compare(recorded, replayed, (body for _, body in judged_bodies(outcome.result)))
     notes = (*started.notes, *density_notes(density_of(stations_of(outcome.result), profile.length_mm), profile.length_mm))
     return Replay(changed, outcome, profile, replayed, changes, differs, identical, notes)
 
@@ -243,18 +240,24 @@ def _software_changed(recorded: Mapping[str, str]) -> Iterator[Change]:
     return _differences_of(dict(recorded), software(), "software.")
 
 
-def _differences(recorded: Mapping[str, Any] | None, replayed: Mapping[str, Any]) -> tuple[Change, ...]:
-    """Name what came out differently. Deviations alone may differ without any of the summary showing it."""
-    if recorded is None:
-        return ()
-    found = tuple(_differences_of(recorded, replayed))
-    return found or (Change("deviations", "as recorded", "differ in the last bits; nothing of the summary does"),)
+def _compare(recorded: RecordedRun, replayed: Mapping[str, Any], rows: Iterator[bytes]) -> tuple[bool | None, tuple[Change, ...]]:
+    """Whether all that was recorded is found again to the last bit, and what is not. None where no result was recorded.
+
+    Deviations alone may differ without any of the summary showing it. What a later version of cmmlink tells as well is no difference.
+    """
+    differs = tuple(_differences_of(recorded.result, replayed)) if recorded.result is not None else ()
+    if recorded.end is None or not recorded.end["result_sha256"]:
+        return None, differs
+    alike = result_sha256(recorded.result or replayed, rows) == recorded.end["result_sha256"]
+    if not alike and not differs:
+        differs = (Change("deviations", "as recorded", "differ in the last bits; nothing of the summary does"),)
+    return alike and not differs, differs
 
 
 def _differences_of(recorded: Any, replayed: Any, key: str = "") -> Iterator[Change]:
-    """Name the values that are not alike, by their path."""
+    """Name the recorded values that are not found again, by their path."""
     if isinstance(recorded, Mapping) and isinstance(replayed, Mapping):
-        for name in [*recorded, *(name for name in replayed if name not in recorded)]:
+        for name in recorded:
             prefix = key if not key or key.endswith(".") else key + "."
             yield from _differences_of(recorded.get(name), replayed.get(name), prefix + name)
     elif _is_list(recorded) and _is_list(replayed):
@@ -263,7 +266,7 @@ def _differences_of(recorded: Any, replayed: Any, key: str = "") -> Iterator[Cha
             return
         for index, (before, now) in enumerate(zip(recorded, replayed, strict=True)):
             yield from _differences_of(before, now, f"{key}[{index}]")
-    elif recorded != replayed:
+    elif pack_document(recorded) != pack_document(replayed):
         yield Change(key, recorded, replayed)
 
 

@@ -6,7 +6,10 @@ import shutil
 import subprocess
 import sys
 import threading
+from copy import deepcopy
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +17,7 @@ import pytest
 from cmmlink.demo import part_path
 from cmmlink.events import Arrived, Event, RunFinished
 from cmmlink.record.reader import open_to_read, recorded_run
+from cmmlink.record.recorder import result_sha256
 from cmmlink.record.replay import Replay, replay_run
 from drivers.codecs.ascii_frames import AsciiDecoder
 from drivers.links.link_settings import LinkSettings
@@ -158,6 +162,29 @@ def test_the_recorded_nominal_counts_not_the_file_of_that_name_today(tmp_path: P
         assert moved != recorded.plan
         again = replay_run(store, type(recorded)(recorded.header, moved, recorded.nominal, recorded.end, recorded.result, ""), decoder_of)
     assert again.identical is True
+
+
+def test_what_a_later_version_tells_as_well_is_no_difference(tmp_path: Path) -> None:
+    run = recorded_scan(tmp_path)
+    with open_to_read(tmp_path, today) as store:
+        recorded = recorded_run(store, run)
+        rows = [record.body for record in store.records(run, "deviations")]
+
+        def replayed_with(result: dict[str, Any]) -> Replay:
+            """Replay as if the version of that day had written this result."""
+            end = {**(recorded.end or {}), "result_sha256": result_sha256(result, rows)}
+            return replay_run(store, replace(recorded, result=result, end=end), decoder_of)
+
+        assert recorded.result is not None
+        told = deepcopy(recorded.result)
+        del told["coverage"], told["characteristics"][0]["fit"]
+        again = replayed_with(told)
+        assert again.identical is True
+        assert again.differs == ()
+        told["characteristics"][0]["value"] = np.nextafter(told["characteristics"][0]["value"], 1.0)
+        again = replayed_with(told)
+        assert again.identical is False
+        assert [change.key for change in again.differs] == ["characteristics[0].value"]
 
 
 def test_replay_on_another_machine_is_identical(tmp_path: Path) -> None:
