@@ -18,6 +18,7 @@ from cmmlink.plan import CtPlan, Discretisation, Nominal, Plan, Section, place_o
 from drivers import PointFileError, read_bytes
 from inspection import (
     Characteristic,
+    Evaluation,
     FitName,
     LiveInspection,
     Method,
@@ -31,6 +32,7 @@ from inspection import (
     ToleranceZone,
     WeightName,
     discretize,
+    evaluate,
     uncertainty_along,
 )
 
@@ -201,12 +203,14 @@ def inspection_of(
     provisional: bool = True,
     characteristics: Sequence[Characteristic] | None = None,
     numbers: Sequence[SectionCharacteristic] = (),
+    evaluation: Evaluation = evaluate,
 ) -> LiveInspection:
     """A fresh inspection as a plan describes it. Points that are all there from the start need no provisional verdicts.
 
     room            : gives the arrays that grow with the scan, like numpy.empty
     characteristics : those of the plan for this profile, where they are built already
     numbers         : what is found as well, without a part in the verdict
+    evaluation      : how both are found at the end
 
     Raises PlanError for a characteristic that the nominal does not have.
     """
@@ -222,6 +226,7 @@ def inspection_of(
         compensation=plan.warmth.compensation if plan.warmth is not None else None,
         characteristics=asked_of(plan, profile) if characteristics is None else characteristics,
         numbers=numbers,
+        evaluation=evaluation,
         provisional=provisional,
         room=room,
     )

@@ -24,7 +24,7 @@ from cmmlink.record import Recorder, RunInputs, Store
 from cmmlink.words import VERDICT_WORDS
 from drivers import MeshError, Rejected, ScanClosed, ScanOpened, ScanSource
 from drivers.surface import Contour, ContourSource, SurfaceSection, add_points_between
-from inspection import Characteristic, NominalProfile, Reason, RegistrationError, SectionCharacteristic
+from inspection import Characteristic, Evaluation, NominalProfile, Reason, RegistrationError, SectionCharacteristic, evaluate
 
 _REFUSED = "not registered"
 
@@ -188,15 +188,17 @@ def measure_section(
     clock: Callable[[], float],
     stop: threading.Event,
     numbers: Sequence[SectionCharacteristic] = (),
+    evaluation: Evaluation = evaluate,
 ) -> RunOutcome:
     """Send the outline of one section through the pipeline. With a doubt about the outline no verdict is proven.
 
     asked   : the characteristics of the plan for this profile
     numbers : what is found of it as well, for the characteristics of its stack
+    evaluation : how both are found
 
     Raises MeshError where the outline cannot be read, which is no fault of the outline: the system has no thread to give.
     """
-    live = inspection_of(plan, profile, provisional=False, characteristics=asked, numbers=numbers)
+    live = inspection_of(plan, profile, provisional=False, characteristics=asked, numbers=numbers, evaluation=evaluation)
     sinks = [recorder] if recorder else []
     watch = recorder.check if recorder else lambda: None
     run = run_inspection(source, live, sinks, started, buffer_points=plan.buffer_points, clock=clock, stop=stop, watch=watch, doubt=doubt)

@@ -16,6 +16,7 @@ from typing import Any
 from cmmlink.characteristics import notes_on_zone
 from cmmlink.errors import PlanError
 from cmmlink.events import Ending, RunStarted
+from cmmlink.foresight import Foresight, look_ahead
 from cmmlink.from_plan import (
     check_fixed_place,
     notes_on_temperature,
@@ -23,11 +24,12 @@ from cmmlink.from_plan import (
 )
 from cmmlink.outline import outline_of
 from cmmlink.pipeline import RunOutcome
-from cmmlink.plan import CtPlan
+from cmmlink.plan import CtPlan, Plan
 from cmmlink.record import PATIENCE_S, RecordReference, open_to_record
 from cmmlink.result_folder import folder_of
 from cmmlink.result_json import result_json
 from cmmlink.section_run import (
+    Chosen,
     StackRecord,
     choose_outline,
     count_points,
@@ -52,7 +54,17 @@ from drivers.surface import (
     SurfaceSection,
     cut_surface,
 )
-from inspection import NominalProfile, Reason, RigidTransform, StackCharacteristicResult, Verdict
+from inspection import (
+    Characteristic,
+    Evaluation,
+    NominalProfile,
+    Reason,
+    RegistrationError,
+    RigidTransform,
+    StackCharacteristicResult,
+    Verdict,
+    evaluate,
+)
 
 _log = logging.getLogger(__name__)
 
@@ -187,32 +199,38 @@ def inspect_stack(
     questions = StackQuestions(plan if plan.stack_fit == "each" else placed_at(plan, RigidTransform.identity()))
     with ExitStack() as opened:
         open3d = Open3DOnUse(opened)
+        foresight = opened.enter_context(Foresight())
         mesh = read_surface(plan, open3d)
         heights = heights_of(plan, mesh)
         check_own_nominals(plan, heights)
         questions.check_heights(heights)
-        for height in heights:
-            questions.numbers(profiles.at(height)[1])
+        numbers = [len(questions.numbers(profiles.at(height)[1])) for height in heights]
         record = None
         if records is not None:
             store = opened.enter_context(open_to_record(records, now, patience_s))
             record = StackRecord.of(store, plan, mesh.triangles, len(heights), began=began, clock=clock, now=now)
         on_start(len(heights))
+        foresight.expect(len(heights), len(plan.characteristics) + max(numbers))
         read_in = [f"{plan.mesh.file.name}: read in {plan.mesh.unit}, as asked"] if plan.mesh.unit else []
         notes = [*read_in, *mesh.warnings, *profiles.notes, *notes_on_temperature(plan), *notes_on_zone(plan)]
         sections: list[SectionOutcome] = []
         slices = _slices(plan, mesh, heights, open3d, notes, profiles.shortest_mm)
         if plan.stack_fit == "common":
             cuts = list(slices)
-            alone = _Stack(plan, profiles, tuple(notes), StackQuestions(plan.model_copy(update={"stack_characteristics": ()})))
-            measured = [_inspect(alone, k + 1, cut, None, clock, stop) for k, cut in enumerate(cuts) if not (k and stop.is_set())]
+            own = plan.model_copy(update={"stack_characteristics": ()})
+            alone = _Stack(own, profiles, StackQuestions(own))
+            measured: list[SectionOutcome] = []
+            for ready in _prepare_ahead(alone, iter(cuts), notes, foresight, clock, stop):
+                measured.append(_inspect(alone, len(measured) + 1, ready, None, clock, stop))
+                if stop.is_set():
+                    break
             common = fit_sections(plan, measured, len(cuts))
             plan, doubt, slices = common.plan, common.doubt, iter(cuts)
             profiles, questions = profiles.asked_by(plan), StackQuestions(plan)
             notes.append(common.words)
-        for cut in slices:
-            stack = _Stack(plan, profiles, tuple(notes), questions, doubt)
-            sections.append(_inspect(stack, len(sections) + 1, cut, record, clock, stop))
+        stack = _Stack(plan, profiles, questions, doubt)
+        for ready in _prepare_ahead(stack, slices, notes, foresight, clock, stop):
+            sections.append(_inspect(stack, len(sections) + 1, ready, record, clock, stop))
             on_section(sections[-1])
             if stop.is_set():
                 notes.append(f"aborted by the operator after {len(sections)} of {len(heights)} sections")
@@ -227,11 +245,10 @@ def inspect_stack(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Stack:
-    """What the sections of a stack share. `notes` are what was assumed about the surface and the nominals, `doubt` is of all sections."""
+    """What the sections of a stack share; `doubt` is of all of them."""
 
     plan: CtPlan
     profiles: StackProfiles
-    notes: tuple[str, ...]
     questions: StackQuestions
     doubt: Reason | None = None
 
@@ -275,31 +292,79 @@ def _cutter(plan: CtPlan, sections: int, open3d: Callable[[], Open3DProcess], no
     return NumpyCutter()
 
 
-def _inspect(
-    stack: "_Stack", number: int, cut: SurfaceSection, record: StackRecord | None, clock: Callable[[], float], stop: threading.Event
-) -> SectionOutcome:
-    """Send one section through the pipeline. An outline that cannot be this profile is refused before anything is fitted."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Ready:
+    """A section before it is measured, with what was assumed about the surface and the nominals by then."""
+
+    cut: SurfaceSection
+    notes: tuple[str, ...]
+    nominal_file: Path
+    plan: Plan
+    profile: NominalProfile
+    asked: tuple[Characteristic, ...]
+    refusal: RegistrationError | None
+    chosen: Chosen
+    warnings: tuple[str, ...]
+    evaluation: Evaluation
+
+
+def _prepare_ahead(
+    stack: _Stack,
+    slices: Iterator[SurfaceSection],
+    notes: list[str],
+    foresight: Foresight,
+    clock: Callable[[], float],
+    stop: threading.Event,
+) -> Iterator[_Ready]:
+    """The sections, so many of them prepared before they are needed as other processes can evaluate beforehand."""
+    return look_ahead((_prepare(stack, cut, tuple(notes), foresight, clock, stop) for cut in slices), foresight.ahead)
+
+
+def _prepare(
+    stack: _Stack, cut: SurfaceSection, notes: tuple[str, ...], foresight: Foresight, clock: Callable[[], float], stop: threading.Event
+) -> _Ready:
+    """Choose what is judged of a section. An outline that cannot be this profile is refused before anything is fitted."""
     plan, (path, _) = stack.plan, stack.profiles.at(cut.asked_mm)
     section, surface = plan_of_section(plan, cut, path), plan.mesh.file.name
     profile, asked = stack.profiles.of(section)
     outline = outline_of(cut, profile)
-    chosen = choose_outline(outline, section, profile, asked, profile.length_mm / _LEAST_POINTS, surface, clock=clock, stop=stop)
+    spacing_mm = profile.length_mm / _LEAST_POINTS
+    chosen = choose_outline(outline, section, profile, asked, spacing_mm, surface, clock=clock, stop=stop)
     warnings = [*cut.warnings, *outline.notes, *_beside(cut, chosen.contours)]
     if count_points(chosen.judged) > count_points(chosen.contours):
-        spacing_mm = profile.length_mm / _LEAST_POINTS
         warnings.append(f"a coarse surface: points were set between its corners, no farther apart than {spacing_mm:.3f} mm")
-    started = run_started(plan, surface_words(plan), simulated=False, notes=(*stack.notes, *warnings))
+    evaluation = evaluate if outline.refusal is not None else foresight.begin(plan, section, chosen.judged)
+    return _Ready(cut, notes, path, section, profile, asked, outline.refusal, chosen, tuple(warnings), evaluation)
+
+
+def _inspect(
+    stack: _Stack, number: int, ready: _Ready, record: StackRecord | None, clock: Callable[[], float], stop: threading.Event
+) -> SectionOutcome:
+    """Send one section through the pipeline."""
+    cut, chosen, warnings, profile = ready.cut, ready.chosen, list(ready.warnings), ready.profile
+    started = run_started(stack.plan, surface_words(stack.plan), simulated=False, notes=(*ready.notes, *warnings))
     doubt = chosen.doubt or stack.doubt
-    with recorder_of(record, number, cut, section, doubt) as recorder:
-        if outline.refusal is not None:
-            run = refuse_section(count_points(chosen.judged), outline.refusal, started, recorder, clock())
+    with recorder_of(record, number, cut, ready.plan, doubt) as recorder:
+        if ready.refusal is not None:
+            run = refuse_section(count_points(chosen.judged), ready.refusal, started, recorder, clock())
         else:
-            source = ContourSource(chosen.judged, surface)
-            numbers = stack.questions.numbers(profile)
-            run = measure_section(source, section, profile, asked, started, recorder, doubt=doubt, clock=clock, stop=stop, numbers=numbers)
+            run = measure_section(
+                ContourSource(chosen.judged, stack.plan.mesh.file.name),
+                ready.plan,
+                profile,
+                ready.asked,
+                started,
+                recorder,
+                doubt=doubt,
+                clock=clock,
+                stop=stop,
+                numbers=stack.questions.numbers(profile),
+                evaluation=ready.evaluation,
+            )
     if run.refusal is not None:
         warnings.append(str(run.refusal))
-    return SectionOutcome(cut, chosen.judged, path, profile, started, run, tuple(warnings), recorder.evidence if recorder else None)
+    evidence = recorder.evidence if recorder else None
+    return SectionOutcome(cut, chosen.judged, ready.nominal_file, profile, started, run, tuple(warnings), evidence)
 
 
 def _beside(cut: SurfaceSection, judged: tuple[Contour, ...]) -> Iterator[str]:

@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from inspection.difference import Course, Difference, difference_along
     from inspection.errors import InspectionError, NominalError, NotMeasured, RegistrationError
     from inspection.evaluation.datum import check_datum
-    from inspection.evaluation.evaluate import doubt_part, evaluate
+    from inspection.evaluation.evaluate import Evaluation, doubt_part, evaluate, with_found
     from inspection.evaluation.line_profile import zone_words
     from inspection.evaluation.region import FeatureName, Features, features_of, region_between, station_near
     from inspection.evaluation.section_value import METHODS_OF_SECTIONS, Outline, with_nominal
@@ -78,6 +78,7 @@ if TYPE_CHECKING:
     from inspection.self_crossings import Crossing, find_crossings
     from inspection.signed_deviations import Deviations, deviations, profile_error_mm
     from inspection.telling_points import telling_rows
+    from inspection.terms import Terms
     from inspection.tolerance import DecisionRule, ToleranceZone
     from inspection.uncertainty import DeviationUncertainty, PartName, UncertaintyBudget, deviation_uncertainty, largest_by_noise_mm
     from inspection.verdict import NOT_JUDGED, Rejection, Verdict
@@ -140,6 +141,7 @@ else:
         "inspection.self_crossings": ("Crossing", "find_crossings"),
         "inspection.signed_deviations": ("Deviations", "deviations", "profile_error_mm"),
         "inspection.telling_points": ("telling_rows",),
+        "inspection.terms": ("Terms",),
         "inspection.tolerance": ("DecisionRule", "ToleranceZone"),
         "inspection.uncertainty": ("DeviationUncertainty", "PartName", "UncertaintyBudget", "deviation_uncertainty", "largest_by_noise_mm"),
         "inspection.verdict": ("NOT_JUDGED", "Rejection", "Verdict"),
@@ -156,8 +158,10 @@ else:
             "WorstPlace",
         ),
         "inspection.evaluation.evaluate": (
+            "Evaluation",
             "doubt_part",
             "evaluate",
+            "with_found",
         ),
         "inspection.evaluation.datum": ("check_datum",),
         "inspection.evaluation.line_profile": ("zone_words",),
@@ -213,6 +217,7 @@ __all__ = [
     "Difference",
     "EdgeRadiusMethod",
     "EdgeThicknessMethod",
+    "Evaluation",
     "EvaluationSoFar",
     "FeatureName",
     "Features",
@@ -273,6 +278,7 @@ __all__ = [
     "State",
     "StatedUncertainty",
     "Stretch",
+    "Terms",
     "ThicknessMethod",
     "ToleranceZone",
     "Transition",
@@ -337,6 +343,7 @@ __all__ = [
     "twist_by_fit",
     "uncertainty_along",
     "while_compiling",
+    "with_found",
     "with_nominal",
     "zone_words",
 ]

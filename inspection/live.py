@@ -22,7 +22,7 @@ from inspection.characteristics.characteristic import Characteristic, SectionCha
 from inspection.cloud import MANY, Cloud
 from inspection.compensation import Compensation
 from inspection.conclusion import Missing
-from inspection.evaluation.evaluate import evaluate
+from inspection.evaluation.evaluate import Evaluation, evaluate
 from inspection.evaluation.so_far import EvaluationSoFar, ScanSoFar, ScanWatch
 from inspection.kernels import Room, compile_projection, fit_compiled_beside, is_fit_compiled
 from inspection.methods import FitName, Method, RuleName, WeightName
@@ -88,6 +88,7 @@ class LiveInspection:
     compensation    : takes the growth of a warm part out of every point before anything else is done with it
     characteristics : what is evaluated at the end, each with a verdict of its own; none stands for the profile alone
     numbers         : what is found at the end as well, without a part in the verdict, for what stands on several inspections
+    evaluation      : how the characteristics are found at the end, where they may be known already
     provisional     : False seeks no pose before `finish`, for points that are all there from the start; the result is the same
     room            : gives the arrays that grow with the scan, like numpy.empty: about 60 bytes a point until `finish` returns
     """
@@ -114,6 +115,7 @@ class LiveInspection:
         compensation: Compensation | None = None,
         characteristics: Sequence[Characteristic] = (),
         numbers: Sequence[SectionCharacteristic] = (),
+        evaluation: Evaluation = evaluate,
         provisional: bool = True,
         room: Room = np.empty,
     ) -> None:
@@ -144,7 +146,7 @@ class LiveInspection:
         self._characteristics, self._numbers = tuple(characteristics), tuple(numbers)
         self._known_pose = self._terms.known_pose
         self._plane = section or SectionPlane(np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
-        self._provisional = provisional
+        self._provisional, self._evaluation = provisional, evaluation
         self._kept = ScanRows(room=room)
         self._handed_over = False  # the rows belong to a result by now
         self._next_fit = BLOCK  # received points at which the pose is sought, or fitted anew
@@ -241,7 +243,7 @@ class LiveInspection:
         rows, self._handed_over = self._rows, True
         missing = missing or Missing()
         result = settle(rows, self._terms, complete, missing)
-        return evaluate(self._characteristics, result, self._terms, missing, complete, self._numbers)
+        return self._evaluation(self._characteristics, result, self._terms, missing, complete, self._numbers)
 
     @property
     def _rows(self) -> ScanRows:

@@ -101,8 +101,9 @@ def inspect(
     """
     from cmmlink.devices import connect
     from cmmlink.from_plan import inspection_of, profile_of
+    from cmmlink.other_processes import processes_here
     from cmmlink.plan import Plan
-    from cmmlink.report import Pictures, prepare, processes_here
+    from cmmlink.report import Pictures, prepare
     from cmmlink.run import carry_out
     from cmmlink.scratch import scratch_in
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from cmmlink.report.nominal_picture import write_nominal_picture
     from cmmlink.report.nominal_text import text_picture
     from cmmlink.report.pdf import write_report
-    from cmmlink.report.picture_processes import Pictures, processes_here
+    from cmmlink.report.picture_processes import Pictures
     from cmmlink.report.recorded_report import input_of_replay, input_on_record
     from cmmlink.report.recorded_stack import stack_on_record
     from cmmlink.report.report_input import ReportInput, with_settings
@@ -28,7 +28,7 @@ else:
         "cmmlink.report.comparison_picture": ("write_comparison_picture",),
         "cmmlink.report.folder": ("prepare", "write_results", "write_run"),
         "cmmlink.report.live_table": ("LiveTable",),
-        "cmmlink.report.picture_processes": ("Pictures", "processes_here"),
+        "cmmlink.report.picture_processes": ("Pictures",),
         "cmmlink.report.curves_picture": ("write_curves_picture",),
         "cmmlink.report.nominal_picture": ("write_nominal_picture",),
         "cmmlink.report.nominal_text": ("text_picture",),
@@ -57,7 +57,6 @@ __all__ = [
     "prepare",
     "print_characteristics",
     "print_summary",
-    "processes_here",
     "stack_on_record",
     "text_picture",
     "with_settings",

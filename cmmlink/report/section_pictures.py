@@ -3,9 +3,10 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from cmmlink.other_processes import processes_here
 from cmmlink.report.judged_scan import scan_of
 from cmmlink.report.picture_content import PictureContent, content_of
-from cmmlink.report.picture_processes import Drawing, Pictures, drawn_by_none, processes_here
+from cmmlink.report.picture_processes import Drawing, Pictures, drawn_by_none
 
 if TYPE_CHECKING:
     from cmmlink.stack import SectionOutcome

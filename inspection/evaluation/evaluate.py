@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Protocol
 
 from inspection.characteristics.characteristic import (
     Characteristic,
@@ -23,6 +24,22 @@ PROFILE = WholeProfile("profile")
 """What a plan without characteristics asks for."""
 
 
+class Evaluation(Protocol):
+    """How the characteristics of a run are found: as `evaluate` finds them, with its arguments."""
+
+    def __call__(
+        self,
+        asked: Sequence[Characteristic],
+        result: InspectionResult,
+        terms: Terms,
+        missing: Missing,
+        complete: bool,
+        numbers: Sequence[SectionCharacteristic],
+        /,
+    ) -> InspectionResult:
+        """The result of a run with its characteristics."""
+
+
 def evaluate(
     asked: Sequence[Characteristic],
     result: InspectionResult,
@@ -40,7 +57,13 @@ def evaluate(
     basis = Basis(result, terms, missing, complete)
     outlines = ActualOutlines(basis)
     found = tuple(_judge(one, basis, outlines) for one in asked or (PROFILE,))
-    beside = tuple(judge_value(one, basis, outlines) for one in numbers)
+    return with_found(result, found, tuple(judge_value(one, basis, outlines) for one in numbers))
+
+
+def with_found(
+    result: InspectionResult, found: tuple[CharacteristicResult, ...], beside: tuple[CharacteristicResult, ...]
+) -> InspectionResult:
+    """The result of a run with what was found of its characteristics, and with the verdict on the part that follows from them."""
     verdict, reasons = max(one.verdict for one in found), _reasons_of_part(found)
     return replace(result, characteristics=found, numbers=beside, verdict=verdict, reasons=reasons)
 

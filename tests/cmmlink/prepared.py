@@ -33,5 +33,5 @@ def preparations_made_once() -> Iterator[None]:
 @contextmanager
 def pictures_drawn_here() -> Iterator[None]:
     """Let `cmmlink inspect` draw its pictures in this process, which loads what draws them once; another process has tests of its own."""
-    with patch("cmmlink.report.processes_here", lambda: 0):
+    with patch("cmmlink.other_processes.processes_here", lambda: 0):
         yield

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from cmmlink.other_processes import processes_here
 from cmmlink.record.store import FILE_NAME
-from cmmlink.report import processes_here
 from tests.cmmlink.commands.oval_files import TOLERANCE
 from tests.cmmlink.oval_part import oval_points, write_points
 from tests.cmmlink.recorded import Script, record, scan_arrivals

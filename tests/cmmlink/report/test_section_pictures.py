@@ -9,10 +9,11 @@ from typing import Any
 
 import pytest
 
+from cmmlink.other_processes import _Process
 from cmmlink.report.judged_scan import scan_of
 from cmmlink.report.picture import ProfilePictures
 from cmmlink.report.picture_content import content_of
-from cmmlink.report.picture_processes import Pictures, _Process
+from cmmlink.report.picture_processes import Pictures
 from cmmlink.report.section_pictures import SectionPictures
 from inspection import InspectionResult, NominalProfile
 from tests.cmmlink.judged_oval import bumped, inspect_oval
@@ -67,8 +68,8 @@ def begun(monkeypatch: pytest.MonkeyPatch) -> list[_Process]:
     processes: list[_Process] = []
     start = _Process.__init__
 
-    def note(process: _Process) -> None:
-        start(process)
+    def note(process: _Process, serving: str) -> None:
+        start(process, serving)
         processes.append(process)
 
     monkeypatch.setattr(_Process, "__init__", note)
