@@ -252,17 +252,22 @@ def _check_ball(points_mm: Array, found: _Found, terms: Terms) -> None:
     """Raise NotMeasured where all points (m, 2) are out by the same, far above their scatter, as ball centres are."""
     width, radius = terms.zone.upper_mm - terms.zone.lower_mm, terms.tip_radius_mm
     shift, scatter = _shift(found.deviation_mm)
-    away = abs(shift - terms.zone.middle_mm)
+    away = _away(shift, terms)
     if away <= width or away <= _SHIFT_HINT * scatter:
         return
     if terms.known_pose is None:  # fitted about the shift, for a fit about 0 shares a part of it out among the points
         shift, scatter = _fitted_shift(points_mm, shift, terms)
-        away = abs(shift - terms.zone.middle_mm)
+        away = _away(shift, terms)
     if away <= width or away <= _SHIFT_SCATTERS * scatter:
         return
     if not _is_a_radius(shift, radius) and away < max(_SHIFT_ZONES * width, _SHIFT_MM):
         return
     raise NotMeasured(f"all points are {_words_of_shift(shift, scatter, radius)}")
+
+
+def _away(shift_mm: float, terms: Terms) -> float:
+    """How far from what was to be expected: a part as its nominal is nothing shifted, whatever zone lies beside it."""
+    return min(abs(shift_mm), abs(shift_mm - terms.zone.middle_mm))
 
 
 def shift_reservation(deviation_mm: Array, terms: Terms) -> str:
@@ -271,7 +276,7 @@ def shift_reservation(deviation_mm: Array, terms: Terms) -> str:
     The part itself may be too large, so this is no reason to refuse it.
     """
     shift, scatter = _shift(deviation_mm)
-    if abs(shift - terms.zone.middle_mm) <= max((terms.zone.upper_mm - terms.zone.lower_mm) / 2, _SHIFT_SCATTERS * scatter):
+    if _away(shift, terms) <= max((terms.zone.upper_mm - terms.zone.lower_mm) / 2, _SHIFT_SCATTERS * scatter):
         return ""
     return f"All points are {_words_of_shift(shift, scatter, terms.tip_radius_mm)}"
 
