@@ -104,9 +104,10 @@ memory: .venv/test-installed
 proofs: .venv/test-installed
 	$(BIN)/python -m tests.benchmarks.live_proof 200
 
-# The two laws over every source, format and surface, with thirty times as many random cases as `make test` tries.
+# The two laws over every source, format and surface, with thirty times as many random cases as `make test` tries; every rotation, too.
 laws: .venv/test-installed
-	$(BIN)/pytest --hypothesis-profile=laws --timeout 7200 tests/integration/test_laws.py tests/integration/test_laws_of_files.py
+	$(BIN)/pytest --hypothesis-profile=laws --timeout 7200 tests/integration/test_laws.py tests/integration/test_laws_of_files.py \
+		tests/inspection/test_coarse.py
 
 # The audit of verdicts: live scans, minimum zones, partial scans and mirrored parts whose truth is known.
 audit: .venv/test-installed

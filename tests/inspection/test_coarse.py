@@ -6,6 +6,7 @@ from contextlib import suppress
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 from inspection import (
     NominalProfile,
@@ -23,14 +24,16 @@ from tests.inspection.best_pose import farthest_mm, optimum
 from tests.inspection.profiles import Array, curve_of, measured, nominal_of
 
 FIVE = ("P1", "P2", "P3", "GOE404", "MH42")
+MANY_EXAMPLES = 3000  # of `make laws`
 
 
 @pytest.mark.parametrize("name", FIVE)
-def test_all_360_one_degree_rotations_register_without_a_flip(name: str) -> None:
-    """The five profiles take turns at the degrees; the benchmark of the registration tries all of them on each."""
+def test_rotations_by_every_degree_register_without_a_flip(name: str) -> None:
+    """The five profiles take turns at the degrees; `make laws` turns each by all 360."""
+    turns = range(360) if settings.default.max_examples >= MANY_EXAMPLES else range(FIVE.index(name), 360, len(FIVE))
     nominal, truth, rng = nominal_of(name), measured(name, 250, 3), np.random.default_rng(4)
     best, _ = optimum(curve_of(name), truth)
-    for degree in range(FIVE.index(name), 360, 5):
+    for degree in turns:
         points = profiles.rotated(truth, float(degree), rng.uniform(-200, 200, 2))
         coarse = register_coarse(points, nominal)
         # a flip puts points tens of millimetres off; a good coarse pose is within one

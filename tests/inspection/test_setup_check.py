@@ -320,7 +320,7 @@ def test_a_part_that_is_too_large_throughout_is_bad_and_its_verdict_asks_for_bal
 
 
 @pytest.mark.parametrize("zone", [(0.01, 0.05), (0.0, 0.1), (-0.1, 0.0), (0.5, 0.6), (0.02, 0.03)])
-def test_a_part_as_its_nominal_is_not_taken_for_ball_centres_by_a_zone_beside_it(nominal: NominalProfile, zone: tuple[float, float]) -> None:
+def test_a_part_as_its_nominal_is_no_ball_centre_beside_a_zone_of_other_parts(nominal: NominalProfile, zone: tuple[float, float]) -> None:
     off = np.zeros(400)
     off[:200] = 0.01  # out, and in elsewhere, so that no zone is better than another
     off[200:] = -0.01
