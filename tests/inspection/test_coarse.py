@@ -30,7 +30,7 @@ MANY_EXAMPLES = 3000  # of `make laws`
 @pytest.mark.parametrize("name", FIVE)
 def test_rotations_by_every_degree_register_without_a_flip(name: str) -> None:
     """The five profiles take turns at the degrees; `make laws` turns each by all 360."""
-    turns = range(360) if settings.default.max_examples >= MANY_EXAMPLES else range(FIVE.index(name), 360, len(FIVE))
+    turns = range(360) if settings().max_examples >= MANY_EXAMPLES else range(FIVE.index(name), 360, len(FIVE))
     nominal, truth, rng = nominal_of(name), measured(name, 250, 3), np.random.default_rng(4)
     best, _ = optimum(curve_of(name), truth)
     for degree in turns:
