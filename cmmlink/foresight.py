@@ -35,7 +35,7 @@ from inspection import (
     with_found,
 )
 
-_WORTH_A_PROCESS = 200  # characteristics of sections, which take as long as a process takes to load what it evaluates with
+_WORTH_A_PROCESS = 400  # characteristics of sections: about eight seconds, of which a process takes three to load what it evaluates with
 _SURFACE = "surface"  # nothing of what is found holds its name
 
 
