@@ -25,7 +25,7 @@ from cmmlink.result_json import density_notes, density_of, result_json, run_docu
 from cmmlink.run_log import log_event
 from cmmlink.scratch import scratch_in, words_of_room
 from cmmlink.words import utc_words
-from inspection import CharacteristicResult, NominalProfile, Verdict, rehearse
+from inspection import CharacteristicResult, InspectionError, NominalProfile, Verdict, rehearse
 
 _FILE_POINTS, _FILE_BYTES = 1 << 15, 4 << 20  # a file can wait: no more of it is held than keeps judging and recording busy
 _log = logging.getLogger(__name__)
@@ -44,6 +44,15 @@ class FinishedRun:
     outcome: RunOutcome
     evidence: RecordReference | None
     began: datetime
+
+    @property
+    def refusal(self) -> InspectionError | None:
+        """Why no result could be given, with what was assumed of a file of points: that may be the cause. None where there is one."""
+        refused = self.outcome.refusal
+        if refused is None or not isinstance(self.plan.device, FileDevice):
+            return refused
+        of_file = [note for note in self.started.notes if note.startswith(f"{self.plan.device.file.name}: ")]
+        return type(refused)("; ".join([str(refused), *of_file]))
 
     @property
     def verdict(self) -> Verdict:

@@ -6,8 +6,8 @@ Contours beside it are counted and reported, never judged.
 
 import logging
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from collections.abc import Callable, Generator, Iterator
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -214,7 +214,7 @@ def inspect_stack(
         read_in = [f"{plan.mesh.file.name}: read in {plan.mesh.unit}, as asked"] if plan.mesh.unit else []
         notes = [*read_in, *mesh.warnings, *profiles.notes, *notes_on_temperature(plan), *notes_on_zone(plan)]
         sections: list[SectionOutcome] = []
-        slices = _slices(plan, mesh, heights, open3d, notes, profiles.shortest_mm)
+        slices: Iterator[SurfaceSection] = opened.enter_context(closing(_slices(plan, mesh, heights, open3d, notes, profiles.shortest_mm)))
         if plan.stack_fit == "common":
             cuts = list(slices)
             own = plan.model_copy(update={"stack_characteristics": ()})
@@ -260,7 +260,7 @@ def _slices(
     open3d: Callable[[], Open3DProcess],
     notes: list[str],
     part_mm: float,
-) -> Iterator[SurfaceSection]:
+) -> Generator[SurfaceSection, None, None]:
     """Slices by the cutter of the plan; where Open3D is missing or breaks down, the rest by numpy, and a note says so."""
     cutter = _cutter(plan, len(heights), open3d, notes)
     done = 0

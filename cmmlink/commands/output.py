@@ -70,9 +70,10 @@ def report_outcome(run: "FinishedRun", output: Output, pictures: "Pictures | Non
     Raises NotMeasured where the set-up contradicts the points: then there is no result to print or to write.
     """
     outcome, evidence = run.outcome, run.evidence
-    if isinstance(outcome.refusal, NotMeasured) and outcome.failure is None and outcome.ending == "complete":
-        raise outcome.refusal
-    message = str(outcome.failure or outcome.refusal or "")
+    refusal = run.refusal
+    if isinstance(refusal, NotMeasured) and outcome.failure is None and outcome.ending == "complete":
+        raise refusal
+    message = str(outcome.failure or refusal or "")
     if outcome.ending == "aborted":
         message = message or "stopped by the operator: the scan is not complete"
     if message:

@@ -142,9 +142,8 @@ def inspect(
                 raise PlanError(f"--tip-radius {tip_radius:g}: {error}") from None
             prepare(out)
             finished = carry_out(plan, profile, source, records=folder, clock=time.monotonic, now=now, stop=stop, patience_s=_PATIENCE_S)
-        if finished.outcome.refusal is not None:
-            refusal = finished.outcome.refusal
-            raise type(refusal)(f"{file}: {refusal}")
+        if finished.refusal is not None:
+            raise type(finished.refusal)(f"{file}: {finished.refusal}")
         return finished
 
     with Pictures() as pictures, stop_on_ctrl_c() as stop:

@@ -71,7 +71,9 @@ def test_what_the_nominal_does_not_have_is_told_with_its_place_before_anything_i
     )
     with pytest.raises(PlanError, match=r"plan.yaml: line 8: characteristics\[1\]: fit datum needs a known pose"):
         check_plan(load_plan(plan), plan)
-    assert "line 8" in cmmlink("check", plan).refused()
+    checked = cmmlink("check", plan)
+    assert checked.code == 2
+    assert "line 8: characteristics[1]: fit datum needs a known pose" in checked.err
 
 
 def test_a_section_that_is_no_airfoil_has_no_chord(tmp_path: Path) -> None:

@@ -151,7 +151,7 @@ def cut(folder: Path, triangles: Triangles) -> StackOutcome | None:
     mesh.write_bytes(binary_stl(triangles))
     told = {"tolerance": {"lower_mm": -0.05, "upper_mm": 0.05}, "registration": {"fit": "none"}}
     plan = plan_of(mesh, write_nominal(folder / "oval.yaml"), {"heights_mm": (2.5,)}, **told)
-    with suppress(MeshError, InspectionError), patch("cmmlink.stack.discretize_file", lambda *_: profile_of(flat=False)):
+    with suppress(MeshError, InspectionError), patch("cmmlink.stack_inputs.discretize_file", lambda *_: profile_of(flat=False)):
         return inspect(plan)
     return None
 

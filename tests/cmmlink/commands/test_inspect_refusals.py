@@ -25,7 +25,10 @@ WRONG_POINTS = {
     "one point": (b"1,2\n", r"1 point; expected at least two"),
     "two points": (b"1,2\n2,3\n", r"2 points: a registration needs at least \d"),
     "one point many times": (b"1.5,2.5\n" * 50, r"all 50 points coincide at \(1\.5, 2\.5\)"),
-    "another unit": (f"x_inch,y_inch\n{GOOD_ROWS}".encode(), "the header gives x in inch"),
+    "another unit": (
+        f"x_inch,y_inch\n{GOOD_ROWS}".encode(),
+        "the points do not fit .*; wrong.csv: the header gives x in inch: read in inch",
+    ),
     "another part": (b"".join(b"%d,%d\n" % (i, i % 7) for i in range(200)), "the points do not fit the nominal"),
 }
 
@@ -80,7 +83,6 @@ WRONG_OPTIONS = [
     (("--coverage-min", 2), r"Invalid value for '--coverage-min': .*less than or equal to 1"),
     (("--reject-outliers",), r"--reject-outliers: expected false where fit is none: outliers are found by fitting the other points"),
     (("--metod", "exact"), r"No such option: --metod.*--method"),
-    (("further.csv",), r"further.csv: no such file"),
     (("--out",), r"Option '--out' requires an argument"),
 ]
 
@@ -90,6 +92,12 @@ def test_a_wrong_option_is_named_with_what_is_allowed(nominal: Path, options: tu
     ended = inspect_oval(nominal, 0.0, *options)
     assert re.match(message, ended.refused())
     assert ended.out == ""
+
+
+def test_a_second_word_is_a_second_file(nominal: Path) -> None:
+    ended = inspect_oval(nominal, 0.0, "further.csv")
+    assert ended.refused() == "further.csv: no such file"
+    assert "2 files: 1 CONFORM, 1 NOT MEASURED" in ended.out
 
 
 def test_a_ball_larger_than_the_tightest_hollow_is_taken_and_points_there_are_rejected(tmp_path: Path) -> None:
