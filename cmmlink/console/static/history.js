@@ -58,5 +58,6 @@ export function chartWords(runs) {
 function rowOf(run) {
   const part = run.section ? `${run.part}, ${run.section}` : run.part;
   const words = [part, run.serial_number, run.began, run.state];
-  return [verdictCell(run.of ? `${run.word}: ${run.of}` : run.word, run.shape), ...words.map((word) => cell(word)), cell(count(run.received), "number"), ...worstCells(run)];
+  const verdict = verdictCell(run.of ? `${run.word}: ${run.of}` : run.word, run.shape);
+  return [verdict, ...words.map((word) => cell(word)), cell(count(run.received), "number"), ...worstCells(run)];
 }

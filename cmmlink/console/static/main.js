@@ -347,7 +347,8 @@ const KEYS = {
   1: [() => go("live")], 2: [() => go("part")], 3: [() => go("history")], 4: [press("tab-ct")],
   s: [press("start")], e: [press("end")], n: [press("next")], a: [press("acknowledge")], l: [press("alarm-list-button")],
   t: [press("test")], o: [pressIn("history", "open-run"), pressIn("ct", "open-section")], r: [pressIn("history", "replay-run")],
-  x: [pressIn("history", "export-run")], p: [reportShown], c: [pressIn("history", "compare-run")], i: [pressIn("ct", "import-ct")], escape: [leave],
+  x: [pressIn("history", "export-run")], p: [reportShown], c: [pressIn("history", "compare-run")], i: [pressIn("ct", "import-ct")],
+  escape: [leave],
 };
 
 /** @param {KeyboardEvent} event */
