@@ -1,5 +1,11 @@
 """The application: plans, runs, records, reports and the command line. This is its front door for scripts.
 
+    found = inspect("cam-points.csv", nominal="cam.yaml", tolerance=(-0.05, 0.05))
+    found.verdict, found.points.deviation_mm, found.to_dataframe(), found.plot()
+    open_run("last").document["profile_error_mm"]
+
+A run with a device, which is recorded:
+
     plan = load_plan(Path("blade.yaml"))
     profile = profile_of(plan)
     with connect(plan) as device:
@@ -15,8 +21,10 @@ if TYPE_CHECKING:
     from cmmlink.devices import Connected, connect
     from cmmlink.errors import PlanError, RunError, StoreError
     from cmmlink.from_plan import profile_of
+    from cmmlink.inspected import Inspected, inspected_run
     from cmmlink.plan import CtPlan, Plan, load_ct_plan, load_plan
     from cmmlink.run import FinishedRun, carry_out
+    from cmmlink.scripting import inspect, open_run
     from cmmlink.stack import StackOutcome, inspect_stack
     from cmmlink.version import __version__
 else:
@@ -26,8 +34,10 @@ else:
         "cmmlink.devices": ("Connected", "connect"),
         "cmmlink.errors": ("PlanError", "RunError", "StoreError"),
         "cmmlink.from_plan": ("profile_of",),
+        "cmmlink.inspected": ("Inspected", "inspected_run"),
         "cmmlink.plan": ("CtPlan", "Plan", "load_ct_plan", "load_plan"),
         "cmmlink.run": ("FinishedRun", "carry_out"),
+        "cmmlink.scripting": ("inspect", "open_run"),
         "cmmlink.stack": ("StackOutcome", "inspect_stack"),
         "cmmlink.version": ("__version__",),
     }
@@ -39,6 +49,7 @@ __all__ = [
     "Connected",
     "CtPlan",
     "FinishedRun",
+    "Inspected",
     "Plan",
     "PlanError",
     "RunError",
@@ -47,8 +58,11 @@ __all__ = [
     "__version__",
     "carry_out",
     "connect",
+    "inspect",
     "inspect_stack",
+    "inspected_run",
     "load_ct_plan",
     "load_plan",
+    "open_run",
     "profile_of",
 ]

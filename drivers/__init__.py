@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from drivers.codecs.register_map import RegisterMap, register_map
     from drivers.errors import CadError, DeviceError, DeviceRefused, LinkError, MeshError, PointFileError, ProtocolError
     from drivers.files.column_choice import AxisName
-    from drivers.files.point_file import PointFile, PointFileSource, convert_to_mm, points_of, read_points
+    from drivers.files.point_file import PointArraySource, PointFile, PointFileSource, convert_to_mm, points_in, points_of, read_points
     from drivers.files.row_reading import shorten
     from drivers.files.stated_units import UnitName, mm_per
     from drivers.files.text_table import Columns, count_of, numbers_of, parse_columns, read_bytes, read_text
@@ -43,7 +43,16 @@ else:
         "drivers.codecs.register_map": ("RegisterMap", "register_map"),
         "drivers.errors": ("CadError", "DeviceError", "DeviceRefused", "LinkError", "MeshError", "PointFileError", "ProtocolError"),
         "drivers.files.column_choice": ("AxisName",),
-        "drivers.files.point_file": ("PointFile", "PointFileSource", "convert_to_mm", "points_of", "read_points"),
+        "drivers.files.point_file": (
+            "PointArraySource",
+            "PointFile",
+            "PointFileSource",
+            "convert_to_mm",
+            "points_in",
+            "points_in",
+            "points_of",
+            "read_points",
+        ),
         "drivers.files.row_reading": ("shorten",),
         "drivers.files.stated_units": ("UnitName", "mm_per"),
         "drivers.files.text_table": ("Columns", "count_of", "numbers_of", "parse_columns", "read_bytes", "read_text"),
@@ -59,6 +68,7 @@ else:
             "LinkDown",
             "LinkUp",
             "Lost",
+            "PointArraySource",
             "PointBatch",
             "Rejected",
             "ScanClosed",
@@ -94,6 +104,7 @@ __all__ = [
     "LinkUp",
     "Lost",
     "MeshError",
+    "PointArraySource",
     "PointBatch",
     "PointFile",
     "PointFileError",
@@ -115,6 +126,7 @@ __all__ = [
     "mm_per",
     "numbers_of",
     "parse_columns",
+    "points_in",
     "points_of",
     "read_bytes",
     "read_points",

@@ -19,7 +19,6 @@ from cmmlink.commands.options import (
     Records,
     Unit,
     columns_from,
-    plan_from_options,
     records_folder,
     section_in,
 )
@@ -129,7 +128,7 @@ def _scan_of_file(path: Path, asked: dict[str, Any], known: "ComparedScan | None
     """The points of a file, judged as it is asked, against the nominal of a scan that is `known`."""
     from cmmlink.comparison import scan_of_file
     from cmmlink.from_plan import profile_of
-    from cmmlink.plan import Plan
+    from cmmlink.plan import Plan, plan_given_by
 
     settings = {name: value for name, value in asked.items() if name not in ("fit", "method")}
     settings |= {
@@ -139,7 +138,7 @@ def _scan_of_file(path: Path, asked: dict[str, Any], known: "ComparedScan | None
         "rule": "best-fit",
         "out": None,
     }
-    plan = plan_from_options(Plan, settings, _OPTION_OF)
+    plan = plan_given_by(Plan, settings, _OPTION_OF)
     return scan_of_file(plan, known.profile if known is not None else profile_of(plan), time.monotonic)
 
 

@@ -1,17 +1,13 @@
 """Options that several commands share, and what they mean."""
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal
 
 import typer
 
 from cmmlink.errors import PlanError
 from drivers import UnitName
 from inspection import RuleName, WeightName
-
-if TYPE_CHECKING:
-    from pydantic import BaseModel
 
 PlanFile = Annotated[Path, typer.Argument(metavar="PLAN.yaml", help="The inspection plan.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of words.")]
@@ -65,34 +61,12 @@ CurveNumber = Annotated[
 ]
 Closed = Annotated[bool | None, typer.Option("--closed/--open", help="Close the nominal, or leave it open.")]
 
-Model = TypeVar("Model", bound="BaseModel")
-
 
 def records_folder(records: Path | None) -> Path:
     """The folder of the run records: the one that was asked for, or the user's own."""
     from cmmlink.record import default_folder
 
     return records or default_folder()
-
-
-def plan_from_options(model: type[Model], settings: Mapping[str, object], option_of: Mapping[str, str]) -> Model:
-    """Validate a plan that is made of options. Raises PlanError, which names the option that is wrong.
-
-    option_of : maps a key of the plan, or a group of keys, to the option that sets it
-    """
-    from pydantic import ValidationError
-
-    from cmmlink.plan import words_of_allowed
-
-    try:
-        return model.model_validate(settings)
-    except ValidationError as failure:
-        problem = failure.errors()[0]
-        place = ".".join(str(part) for part in problem["loc"])
-        option = next((option for key, option in option_of.items() if f"{place}.".startswith(f"{key}.")), place or "the options")
-        value = problem["input"]
-        found = f" is {value:g}" if isinstance(value, int | float) and not isinstance(value, bool) else ""
-        raise PlanError(f"{option}{found}: expected {words_of_allowed(problem)}") from None
 
 
 def columns_from(text: str | None) -> dict[str, int] | None:

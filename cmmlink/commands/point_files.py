@@ -30,7 +30,6 @@ from cmmlink.commands.options import (
     Unit,
     Weights,
     columns_from,
-    plan_from_options,
     records_folder,
     section_in,
 )
@@ -102,7 +101,7 @@ def inspect(
     from cmmlink.devices import connect
     from cmmlink.from_plan import inspection_of, profile_of
     from cmmlink.other_processes import processes_here
-    from cmmlink.plan import Plan
+    from cmmlink.plan import Plan, plan_given_by
     from cmmlink.report import Pictures, prepare
     from cmmlink.run import carry_out
     from cmmlink.scratch import scratch_in
@@ -133,7 +132,7 @@ def inspect(
 
     def inspect_one(file: Path, out: Path | None) -> "FinishedRun":
         part = {"name": printable((file.stem.strip() or file.name).replace("\n", " "))}
-        plan = plan_from_options(Plan, settings | {"part": part, "device": device | {"file": file}}, _OPTION_OF)
+        plan = plan_given_by(Plan, settings | {"part": part, "device": device | {"file": file}}, _OPTION_OF)
         profile = profile_of(plan)
         with connect(plan, scratch_in(folder)) as source:
             try:

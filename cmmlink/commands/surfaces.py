@@ -30,7 +30,6 @@ from cmmlink.commands.options import (
     Rule,
     Uncertainty,
     Weights,
-    plan_from_options,
     records_folder,
 )
 from cmmlink.commands.output import Output, print_json, stop_on_ctrl_c, terminal
@@ -139,7 +138,7 @@ def ct(
     as_json: Json = False,
 ) -> int:
     """Inspect sections of a CT surface, and record each as a run."""
-    from cmmlink.plan import CtPlan, load_ct_plan
+    from cmmlink.plan import CtPlan, load_ct_plan, plan_given_by
 
     if mesh.suffix.lower() in (".yaml", ".yml"):
         beside = [name for name in _options_given(context) if name not in _BESIDE_A_PLAN]
@@ -177,7 +176,7 @@ def ct(
         "end_allowance_mm": end_allowance,
         "allow": {"unseen_mm": allow_unseen},
     }
-    return _inspect_stack(plan_from_options(CtPlan, settings, _OPTION_OF), Output(False, as_json, out, records), pictures, no_record)
+    return _inspect_stack(plan_given_by(CtPlan, settings, _OPTION_OF), Output(False, as_json, out, records), pictures, no_record)
 
 
 def _inspect_stack(plan: "CtPlan", output: Output, pictures: bool, no_record: bool) -> int:

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Protocol, cast, runtime_checkable
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cmmlink.errors import YamlError
 from cmmlink.nominal_files.curve_words import notes_of, refuse_crossings
@@ -110,6 +111,27 @@ def load_nominal(
         raise NominalError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from None
     except FloatingPointError:
         raise NominalError(f"{path}: the numbers leave the range a curve can be computed in; expected a profile in mm") from None
+
+
+def nominal_of_curve(curve: NurbsCurve) -> NominalFile:
+    """A curve that was handed over, checked as one from a file is. Raises NominalError."""
+    return _checked(NominalFile(curve, "curve", ()))
+
+
+def nominal_of_points(points_mm: ArrayLike, closed: bool | None = None) -> NominalFile:
+    """The nominal through points (k, 2), in their order, as if they stood in a file. Raises NominalError, naming rows from 0."""
+    from cmmlink.nominal_files.through_points import through_points  # noqa: PLC0415 - it stands on this file
+
+    try:
+        points = np.asarray(points_mm, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise NominalError("no array of numbers; expected points of shape (k, 2)") from None
+    if points.ndim != 2 or points.shape[1] != 2:
+        raise NominalError(f"an array of shape {points.shape}; expected points of shape (k, 2)")
+    unusable = ~np.isfinite(points).all(axis=1)
+    if unusable.any():
+        raise NominalError(f"row {int(unusable.argmax())}: not a finite number; expected coordinates in mm")
+    return _checked(through_points(points, np.arange(len(points)), closed, "points", (), "row"))
 
 
 def _drawn(

@@ -28,14 +28,18 @@ _PARTS = 4  # of each of those steps
 _LIKE_A_STEP = 1.5  # a gap no larger than the steps beside it may be a step itself: a loop that does not repeat its first point
 
 
-def through_points(points_mm: Array, lines: Lines, closed: bool | None, source_format: str, notes: tuple[str, ...]) -> NominalFile:
-    """Interpolate points (m, 2), given on the lines (m,) of the file. Raises NominalError, naming lines.
+def through_points(
+    points_mm: Array, lines: Lines, closed: bool | None, source_format: str, notes: tuple[str, ...], place: str = "line"
+) -> NominalFile:
+    """Interpolate points (m, 2), given on the lines (m,) of the file, or in the rows of an array. Raises NominalError, naming these.
+
+    place : what messages call them, line or row
 
     closed None: closed if the last point repeats the first, or if a small gap lies between them as a blunt edge does; a gap that
     may be either is asked about. A gap joined because `closed` says so is bridged smoothly where the points run on (a circle),
     with a straight line where they do not (a blunt trailing edge).
     """
-    _require_distinct(points_mm, lines)
+    _require_distinct(points_mm, lines, place)
     gap = float(np.hypot(*(points_mm[-1] - points_mm[0])))
     repeats = len(points_mm) > 2 and gap <= _SAME_END * _size(points_mm)
     distinct = points_mm[:-1] if repeats else points_mm
@@ -51,7 +55,7 @@ def through_points(points_mm: Array, lines: Lines, closed: bool | None, source_f
     else:
         curve, mended = _without_crossing(points_mm, corner_at_seam=False)
         note = f"open{asked}: {ends}"
-    return NominalFile(curve, source_format, (*notes, note, *mended, *_notes_on_corners(distinct, lines, repeats)))
+    return NominalFile(curve, source_format, (*notes, note, *mended, *_notes_on_corners(distinct, lines, repeats, place)))
 
 
 def _is_blunt_edge(points: Array, gap: float) -> bool:
@@ -143,13 +147,13 @@ def _sharp_turns(points: Array) -> tuple[Array, NDArray[np.bool_]]:
     return turn, (turn > _SHARP_DEG) & (turn > _ABOVE_NEIGHBOURS * beside)
 
 
-def _notes_on_corners(points: Array, lines: Lines, repeats: bool) -> list[str]:
+def _notes_on_corners(points: Array, lines: Lines, repeats: bool, place: str) -> list[str]:
     """Note the sharp turns between the ends, which the interpolating cubic cannot keep; all but the seam, if the ends meet there."""
     turn, sharp = _sharp_turns(points)
     inner = np.arange(1, len(points) if repeats else len(points) - 1)
     sharp = sharp | _sharp_pairs(np.where(np.isin(np.arange(len(points)), inner), turn, 0.0))
     return [
-        f"line {lines[i]}: the points turn by {turn[i]:.0f} deg; the curve is smooth there, a corner would need a nurbs yaml"
+        f"{place} {lines[i]}: the points turn by {turn[i]:.0f} deg; the curve is smooth there, a corner would need a nurbs yaml"
         for i in inner[sharp[inner]]
     ]
 
@@ -162,7 +166,7 @@ def _sharp_pairs(turn: Array) -> NDArray[np.bool_]:
     return np.asarray(first | np.roll(first, 1))
 
 
-def _require_distinct(points: Array, lines: Lines) -> None:
+def _require_distinct(points: Array, lines: Lines, place: str) -> None:
     """Refuse fewer than two points, points that all coincide, and neighbours that coincide."""
     if len(points) < 2:
         raise NominalError(f"{len(points)} point; expected at least {_DEGREE + 1} for a cubic curve")
@@ -170,8 +174,9 @@ def _require_distinct(points: Array, lines: Lines) -> None:
     step = np.hypot(*np.diff(points, axis=0).T)
     if np.any(step <= _SAME_POINT * size):
         i = int(np.argmax(step <= _SAME_POINT * size))
-        place = f"({points[i, 0]:g}, {points[i, 1]:g})"
-        raise NominalError(f"line {lines[i + 1]}: repeats the point {place} of line {lines[i]}; expected different points: remove one")
+        point = f"({points[i, 0]:g}, {points[i, 1]:g})"
+        told = f"{place} {lines[i + 1]}: repeats the point {point} of {place} {lines[i]}"
+        raise NominalError(f"{told}; expected different points: remove one")
     if size < max(_SMALLEST_MM, _RESOLVED * float(np.abs(points).max())):
         raise NominalError(f"all points lie within {size:g} mm; expected a profile in mm: give the scale, or move it nearer to the origin")
 

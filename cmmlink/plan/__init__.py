@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from cmmlink.plan.datum import Datum
     from cmmlink.plan.deciding import PROFILE, Deciding
     from cmmlink.plan.formats import FormatName
+    from cmmlink.plan.given import plan_given_by
     from cmmlink.plan.key_search import KeyEntry, all_keys, keys_named
     from cmmlink.plan.mistakes import PlanMistake, find_mistakes, kind_of
     from cmmlink.plan.own_maps import map_of
@@ -39,6 +40,7 @@ else:
 
     _PLACES = {
         "cmmlink.plan.deciding": ("PROFILE", "Deciding"),
+        "cmmlink.plan.given": ("plan_given_by",),
         "cmmlink.plan.key_search": ("KeyEntry", "all_keys", "keys_named"),
         "cmmlink.plan.serial_numbers": ("SerialNumbers", "next_serial_number"),
         "cmmlink.plan.schema": ("schema_of_plans",),
@@ -119,6 +121,7 @@ __all__ = [
     "map_of",
     "next_serial_number",
     "place_of",
+    "plan_given_by",
     "read_model",
     "schema_of_plans",
     "with_own_maps",

@@ -9,14 +9,17 @@ if TYPE_CHECKING:
     from cmmlink.report.comparison_picture import write_comparison_picture
     from cmmlink.report.curves_picture import write_curves_picture
     from cmmlink.report.folder import prepare, write_results, write_run
+    from cmmlink.report.judged_scan import JudgedScan, scan_of, scan_on_record
     from cmmlink.report.live_table import LiveTable
     from cmmlink.report.nominal_picture import write_nominal_picture
     from cmmlink.report.nominal_text import text_picture
     from cmmlink.report.pdf import write_report
+    from cmmlink.report.picture import ProfilePictures
+    from cmmlink.report.picture_content import content_of
     from cmmlink.report.picture_processes import Pictures
-    from cmmlink.report.recorded_report import input_of_replay, input_on_record
+    from cmmlink.report.recorded_report import input_of_replay, input_on_record, zone_in
     from cmmlink.report.recorded_stack import stack_on_record
-    from cmmlink.report.report_input import ReportInput, with_settings
+    from cmmlink.report.report_input import ReportInput, places_in, regions_in, with_settings
     from cmmlink.report.section_pictures import SectionPictures
     from cmmlink.report.stack_folder import write_stack
     from cmmlink.report.stack_pdf import write_stack_report
@@ -27,15 +30,18 @@ else:
     _PLACES = {
         "cmmlink.report.comparison_picture": ("write_comparison_picture",),
         "cmmlink.report.folder": ("prepare", "write_results", "write_run"),
+        "cmmlink.report.judged_scan": ("JudgedScan", "scan_of", "scan_on_record"),
         "cmmlink.report.live_table": ("LiveTable",),
+        "cmmlink.report.picture": ("ProfilePictures",),
+        "cmmlink.report.picture_content": ("content_of",),
         "cmmlink.report.picture_processes": ("Pictures",),
         "cmmlink.report.curves_picture": ("write_curves_picture",),
         "cmmlink.report.nominal_picture": ("write_nominal_picture",),
         "cmmlink.report.nominal_text": ("text_picture",),
         "cmmlink.report.pdf": ("write_report",),
-        "cmmlink.report.recorded_report": ("input_of_replay", "input_on_record"),
+        "cmmlink.report.recorded_report": ("input_of_replay", "input_on_record", "zone_in"),
         "cmmlink.report.recorded_stack": ("stack_on_record",),
-        "cmmlink.report.report_input": ("ReportInput", "with_settings"),
+        "cmmlink.report.report_input": ("ReportInput", "places_in", "regions_in", "with_settings"),
         "cmmlink.report.section_pictures": ("SectionPictures",),
         "cmmlink.report.stack_folder": ("write_stack",),
         "cmmlink.report.stack_pdf": ("write_stack_report",),
@@ -48,15 +54,22 @@ else:
 __all__ = [
     "STYLES",
     "STYLE_OF",
+    "JudgedScan",
     "LiveTable",
     "Pictures",
+    "ProfilePictures",
     "ReportInput",
     "SectionPictures",
+    "content_of",
     "input_of_replay",
     "input_on_record",
+    "places_in",
     "prepare",
     "print_characteristics",
     "print_summary",
+    "regions_in",
+    "scan_of",
+    "scan_on_record",
     "stack_on_record",
     "text_picture",
     "with_settings",
@@ -68,4 +81,5 @@ __all__ = [
     "write_run",
     "write_stack",
     "write_stack_report",
+    "zone_in",
 ]

@@ -30,14 +30,19 @@ class ProfilePictures:
         for axes in (self._profile, self._strip):
             prepare_axes(axes, self._say)
 
-    def write(self, content: PictureContent, *paths: pathlib.Path) -> None:
-        """Draw the profile and the strip of deviations to files, PNG or SVG by their names."""
+    def draw(self, content: PictureContent) -> Figure:
+        """Draw the profile and the strip of deviations. The figure is the one that the next picture is drawn on as well."""
         axes: Axes
         for axes, draw in ((self._profile, draw_contour), (self._strip, draw_strip)):
             wipe(axes)
             draw(axes, content, self._say)
         draw_heading(self._figure, content.heading, size=10)
         self._foot.set_text(content.foot)
+        return self._figure
+
+    def write(self, content: PictureContent, *paths: pathlib.Path) -> None:
+        """Draw the profile and the strip of deviations to files, PNG or SVG by their names."""
+        self.draw(content)
         with mpl.rc_context({"svg.hashsalt": "cmmlink"}):  # the names inside an SVG are the same each time
             for path in paths:
                 save_picture(self._figure, path)

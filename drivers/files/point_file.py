@@ -51,10 +51,40 @@ class PointFile:
         self.points_mm.setflags(write=False)
 
 
-class PointFileSource:
-    """A file of points as a scan: the sequence is the row, from 0. A file has no clock: every time is 0 s.
+class PointArraySource:
+    """Points that are all there already, as a scan: the sequence is the row, from 0. They have no clock: every time is 0 s."""
 
-    The file is read here, so that a bad one is refused (PointFileError) before a run begins.
+    def __init__(self, device: str, points: PointFile, batch_points: int = 1024) -> None:
+        """`device` is what the scan says that it comes from."""
+        if batch_points < 1:
+            raise ValueError(f"a batch holds at least one point, not {batch_points}")
+        self._device, self._points = device, points
+        self._batch_points = batch_points
+        self._stopped = Event()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was assumed when the points were read."""
+        return self._points.notes
+
+    def arrivals(self) -> Iterator[Arrival]:
+        """Yield the points, in batches; see ScanSource."""
+        points = self._points.points_mm
+        yield ScanOpened(device=self._device, serial_number="", expected=len(points))
+        for start in range(0, len(points), self._batch_points):
+            if self._stopped.is_set():
+                return
+            batch = points[start : start + self._batch_points].copy()
+            yield PointBatch(np.arange(start, start + len(batch), dtype=np.int64), np.zeros(len(batch)), batch)
+        yield ScanClosed(sent=len(points))
+
+    def stop(self) -> None:
+        """End `arrivals` before its next batch."""
+        self._stopped.set()
+
+
+class PointFileSource(PointArraySource):
+    """A file of points as a scan. It is read here, so that a bad one is refused (PointFileError) before a run begins.
 
     room : gives the arrays that are as long as the file, like numpy.empty
     """
@@ -70,32 +100,8 @@ class PointFileSource:
         invalid: Collection[float] = (),
         room: Room = np.empty,
     ) -> None:
-        if batch_points < 1:
-            raise ValueError(f"a batch holds at least one point, not {batch_points}")
-        self._name = path.name
-        self._batch_points = batch_points
-        self._stopped = Event()
-        self._file = read_points(path, scale, unit=unit, columns=columns, invalid=invalid, room=room)
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What was assumed when the file was read."""
-        return self._file.notes
-
-    def arrivals(self) -> Iterator[Arrival]:
-        """Yield the points of the file, in batches; see ScanSource."""
-        points = self._file.points_mm
-        yield ScanOpened(device=f"file {self._name}", serial_number="", expected=len(points))
-        for start in range(0, len(points), self._batch_points):
-            if self._stopped.is_set():
-                return
-            batch = points[start : start + self._batch_points].copy()
-            yield PointBatch(np.arange(start, start + len(batch), dtype=np.int64), np.zeros(len(batch)), batch)
-        yield ScanClosed(sent=len(points))
-
-    def stop(self) -> None:
-        """End `arrivals` before its next batch."""
-        self._stopped.set()
+        points = read_points(path, scale, unit=unit, columns=columns, invalid=invalid, room=room)
+        super().__init__(f"file {path.name}", points, batch_points)
 
 
 def read_points(
@@ -276,9 +282,32 @@ def _read_npy(path: Path, asked: _Asked) -> PointFile:
             array = np.lib.format.open_memmap(path, mode="r")
     except _NPY_ERRORS:
         raise PointFileError("not a readable npy file of numbers; expected an array (m, 2) or (m, 3)") from None
+    return _read_array(array, asked)
+
+
+def points_in(
+    array: object,
+    scale: float = 1.0,
+    *,
+    unit: UnitName | None = None,
+    columns: Mapping[AxisName, int] | None = None,
+    invalid: Collection[float] = (),
+) -> PointFile:
+    """Take measured points from an array (m, 2) or (m, 3), or a wider one where columns are given, as `read_points` does from a file.
+
+    Raises PointFileError: the row (from 0), what was found, what is expected.
+    """
+    try:
+        values = np.asarray(array)
+    except ValueError:  # rows of different lengths
+        raise PointFileError("rows of different lengths; expected numbers of shape (m, 2) or (m, 3)") from None
+    return _read_array(values, _Asked(scale, unit, columns, tuple(invalid), np.empty))
+
+
+def _read_array(array: object, asked: _Asked) -> PointFile:
     columns = asked.columns
     flat = isinstance(array, np.ndarray) and array.ndim == 2 and array.dtype.kind in "fiu"
-    if not flat or (columns is None and array.shape[1] not in (2, 3)):
+    if not isinstance(array, np.ndarray) or not flat or (columns is None and array.shape[1] not in (2, 3)):
         found = f"{array.dtype} array of shape {array.shape}" if isinstance(array, np.ndarray) else "an archive"
         raise PointFileError(f"{found}; expected numbers of shape (m, 2) or (m, 3)")
     refuse_places(columns, array.shape[1])
