@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from cmmlink.inspected import Inspected, inspected_run
     from cmmlink.plan import CtPlan, Plan, load_ct_plan, load_plan
     from cmmlink.run import FinishedRun, carry_out
-    from cmmlink.scripting import inspect, open_run
+    from cmmlink.scripting import inspect, nominal_profile, open_run
     from cmmlink.stack import StackOutcome, inspect_stack
     from cmmlink.version import __version__
 else:
@@ -37,7 +37,7 @@ else:
         "cmmlink.inspected": ("Inspected", "inspected_run"),
         "cmmlink.plan": ("CtPlan", "Plan", "load_ct_plan", "load_plan"),
         "cmmlink.run": ("FinishedRun", "carry_out"),
-        "cmmlink.scripting": ("inspect", "open_run"),
+        "cmmlink.scripting": ("inspect", "nominal_profile", "open_run"),
         "cmmlink.stack": ("StackOutcome", "inspect_stack"),
         "cmmlink.version": ("__version__",),
     }
@@ -63,6 +63,7 @@ __all__ = [
     "inspected_run",
     "load_ct_plan",
     "load_plan",
+    "nominal_profile",
     "open_run",
     "profile_of",
 ]

@@ -45,6 +45,10 @@ class FinishedRun:
     evidence: RecordReference | None
     began: datetime
 
+    def __repr__(self) -> str:
+        found = "no result" if self.outcome.result is None else repr(self.outcome.result)
+        return f"<FinishedRun {self.title}: {self.outcome.ending}, {found}>"
+
     @property
     def refusal(self) -> InspectionError | None:
         """Why no result could be given, with what was assumed of a file of points: that may be the cause. None where there is one."""

@@ -20,6 +20,7 @@ from cmmlink.exports import document_on_record, judged_rows, sound_run
 from cmmlink.from_plan import (
     discretize_file,
     inspection_of,
+    load_from,
     notes_on_datum,
     notes_on_nominal,
     notes_on_temperature,
@@ -30,7 +31,8 @@ from cmmlink.from_plan import (
 from cmmlink.inspected import Inspected, inspected_on_record, inspected_run
 from cmmlink.nominal_files import NominalFile, nominal_of_curve, nominal_of_points
 from cmmlink.pipeline import run_inspection
-from cmmlink.plan import FileDevice, Plan, plan_given_by
+from cmmlink.plan import Discretisation, FileDevice, Plan, plan_given_by
+from cmmlink.plan import Nominal as NominalOfPlan
 from cmmlink.record import default_folder, end_missing, find_run, open_to_read, recorded_plan, recorded_profile
 from cmmlink.run import FinishedRun
 from drivers import AxisName, PointArraySource, UnitName, points_in, read_points
@@ -131,10 +133,26 @@ def open_run(name: str = "last", *, records: AnyPath | None = None) -> Inspected
         return inspected_on_record(title, document, profile, judged_rows(store, run))
 
 
+def nominal_profile(
+    nominal: Nominal, *, scale: float = 1.0, closed: bool | None = None, material: Material | None = None
+) -> NominalProfile:
+    """The discretised profile of a nominal, for the functions of `inspection`: of a file, a curve, or points (k, 2).
+
+    The arguments are those of `inspect`. Raises PlanError or NominalError for what cannot be used.
+    """
+    curve, of_file = _nominal_in(nominal, closed, {"scale": scale, "closed": closed, "material": material})
+    if isinstance(curve, NominalProfile):
+        return curve
+    asked = plan_given_by(NominalOfPlan, of_file, {"file": "nominal"})
+    return discretize_file(curve or load_from(asked, asked.file), asked.file, asked, Discretisation())
+
+
 def _judge(plan: Plan, curve: NominalFile | NominalProfile | None, source: PointArraySource, notes: tuple[str, ...]) -> FinishedRun:
     """Send points through the pipeline as `cmmlink inspect` does; `curve` is a nominal that was handed over in place of a file."""
+    profile: NominalProfile
+    assumed: tuple[str, ...]
     if isinstance(curve, NominalProfile):
-        profile, assumed = curve, ()
+        profile, assumed = curve, ("the nominal was handed over as a profile: what was assumed when it was made is not told here",)
     elif curve is not None:
         profile, assumed = discretize_file(curve, Path("nominal"), plan.nominal, plan.discretisation), curve.notes
     else:

@@ -59,6 +59,10 @@ class NurbsCurve:
         for array in (self.control_points_mm, self.knots, weights, self._homogeneous, self.corners):
             array.setflags(write=False)
 
+    def __repr__(self) -> str:
+        ends = "closed" if self.closed else "open"
+        return f"<NurbsCurve of degree {self.degree}, {len(self.control_points_mm)} control points, {self.length_mm:.6g} mm long, {ends}>"
+
     @property
     def domain(self) -> tuple[float, float]:
         """First and last parameter of the curve."""

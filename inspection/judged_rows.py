@@ -35,6 +35,9 @@ class JudgedRows:
         for array in (*pairs, *columns):
             array.setflags(write=False)
 
+    def __repr__(self) -> str:
+        return f"<JudgedRows of {self.received} points, {np.count_nonzero(np.isfinite(self.deviation_mm))} with a deviation>"
+
     @property
     def received(self) -> int:
         """Points received; always judged + rejected."""

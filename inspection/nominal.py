@@ -57,6 +57,9 @@ class NominalProfile(ProfileSamples):
     packed: OnFirstUse[SampleTable]
     reach: OnFirstUse[StationReach]
 
+    def __repr__(self) -> str:
+        return f"<NominalProfile of {len(self)} samples, material {self.material}, on {self.curve!r}>"
+
     @property
     def tree(self) -> "cKDTree":
         """The search tree that finds the nearest sample."""

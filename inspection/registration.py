@@ -41,6 +41,12 @@ class Registration:
         for array in (self.covariance, self.centre_mm, self.outliers):
             array.setflags(write=False)
 
+    def __repr__(self) -> str:
+        pose, settled = self.nominal_from_section, "converged" if self.converged else "not converged"
+        moved = "({:.4f}, {:.4f})".format(*pose.translation_mm)
+        turned = f"turned {np.degrees(pose.rotation_rad):.4f} deg, moved {moved} mm"
+        return f"<Registration {turned}, rms {self.rms_mm:.4f} mm, {self.iterations} steps, {settled}>"
+
 
 def datum_registration(nominal_from_section: RigidTransform, points: int) -> Registration:
     """The registration of that many points whose pose is known beforehand."""

@@ -107,6 +107,12 @@ class InspectionResult:
         for array in (self.station_mm, self.deviation_mm, self.verdicts, self.rejection):
             array.setflags(write=False)
 
+    def __repr__(self) -> str:
+        extent = f", {self.min_deviation_mm:+.4f} .. {self.max_deviation_mm:+.4f} mm" if self.judged else ""
+        return (
+            f"<InspectionResult {self.verdict.word}, {self.judged} of {self.received} points judged{extent}, covered {self.coverage:.1%}>"
+        )
+
     @property
     def received(self) -> int:
         """Points received; always judged + rejected."""

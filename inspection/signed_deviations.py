@@ -56,6 +56,10 @@ class Deviations:
     def __len__(self) -> int:
         return len(self.deviation_mm)
 
+    def __repr__(self) -> str:
+        extent = f", {self.deviation_mm.min():+.4f} .. {self.deviation_mm.max():+.4f} mm" if len(self) else ""
+        return f"<Deviations of {len(self)} points{extent}, {np.count_nonzero(self.beyond_end)} beyond an open end>"
+
 
 def profile_error_mm(deviations: Deviations) -> float:
     """Width of the smallest equally disposed zone that holds all points: 2 * max |deviation|. Points beyond an end are left out.

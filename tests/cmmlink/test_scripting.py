@@ -13,12 +13,12 @@ import cmmlink as front
 from cmmlink import Inspected, PlanError, RunError, load_plan, open_run
 from cmmlink.deviations_csv import COLUMNS, POINT_WORDS
 from drivers import PointFileError
-from inspection import NominalError, NominalProfile, NotMeasured, Verdict
+from inspection import NominalError, NominalProfile, NotMeasured, Verdict, deviations
 from tests.cmmlink.command import cmmlink
-from tests.cmmlink.judged_oval import bumped
-from tests.cmmlink.oval_part import COUNT, oval_curve, oval_feet, oval_points, station_mm, write_nominal, write_points
+from tests.cmmlink.judged_oval import bumped, inspect_oval
+from tests.cmmlink.oval_part import COUNT, LENGTH_MM, oval_curve, oval_feet, oval_points, station_mm, write_nominal, write_points
 
-KNOWN = {"registration": {"fit": "none"}}
+KNOWN: dict[str, Any] = {"registration": {"fit": "none"}}
 OF_THE_SURROUNDINGS = ("measured_at", "part", "device", "run", "chain_sha256", "plan_sha256", "nominal_sha256", "software")
 
 
@@ -65,7 +65,8 @@ def test_rows_without_numbers_never_improve_the_verdict(profile: NominalProfile)
     missing = front.inspect(good, nominal=profile, tolerance=(-0.05, 0.05), **KNOWN)
     assert missing.verdict is Verdict.UNCERTAIN
     assert missing.reasons
-    assert missing.notes == ("1 row without numbers: rejected",)
+    assert missing.notes[1:] == ("1 row without numbers: rejected",)
+    assert "handed over as a profile" in missing.notes[0]
     assert np.flatnonzero(np.isnan(missing.points.deviation_mm)).tolist() == [7]
 
 
@@ -139,6 +140,26 @@ def test_a_result_says_itself_in_one_line_and_shows_itself_in_a_notebook(found: 
     assert "oval <b>" not in shown
     assert '<img alt="the deviations of oval' in shown
     assert found.reasons[0] in shown
+
+
+def test_a_nominal_of_any_kind_becomes_the_same_profile(tmp_path: Path) -> None:
+    of_file = front.nominal_profile(write_nominal(tmp_path / "oval.yaml"))
+    of_curve = front.nominal_profile(oval_curve())
+    assert np.array_equal(of_file.points_mm, of_curve.points_mm)
+    assert of_file.material == "left"
+    of_points = front.nominal_profile(oval_feet()[::-1], closed=True)
+    assert of_points.material == "right"
+    assert of_points.length_mm == pytest.approx(LENGTH_MM, rel=1e-7)
+    with pytest.raises(NominalError, match="expected points of shape"):
+        front.nominal_profile(np.zeros(4))
+
+
+def test_results_say_themselves_without_their_arrays(profile: NominalProfile) -> None:
+    found = deviations(oval_points(bumped()), profile)
+    result = inspect_oval(profile, bumped())
+    values = (profile, profile.curve, found, result, result.registration, result.rows_at(slice(None)))
+    assert repr(found) == "<Deviations of 360 points, -0.0900 .. +0.2000 mm, 0 beyond an open end>"
+    assert all(len(repr(value)) < 200 and "array" not in repr(value) for value in values)
 
 
 def test_plots_are_figures_that_belong_to_nobody_else(found: Inspected) -> None:
