@@ -111,7 +111,23 @@ PYTHON = """
 # In Python
 
 What each package offers by its front door. Names behind it are the package's own and may change. Arrays are float64, lengths mm, angles
-radians; what a function takes and gives stands in its docstring, with shapes and units: `help(inspection.register)`.
+radians; what a function takes and gives stands in its docstring, with shapes and units: `help(inspection.register)`. Rows of arrays are
+counted from 0; columns of files from 1, as in a plan.
+
+From files or arrays to a verdict in one call, which is that of `cmmlink inspect`:
+
+```python
+import cmmlink
+
+found = cmmlink.inspect("docs/examples/data/cam-points.csv", nominal="docs/examples/data/cam.yaml", tolerance=(-0.05, 0.05))
+print(found.verdict.word, found.reasons[0])  # nonconform 33 points lie beyond the limits -0.05 .. 0.05 mm.
+print(found.points.deviation_mm.shape)  # (800,)
+```
+
+`found` shows itself in a notebook; `found.plot()` is a matplotlib figure, `found.to_columns()` and `found.to_dataframe()` are the points
+with the columns of deviations.csv, and `found.document` has the keys of result.json. `cmmlink.open_run("last")` gives the same of a recorded
+run, and `plan=cmmlink.load_plan(Path("plan.yaml"))` stands in place of the other arguments.
+[Example 06](examples/06_one_call.py) walks through it.
 """
 
 OBJECTS: tuple[tuple[str, type[BaseModel], type[BaseModel] | None], ...] = (
