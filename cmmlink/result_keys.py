@@ -20,6 +20,7 @@ from cmmlink.inspection_keys import (
     Worst,
     Zone,
 )
+from cmmlink.record_keys import RunOrigin
 from cmmlink.version import ResultSchema
 from cmmlink.words import VerdictName
 
@@ -324,6 +325,7 @@ class Shown(JsonObject):
     coverage: float | None = Field(description="the share of the profile that was measured; null where no part was found")
     result: Inspected | None = Field(description="the recorded result; null where the run gave none")
     chain_sha256: str = Field(description="the hash of the run's last record; empty while the run goes on")
+    origin: RunOrigin | None = Field(default=None, description="where the run was taken over from; null: it was recorded here")
     recorded: Kept = Field(description="how much was recorded")
     events: list[RecordedEvent] = Field(description="what happened on the link; damaged frames and heartbeats are counted only")
     registrations: list[RecordedPose] = Field(description="the history of the registration")

@@ -20,6 +20,7 @@ from cmmlink.plan.reference import Group, groups_of, table
 from cmmlink.plan.scan import Plan
 from cmmlink.plan.surface import CtPlan
 from cmmlink.record import export
+from cmmlink.record_keys import RecordsCopied
 from cmmlink.report import stack_folder
 from cmmlink.result_keys import (
     Exported,
@@ -145,6 +146,7 @@ OBJECTS: tuple[tuple[str, type[BaseModel], type[BaseModel] | None], ...] = (
     ("`compare`", Compared, None),
     ("`verify`", Verified, None),
     ("`verify-zone`", ZonesVerified, None),
+    ("`backup`, `restore` and `merge`", RecordsCopied, None),
 )
 
 TABLES: tuple[tuple[str, Mapping[str, str]], ...] = (

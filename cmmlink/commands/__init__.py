@@ -13,6 +13,7 @@ from typing import Annotated
 
 import typer
 
+from cmmlink.commands.backup import backup, merge, restore
 from cmmlink.commands.check import check
 from cmmlink.commands.compare import compare
 from cmmlink.commands.console import serve_console
@@ -61,6 +62,9 @@ app.command()(compare)
 app.command()(replay)
 app.command()(verify)
 app.command("verify-zone")(verify_zone)
+app.command()(backup)
+app.command()(restore)
+app.command()(merge)
 
 
 @app.callback(invoke_without_command=True)

@@ -4,9 +4,11 @@ TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer 
 
 if TYPE_CHECKING:
     from cmmlink.record.against import disagreements, read_result
+    from cmmlink.record.backup import Copied, back_up, merge, restore
     from cmmlink.record.bodies import unpack_judged
     from cmmlink.record.chain import Draft, Record
     from cmmlink.record.export import export_run
+    from cmmlink.record.origin import origin_of
     from cmmlink.record.reader import (
         RecordedRun,
         arrivals_of,
@@ -35,9 +37,11 @@ else:
 
     _PLACES = {
         "cmmlink.record.against": ("disagreements", "read_result"),
+        "cmmlink.record.backup": ("Copied", "back_up", "merge", "restore"),
         "cmmlink.record.bodies": ("unpack_judged",),
         "cmmlink.record.chain": ("Draft", "Record"),
         "cmmlink.record.export": ("export_run",),
+        "cmmlink.record.origin": ("origin_of",),
         "cmmlink.record.reader": (
             "RecordedRun",
             "arrivals_of",
@@ -73,6 +77,7 @@ __all__ = [
     "PATIENCE_S",
     "QUEUE_BYTES",
     "Change",
+    "Copied",
     "Draft",
     "Record",
     "RecordReference",
@@ -82,6 +87,7 @@ __all__ = [
     "RunInputs",
     "Store",
     "arrivals_of",
+    "back_up",
     "check_chain",
     "default_folder",
     "describe",
@@ -93,8 +99,10 @@ __all__ = [
     "find_stack",
     "last_serial_number",
     "list_runs",
+    "merge",
     "open_to_read",
     "open_to_record",
+    "origin_of",
     "points_of",
     "read_result",
     "reads_of",
@@ -103,6 +111,7 @@ __all__ = [
     "recorded_result",
     "recorded_run",
     "replay_run",
+    "restore",
     "software",
     "unpack_judged",
 ]

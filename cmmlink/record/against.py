@@ -8,6 +8,7 @@ from typing import Any
 
 from cmmlink.errors import PlanError, RunError
 from cmmlink.record.bodies import pack_document
+from cmmlink.record.origin import original_chain_sha256
 from cmmlink.record.reader import RecordedRun, recorded_run
 from cmmlink.record.recorder import result_sha256
 from cmmlink.record.store import Store
@@ -33,7 +34,7 @@ def disagreements(store: Store, result: Mapping[str, Any]) -> list[str]:
     """What a result file says otherwise than the records, in words; nothing where they agree. Raises StoreError.
 
     The last hash of the run covers every record before it, so where it agrees, and the chain is whole, none of them was changed,
-    cut off or added since the result was written.
+    cut off or added since the result was written. Of a run that was taken over from another station that is so of the run alone.
     """
     run = str(result["run"])
     try:
@@ -50,7 +51,7 @@ def _differences(store: Store, recorded: RecordedRun, result: Mapping[str, Any])
     if end is None:
         yield f"the end of run {run} is not in the records: it was deleted or cut off"
         return
-    if recorded.chain_sha256 != result["chain_sha256"]:
+    if result["chain_sha256"] not in (recorded.chain_sha256, original_chain_sha256(store, run)):
         yield f"the chain of run {run} ends with {recorded.chain_sha256 or 'nothing'}, the result says {result['chain_sha256']}"
     rows = (record.body for record in store.records(run, "deviations"))
     kept = recorded.result

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from typing import Literal
 from zlib import crc32
 
-Kind = Literal["run", "plan", "nominal", "wire", "points", "events", "registration", "deviations", "result", "end"]
+Kind = Literal["run", "plan", "nominal", "wire", "points", "events", "registration", "deviations", "result", "end", "origin", "derived"]
+"""What a record holds. Behind the end of a run may stand where it was taken over from, and what it was found to be when judged again."""
 
 GENESIS = bytes(32)  # in place of the hash before the first record
 
@@ -53,10 +54,17 @@ class Alteration:
         return f"record {self.number}{kind}: {self.problem}" if self.number else f"the file of records: {self.problem}"
 
 
-def chain_record(draft: Draft, number: int, time_s: float, previous: bytes) -> Record:
-    """Give a draft its place in the chain."""
+def chain_record(draft: Draft | Record, number: int, time_s: float, previous: bytes) -> Record:
+    """Give a draft its place in the chain, or a record of another file its place in this one."""
     sha256 = _sha256(number, draft.run, draft.kind, time_s, draft.count, draft.body, previous)
     return Record(number, draft.run, draft.kind, time_s, draft.count, draft.body, crc32(draft.body), sha256)
+
+
+def hash_of(records: Iterable[Record], number: int, previous: bytes) -> bytes:
+    """The last hash of records as they stood in another file, from `number` on behind the hash `previous`."""
+    for record in records:
+        number, previous = number + 1, chain_record(record, number, record.time_s, previous).sha256
+    return previous
 
 
 def first_alteration(records: Iterable[Record], number: int, previous: bytes) -> tuple[Alteration | None, int, bytes]:

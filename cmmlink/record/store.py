@@ -9,8 +9,8 @@ import re
 import shutil
 import sqlite3
 import stat
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 from cmmlink.errors import StoreError
@@ -40,6 +40,7 @@ MIGRATIONS: tuple[str, ...] = (
 _OF_THE_SYSTEM = (sqlite3.SQLITE_IOERR, sqlite3.SQLITE_FULL, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_PERM, sqlite3.SQLITE_BUSY)
 _COLUMNS = "number, run, kind, time_s, count, body, crc32, sha256"
 _PATIENCE_S = 5.0  # for another connection's transaction
+_PAGES_AT_ONCE = 4096  # of a copy, between two words about how far it has come
 
 
 class Store:
@@ -56,9 +57,13 @@ class Store:
         epoch_s: Callable[[], float],
         migrations: Sequence[str] = MIGRATIONS,
         patience_s: float = PATIENCE_S,
+        name: str = FILE_NAME,
     ) -> None:
-        """`epoch_s` gives seconds since 1970. Raises StoreError: locked, newer, unusable folder, not a file of records."""
-        self.path = folder / FILE_NAME
+        """`epoch_s` gives seconds since 1970. Raises StoreError: locked, newer, unusable folder, not a file of records.
+
+        name : of the file, where it is not that of a station
+        """
+        self.path = folder / name
         self.recording = False
         self._epoch_s = epoch_s
         self._lock: StationLock | None = None
@@ -103,6 +108,53 @@ class Store:
             self._connection.executemany(f"INSERT INTO record ({_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?, ?)", rows)
         self._head = number, previous
         return records
+
+    def adopt(self, records: Iterable[Record]) -> None:
+        """Add records of another file with the moments at which they were written, in one transaction, each with its place in this chain.
+
+        Records that follow in the other file on what stands in this one keep their numbers and hashes. Raises StoreError: then none is
+        added.
+        """
+        number, previous = self._head
+
+        def rows() -> Iterator[tuple[object, ...]]:
+            nonlocal number, previous
+            for record in records:
+                placed = chain_record(record, number + 1, record.time_s, previous)
+                number, previous = number + 1, placed.sha256
+                yield number, record.run, record.kind, record.time_s, record.count, record.body, placed.crc32, previous
+
+        with _translate_errors(self.path), _transaction(self._connection):
+            self._connection.executemany(f"INSERT INTO record ({_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?, ?)", rows())
+        self._head = number, previous
+
+    def back_up(self, path: Path, tell: Callable[[float], None] = lambda share: None) -> None:
+        """Copy what stands in the file at this moment to a new file, while others may go on recording. `tell` is told the share done."""
+        with _translate_errors(path), closing(sqlite3.connect(path, isolation_level=None)) as copy:
+            self._connection.execute("BEGIN")
+            try:
+                self._connection.execute("SELECT count(*) FROM sqlite_master").fetchone()  # from here on what others write is not seen
+                self._connection.backup(copy, pages=_PAGES_AT_ONCE, progress=lambda _, left, pages: tell(1 - left / max(pages, 1)))
+            finally:
+                self._connection.execute("ROLLBACK")
+            copy.execute("PRAGMA journal_mode = DELETE")  # so that one file holds all of it
+
+    @property
+    def head(self) -> tuple[int, bytes]:
+        """The number and the hash of the last record, when the file was opened or last added to."""
+        return self._head
+
+    def record_at(self, number: int) -> Record | None:
+        """The record with a number."""
+        with _translate_errors(self.path):
+            row = self._connection.execute(f"SELECT {_COLUMNS} FROM record WHERE number = ?", (number,)).fetchone()
+            return None if row is None else Record(*row)
+
+    def records_from(self, number: int) -> Iterator[Record]:
+        """All records from a number on, in their order."""
+        with _translate_errors(self.path):
+            for row in self._connection.execute(f"SELECT {_COLUMNS} FROM record WHERE number >= ? ORDER BY number", (number,)):
+                yield Record(*row)
 
     def records(self, run: str, kind: str | None = None) -> Iterator[Record]:
         """Records of a run in their order, all or of one kind. Raises StoreError where one cannot be read."""
