@@ -225,7 +225,7 @@ def test_a_run_without_an_end_is_left_out_and_told(station: Path, tmp_path: Path
 
 
 def test_a_result_of_another_station_is_held_against_the_merged_run(tmp_path: Path) -> None:
-    """Over the commands: measured at one station, merged into another's records, verified against what the first one wrote; and found out once it is altered."""
+    """Over the commands: merged into other records a run verifies against its result, until that is altered."""
     nominal, points = write_nominal(tmp_path / "oval.yaml"), write_points(tmp_path / "scan.csv", oval_points(0.0))
     add_run(tmp_path / "one", "x-0001")
     asked = ("inspect", points, "--nominal", nominal, "--tolerance", -0.05, 0.05, "--fit", "none", "--json")
