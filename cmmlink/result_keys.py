@@ -20,7 +20,7 @@ from cmmlink.inspection_keys import (
     Worst,
     Zone,
 )
-from cmmlink.record_keys import RunOrigin
+from cmmlink.record_keys import JudgedAgain, JudgementKept, RunOrigin
 from cmmlink.version import ResultSchema
 from cmmlink.words import VerdictName
 
@@ -136,6 +136,7 @@ class Replayed(Inspected):
     )
     changed: list[Change] = Field(description="the settings and software that are not those of the recorded run")
     differs: list[Change] = Field(description="what of the result is not as recorded")
+    derived: JudgementKept | None = Field(default=None, description="with `--reason`: where this judgement is kept")
     notes: list[str] = Field(description="what was assumed about the nominal and the points when they were recorded, and their density")
 
 
@@ -326,6 +327,7 @@ class Shown(JsonObject):
     result: Inspected | None = Field(description="the recorded result; null where the run gave none")
     chain_sha256: str = Field(description="the hash of the run's last record; empty while the run goes on")
     origin: RunOrigin | None = Field(default=None, description="where the run was taken over from; null: it was recorded here")
+    derived: list[JudgedAgain] = Field(default=[], description="what it was found to be when it was judged again, oldest first")
     recorded: Kept = Field(description="how much was recorded")
     events: list[RecordedEvent] = Field(description="what happened on the link; damaged frames and heartbeats are counted only")
     registrations: list[RecordedPose] = Field(description="the history of the registration")

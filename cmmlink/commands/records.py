@@ -1,6 +1,7 @@
 """Commands on what was recorded: list, show, evaluate again, verify."""
 
-from collections.abc import Mapping
+import getpass
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
@@ -84,6 +85,12 @@ def show(name: RunName, records: Records = None, as_json: Json = False) -> int:
         _say(f"note: {note}")
     for key in ("software", "recorded"):
         _say(f"{key:<14} {', '.join(f'{name} {value}' for name, value in found[key].items() if value)}")
+    if (origin := found["origin"]) is not None:
+        _say(f"{'origin':<14} merged {_local(origin['merged'])} from {origin['file']}, its chain there {origin['chain_sha256']}")
+    for judged in found["derived"]:
+        changes = ", ".join(f"{change['key']} {change['recorded']} -> {change['replayed']}" for change in judged["changed"])
+        verdict = headline_of(Verdict[judged["verdict"].upper()]).words if judged["verdict"] else "no verdict"
+        _say(f"{'judged again':<14} {_local(judged['when'])} by {judged['who']}: {verdict}; {changes}; {judged['why']}")
     for event in found["events"]:
         told = ", ".join(f"{name} {value}" for name, value in event.items() if name not in ("event", "time_s", "after_points"))
         _say(f"  {event['time_s'] - found['clock_s']:9.3f} s  after {event['after_points']} points: {event['event']} {told}")
@@ -100,17 +107,43 @@ def replay(
     name: RunName,
     tolerance: Annotated[tuple[float, float] | None, typer.Option(metavar="LO HI", help="Evaluate with another tolerance, mm.")] = None,
     method: Annotated[Method | None, typer.Option(help="Evaluate with another method.")] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Evaluate with another value of any key of the plan; as often as wanted."),
+    ] = None,
+    reason: Annotated[
+        str | None, typer.Option("--reason", metavar="TEXT", help="Why: what was found is then kept in the records, chained to the run.")
+    ] = None,
+    operator: Annotated[
+        str | None, typer.Option("--operator", metavar="O", help="Who judges again.", show_default="the user of this computer")
+    ] = None,
     out: Out = None,
     records: Records = None,
     as_json: Json = False,
 ) -> int:
-    """Evaluate a recorded run once more; with nothing changed the result is the same to the last bit."""
-    from cmmlink.devices import decoder_of
-    from cmmlink.record import find_run, open_to_read, recorded_run, replay_run
+    """Evaluate a recorded run once more; with nothing changed the result is the same to the last bit.
 
-    with open_to_read(records_folder(records), now) as store:
+    With --set, --tolerance or --method it is another judgement. The record of the run stays as it is; with a --reason, which --set asks
+    for, the new judgement is added to the records with who, when and why, and `cmmlink show` tells it.
+    """
+    from cmmlink.devices import decoder_of
+    from cmmlink.record import find_run, keep_judgement, open_to_read, open_to_record, recorded_run, replay_run
+
+    changes = _settings_in(settings or ())
+    if changes and not (reason or "").strip():
+        raise PlanError("--set judges a recorded run anew: expected --reason TEXT, which is kept with the judgement")
+    if reason is not None and not (changes or tolerance or method):
+        raise PlanError("--reason is for a judgement with something changed; expected --set, --tolerance or --method beside it")
+    folder = records_folder(records)
+    with open_to_read(folder, now) as store:
         recorded = recorded_run(store, find_run(store, name))
-        again = replay_run(store, recorded, decoder_of, tolerance=tolerance, method=method)
+        if reason is not None and recorded.end is None:
+            raise PlanError(f"run {recorded.run} has no end yet: it can be judged again when it has")
+        again = replay_run(store, recorded, decoder_of, tolerance=tolerance, method=method, settings=changes)
+    kept = None
+    if reason is not None:
+        with open_to_record(folder, now) as store:
+            kept = keep_judgement(store, recorded, again, who=operator or _user(), why=reason.strip(), now=now())
     document = {"schema": RESULT_SCHEMA, **again.result_json} | {
         "replay_of": recorded.run,
         "chain_sha256": recorded.chain_sha256,
@@ -119,6 +152,7 @@ def replay(
     document |= {"ending": again.outcome.ending, "measured_at": utc_words(datetime.fromisoformat(recorded.header["started"]))}
     document |= {"notes": list(again.notes)}
     document |= {"changed": [asdict(change) for change in again.changed], "differs": [asdict(change) for change in again.differs]}
+    document |= {"derived": kept}
     if out is not None:
         from cmmlink.report import input_of_replay, write_results
 
@@ -128,9 +162,32 @@ def replay(
         print_json(document)
     else:
         _print_replay(again, recorded.run)
+        if kept is not None:
+            _say(f"kept as record {kept['record']}, chained to run {recorded.run}: {kept['who']}, {kept['why']}")
     if again.identical is False and not again.changed:
         return fail(f"run {recorded.run}: nothing was changed, yet the result is not the recorded one", NO_RECORD)
     return UNUSABLE if again.outcome.result is None else EXIT_OF[again.outcome.result.verdict]
+
+
+def _settings_in(texts: Sequence[str]) -> dict[str, str]:
+    """The keys of --set with their values. Raises PlanError."""
+    changes: dict[str, str] = {}
+    for text in texts:
+        key, equals, value = text.partition("=")
+        key = key.strip()
+        if not equals or not key or key in changes:
+            problem = f"{key} is given twice" if key in changes else "expected KEY=VALUE, like tolerance.upper_mm=0.08"
+            raise PlanError(f"--set {text}: {problem}")
+        changes[key] = value.strip()
+    return changes
+
+
+def _user() -> str:
+    """The name of the user of this computer. Raises PlanError where the system does not tell it."""
+    try:
+        return getpass.getuser()
+    except (OSError, KeyError, ImportError):  # which of them depends on the system and the version of Python
+        raise PlanError("the system does not tell who you are; expected --operator O") from None
 
 
 def _print_replay(again: "Replay", run_id: str) -> None:

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from cmmlink.plan.serial_numbers import SerialNumbers, next_serial_number
     from cmmlink.plan.stack_characteristics import AskedOfStack
     from cmmlink.plan.surface import CtPlan, NominalAt, load_ct_plan
-    from cmmlink.plan.yaml_model import Positive, Settings, line_of, read_model, words_of_allowed
+    from cmmlink.plan.yaml_model import Positive, Settings, line_of, read_model, value_of, words_of_allowed
 else:
     from cmmlink.front_door import load_on_use
 
@@ -70,7 +70,7 @@ else:
         "cmmlink.plan.cutters": ("CutterName",),
         "cmmlink.plan.stack_characteristics": ("AskedOfStack",),
         "cmmlink.plan.surface": ("CtPlan", "NominalAt", "load_ct_plan"),
-        "cmmlink.plan.yaml_model": ("Positive", "Settings", "line_of", "read_model", "words_of_allowed"),
+        "cmmlink.plan.yaml_model": ("Positive", "Settings", "line_of", "read_model", "value_of", "words_of_allowed"),
     }
 
     __getattr__ = load_on_use(__name__, _PLACES)
@@ -124,6 +124,7 @@ __all__ = [
     "plan_given_by",
     "read_model",
     "schema_of_plans",
+    "value_of",
     "with_own_maps",
     "words_of_allowed",
 ]

@@ -98,6 +98,14 @@ def mistakes_in(text: str, model: type[BaseModel]) -> tuple[Mistake, ...]:
     return ()
 
 
+def value_of(text: str) -> Any:
+    """What a key has as its value that this text stands behind, as a model takes it. Raises YamlError where it is no value."""
+    document = _read(f"value: {text}")
+    if set(document.value) != {"value"}:
+        raise YamlError("more than one value; expected one, on one line")
+    return document.value["value"]
+
+
 def texts_of(text: str) -> dict[str, tuple[int, str]]:
     """The line and the text of every value that is a text, by its dotted key; those of a list are left out. Raises YamlError."""
     document = _read(text)

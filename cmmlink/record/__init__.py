@@ -7,6 +7,7 @@ if TYPE_CHECKING:
     from cmmlink.record.backup import Copied, back_up, merge, restore
     from cmmlink.record.bodies import unpack_judged
     from cmmlink.record.chain import Draft, Record
+    from cmmlink.record.derived import Change, derived_of
     from cmmlink.record.export import export_run
     from cmmlink.record.origin import origin_of
     from cmmlink.record.reader import (
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
         recorded_run,
     )
     from cmmlink.record.recorder import QUEUE_BYTES, Recorder, RecordReference, RunInputs, software
-    from cmmlink.record.replay import Change, Replay, recorded_plan, recorded_profile, replay_run
+    from cmmlink.record.replay import Replay, keep_judgement, recorded_plan, recorded_profile, replay_run
     from cmmlink.record.station_lock import PATIENCE_S
     from cmmlink.record.store import FILE_NAME, Store
 else:
@@ -40,6 +41,7 @@ else:
         "cmmlink.record.backup": ("Copied", "back_up", "merge", "restore"),
         "cmmlink.record.bodies": ("unpack_judged",),
         "cmmlink.record.chain": ("Draft", "Record"),
+        "cmmlink.record.derived": ("Change", "derived_of"),
         "cmmlink.record.export": ("export_run",),
         "cmmlink.record.origin": ("origin_of",),
         "cmmlink.record.reader": (
@@ -64,7 +66,7 @@ else:
             "recorded_run",
         ),
         "cmmlink.record.recorder": ("QUEUE_BYTES", "Recorder", "RecordReference", "RunInputs", "software"),
-        "cmmlink.record.replay": ("Change", "Replay", "recorded_plan", "recorded_profile", "replay_run"),
+        "cmmlink.record.replay": ("Replay", "keep_judgement", "recorded_plan", "recorded_profile", "replay_run"),
         "cmmlink.record.station_lock": ("PATIENCE_S",),
         "cmmlink.record.store": ("FILE_NAME", "Store"),
     }
@@ -90,6 +92,7 @@ __all__ = [
     "back_up",
     "check_chain",
     "default_folder",
+    "derived_of",
     "describe",
     "disagreements",
     "earlier_run",
@@ -97,6 +100,7 @@ __all__ = [
     "export_run",
     "find_run",
     "find_stack",
+    "keep_judgement",
     "last_serial_number",
     "list_runs",
     "merge",

@@ -19,6 +19,7 @@ from platformdirs import user_data_path
 from cmmlink.errors import RunError, StationBusyError, StoreError
 from cmmlink.record.bodies import PlacedArrival, unpack_arrivals, unpack_document, unpack_points, unpack_reads
 from cmmlink.record.chain import Record, is_damaged
+from cmmlink.record.derived import derived_of
 from cmmlink.record.origin import origin_of
 from cmmlink.record.recorder import end_draft
 from cmmlink.record.shapes import End, Header, Result, checked
@@ -256,6 +257,7 @@ def describe(store: Store, run: str) -> dict[str, Any]:
         "result": recorded.result,
         "chain_sha256": recorded.chain_sha256,
         "origin": None if (origin := origin_of(store, run)) is None else origin.model_dump(mode="json"),
+        "derived": derived_of(store, run),
         "recorded": {
             "wire_bytes": sum(len(read.data) for read in reads_of(store, run)),
             "reads": totals.get("wire", (0, 0))[1],

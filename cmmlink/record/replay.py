@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -18,25 +19,32 @@ from cmmlink.errors import PlanError, StoreError, YamlError
 from cmmlink.events import RunStarted, Sink
 from cmmlink.from_plan import inspection_of, profile_of
 from cmmlink.pipeline import RunOutcome, run_inspection
-from cmmlink.plan import Device, Plan, read_model
+from cmmlink.plan import Device, Plan, read_model, value_of, words_of_allowed
 from cmmlink.record.bodies import PlacedArrival, pack_document
+from cmmlink.record.derived import Change, derived_draft
 from cmmlink.record.reader import RecordedRun, arrivals_of, points_of, reads_of
 from cmmlink.record.recorder import judged_bodies, result_sha256, software
 from cmmlink.record.shapes import plain_name
 from cmmlink.record.store import Store
 from cmmlink.result_json import density_notes, density_of, result_json, stations_of
 from cmmlink.scratch import scratch_in
+from cmmlink.words import utc_words
 from drivers import Arrival, Capture, Decoder, LinkDown, LinkUp, PointBatch
 from inspection import NominalProfile, Reason, SectionCharacteristic
 
-
-@dataclass(frozen=True, slots=True)
-class Change:
-    """A value that is not as it was in the recorded run."""
-
-    key: str
-    recorded: Any
-    replayed: Any
+# Keys that have no part in judging, or stand for what is on record itself.
+_SETTLED = (
+    "buffer_points",
+    "device",
+    "nominal.file",
+    "operator",
+    "out",
+    "part",
+    "records",
+    "registration.datum.result",
+    "report",
+    "serial_number",
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,6 +75,7 @@ def replay_run(
     *,
     tolerance: tuple[float, float] | None = None,
     method: str | None = None,
+    settings: Mapping[str, str] | None = None,
     clock: Callable[[], float] = time.monotonic,
     sinks: Sequence[Sink] = (),
     stop: threading.Event | None = None,
@@ -76,6 +85,7 @@ def replay_run(
 ) -> Replay:
     """Evaluate a recorded run again. `decoder_of` gives the decoder of a plan's device, None for one without wire bytes.
 
+    `settings` are keys of the plan with what is to stand behind them, as it would be written there.
     `sinks` take the events; setting `stop` aborts the replay. `shown`: somebody looks on, who is told the characteristics meanwhile.
     `profile` is the nominal of the record, where it is known already; `numbers` are found as well, without a part in the verdict.
 
@@ -85,7 +95,7 @@ def replay_run(
     if altered is not None:
         raise StoreError(f"{store.path}: {altered}; what was altered is not evaluated again")
     plan = recorded_plan(recorded)
-    changed = _with_changes(plan, tolerance, method)
+    changed = _with_changes(plan, tolerance, method, settings or {})
     profile = profile or recorded_profile(changed, recorded)
     stop = stop or threading.Event()
     decoder = _decoder_of(plan.device, recorded, decoder_of)
@@ -144,7 +154,29 @@ def _decoder_of(device: Device, recorded: RecordedRun, decoder_of: Callable[[Dev
         raise StoreError(f"the device in the plan of run {recorded.run} cannot be read by this version of cmmlink: {error}") from None
 
 
-def _with_changes(plan: Plan, tolerance: tuple[float, float] | None, method: str | None) -> Plan:
+def keep_judgement(store: Store, recorded: RecordedRun, again: Replay, *, who: str, why: str, now: datetime) -> dict[str, Any]:
+    """Add what a replay with changes found to the records, chained to them and to its run. Returns what says where it stands.
+
+    Raises StoreError where it cannot be kept.
+    """
+    bodies = (body for _, body in judged_bodies(again.outcome.result))
+    draft = derived_draft(
+        recorded.run,
+        recorded.chain_sha256,
+        when=utc_words(now),
+        who=who,
+        why=why,
+        changed=[change for change in again.changed if not change.key.startswith("software.")],
+        plan=again.plan.effective_yaml(),
+        software=software(),
+        result=again.result_json,
+        result_sha256=result_sha256(again.result_json, bodies),
+    )
+    (kept,) = store.append([draft])
+    return {"when": utc_words(now), "who": who, "why": why, "record": kept.number, "chain_sha256": kept.sha256.hex()}
+
+
+def _with_changes(plan: Plan, tolerance: tuple[float, float] | None, method: str | None, settings: Mapping[str, str]) -> Plan:
     document = plan.model_dump()
     if tolerance is not None and plan.tolerance is None:
         raise PlanError("the recorded plan has no tolerance to be changed: its characteristics have limits of their own")
@@ -152,12 +184,62 @@ def _with_changes(plan: Plan, tolerance: tuple[float, float] | None, method: str
         document["tolerance"] |= {"lower_mm": tolerance[0], "upper_mm": tolerance[1]}
     if method is not None:
         document["registration"]["method"] = method
+    for key, text in settings.items():
+        _set(document, key, text)
     try:
         return Plan.model_validate(document)
     except ValidationError as error:
         first = error.errors()[0]
-        key, told = ".".join(map(str, first["loc"])), first["msg"].removeprefix("Value error, ")
+        key, told = ".".join(map(str, first["loc"])), words_of_allowed(first)
+        if first["type"] == "extra_forbidden":
+            raise PlanError(f"the recorded plan cannot be changed so: {key} is no key of a plan; `cmmlink plan keys` lists them") from None
         raise PlanError(f"the recorded plan cannot be changed so: {key} is {first['input']!r}; expected {told}") from None
+
+
+def _set(document: dict[str, Any], key: str, text: str) -> None:
+    """Set a dotted key of a plan. Raises PlanError for what has no part in judging, and where there is no such place."""
+    settled = next((one for one in _SETTLED if f"{key}.".startswith(f"{one}.")), None)
+    if settled is not None:
+        raise PlanError(f"{key} cannot be changed: what arrived, and the nominal it was held against, are those on record ({settled})")
+    *groups, last = key.split(".")
+    here: Any = document
+    for group in groups:
+        if isinstance(here, dict) and here.get(group) is None:
+            here[group] = {}  # whether there is such a group of keys is told with the rest
+        here = _within(here, group, key)
+    value = _value_of(key, text)
+    if isinstance(here, list):
+        here[_index(here, last, key)] = value
+    elif isinstance(here, dict):
+        here[last] = value
+    else:
+        raise PlanError(f"{key}: there are no keys below {'.'.join(groups)}; `cmmlink plan keys` lists those there are")
+
+
+def _within(here: Any, group: str, key: str) -> Any:
+    if isinstance(here, list | tuple):
+        return here[_index(here, group, key)]
+    if isinstance(here, dict):
+        if isinstance(here[group], tuple):
+            here[group] = list(here[group])
+        return here[group]
+    raise PlanError(f"{key}: there are no keys below {group}; `cmmlink plan keys` lists those there are")
+
+
+def _index(items: Sequence[Any], name: str, key: str) -> int:
+    """The place in a list by its number, from 0 as messages about plans count, or by the name of what stands there."""
+    named = [place for place, item in enumerate(items) if isinstance(item, dict) and item.get("name") == name]
+    place = int(name) if name.isdecimal() and len(name) < 7 else None
+    if named or (place is not None and place < len(items)):
+        return named[0] if named else place or 0
+    raise PlanError(f"{key}: there is no {name} among {len(items)}; expected its name, or its number from 0")
+
+
+def _value_of(key: str, text: str) -> Any:
+    try:
+        return value_of(text)
+    except YamlError as error:
+        raise PlanError(f"{key}={text}: {error}") from None
 
 
 def recorded_profile(plan: Plan, recorded: RecordedRun) -> NominalProfile:
