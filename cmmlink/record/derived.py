@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict
 from cmmlink.record.bodies import pack_document, unpack_document
 from cmmlink.record.chain import Draft
 from cmmlink.record.shapes import Moment, checked
-from cmmlink.record.store import Store
+from cmmlink.record.store import Store, name_record
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,8 +84,8 @@ def derived_of(store: Store, run: str) -> list[dict[str, Any]]:
     """
     found = []
     for record in store.records(run, "derived"):
-        document: Any = unpack_document(record.body)
-        kept = checked(Derived, document)
+        with name_record(store.path, record):
+            kept = checked(Derived, unpack_document(record.body))
         told = {key: getattr(kept, key) for key in ("when", "who", "why", "changed")}
         found.append({**told, "verdict": kept.result.get("verdict"), "chain_sha256": bytes(record.sha256).hex()})
     return found

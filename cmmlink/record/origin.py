@@ -5,7 +5,6 @@ is needed to recompute the old ones: so a result file that was written at the fi
 """
 
 from itertools import islice
-from typing import Any
 
 from pydantic import BaseModel, ConfigDict
 
@@ -13,7 +12,7 @@ from cmmlink.errors import StoreError
 from cmmlink.record.bodies import pack_document, unpack_document
 from cmmlink.record.chain import Draft, hash_of
 from cmmlink.record.shapes import checked
-from cmmlink.record.store import Store
+from cmmlink.record.store import Store, name_record
 
 
 class Origin(BaseModel):
@@ -43,8 +42,8 @@ class Origin(BaseModel):
 def origin_of(store: Store, run: str) -> Origin | None:
     """Where a run was taken over from; None for one that was recorded here. Raises StoreError where that cannot be read."""
     for record in store.records(run, "origin"):
-        document: Any = unpack_document(record.body)
-        return checked(Origin, document)
+        with name_record(store.path, record):
+            return checked(Origin, unpack_document(record.body))
     return None
 
 

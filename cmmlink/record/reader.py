@@ -24,7 +24,7 @@ from cmmlink.record.origin import origin_of
 from cmmlink.record.recorder import end_draft
 from cmmlink.record.shapes import End, Header, Result, checked
 from cmmlink.record.station_lock import PATIENCE_S
-from cmmlink.record.store import Store, has_records
+from cmmlink.record.store import Store, has_records, name_record
 from drivers import Arrival, PointBatch, Rejected, WireBytes
 
 _FROM_HEADER = ("run", "started", "part", "serial_number", "simulated")
@@ -196,26 +196,16 @@ def recorded_result(store: Store, run: str) -> dict[str, Any]:
 
 def _document(store: Store, record: Record) -> dict[str, Any]:
     """The document of a record, checked. Raises StoreError."""
-    with _named(store, record):
+    with name_record(store.path, record):
         document: dict[str, Any] = unpack_document(record.body)
         checked(_SHAPES[record.kind], document)
         return document
 
 
-@contextmanager
-def _named(store: Store, record: Record) -> Iterator[None]:
-    """Say which record it is that cannot be read."""
-    try:
-        yield
-    except StoreError as error:
-        what = f"record {record.number} ({record.kind} of run {record.run})"
-        raise StoreError(f"{store.path}: {what} cannot be read: {error}; `cmmlink verify` says more") from None
-
-
 def reads_of(store: Store, run: str) -> Iterator[WireBytes]:
     """Every read of raw bytes, in order."""
     for record in store.records(run, "wire"):
-        with _named(store, record):
+        with name_record(store.path, record):
             reads = unpack_reads(record.body)
         yield from reads
 
@@ -223,7 +213,7 @@ def reads_of(store: Store, run: str) -> Iterator[WireBytes]:
 def points_of(store: Store, run: str) -> Iterator[PointBatch]:
     """Every point, in order, as many at once as a record holds."""
     for record in store.records(run, "points"):
-        with _named(store, record):
+        with name_record(store.path, record):
             batch = unpack_points(record.body)
         yield batch
 
@@ -231,7 +221,7 @@ def points_of(store: Store, run: str) -> Iterator[PointBatch]:
 def arrivals_of(store: Store, run: str) -> Iterator[PlacedArrival]:
     """Every arrival other than bytes and points, in order."""
     for record in store.records(run, "events"):
-        with _named(store, record):
+        with name_record(store.path, record):
             moments = unpack_arrivals(record.body)
         yield from moments
 
@@ -240,7 +230,7 @@ def registrations_of(store: Store, run: str) -> list[dict[str, Any]]:
     """The history of the registration: a document for each pose that was noted."""
     found: list[dict[str, Any]] = []
     for record in store.records(run, "registration"):
-        with _named(store, record):
+        with name_record(store.path, record):
             found += checked(list[dict[str, Any]], unpack_document(record.body))
     return found
 

@@ -321,6 +321,16 @@ def _translate_errors(path: Path) -> Iterator[None]:
         raise StoreError(f"{path}: this computer has too little memory left; close other programs") from error
 
 
+@contextmanager
+def name_record(path: Path, record: Record) -> Iterator[None]:
+    """Say which record of a file it is that cannot be read."""
+    try:
+        yield
+    except StoreError as error:
+        what = f"record {record.number} ({record.kind} of run {record.run})"
+        raise StoreError(f"{path}: {what} cannot be read: {error}; `cmmlink verify` says more") from None
+
+
 def has_records(folder: Path) -> bool:
     """Tell whether there is a file of records in a folder. Raises StoreError where the system does not say."""
     try:
