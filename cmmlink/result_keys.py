@@ -94,7 +94,7 @@ class Recorded(Measured):
 class Failure(JsonObject):
     """Why there is no result."""
 
-    kind: str = Field(description="the kind of failure: unusable, not-measured, device-failed or no-record")
+    kind: str = Field(description="the kind of failure: unusable, not-measured, device-failed, no-record, usage, system, stopped or defect")
     message: str = Field(description="what, where, and what to do")
     exit_status: int = Field(description="the exit status")
 

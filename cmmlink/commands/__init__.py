@@ -17,7 +17,7 @@ from cmmlink.commands.backup import backup, merge, restore
 from cmmlink.commands.check import check
 from cmmlink.commands.compare import compare
 from cmmlink.commands.console import serve_console
-from cmmlink.commands.exit_codes import DEVICE_FAILED, NO_RECORD, STOPPED, UNUSABLE, fail, fail_as_asked
+from cmmlink.commands.exit_codes import DEVICE_FAILED, NO_RECORD, STOPPED, UNUSABLE, fail_as_asked, fail_in_words
 from cmmlink.commands.export import export
 from cmmlink.commands.measure import demo, run
 from cmmlink.commands.plans import example, plan
@@ -33,6 +33,7 @@ from cmmlink.version import __version__
 from drivers import DeviceError, MeshError, PointFileError
 from inspection import InspectionError, while_compiling
 
+_NO_MEMORY = "this computer has too little memory left for it; close other programs, or take fewer points at once"
 _log = logging.getLogger(__name__)
 
 app = typer.Typer(
@@ -103,9 +104,9 @@ def _run_command() -> int | str | None:
             code = app(prog_name="cmmlink", standalone_mode=False)
         sys.stdout.flush()
         if code == STOPPED:
-            fail("stopped by the operator", STOPPED)
+            fail_in_words("stopped", "stopped by the operator", STOPPED)
     except typer.TyperException as error:
-        code = fail(_usage(error), UNUSABLE)
+        code = fail_in_words("usage", _usage(error))
     except (PlanError, RunError, InspectionError, PointFileError, MeshError) as error:
         code = fail_as_asked(error, UNUSABLE)
     except DeviceError as error:
@@ -113,15 +114,15 @@ def _run_command() -> int | str | None:
     except StoreError as error:
         code = fail_as_asked(error, NO_RECORD)
     except OSError as error:
-        code = fail(_words_of(error), UNUSABLE)
+        code = fail_in_words("system", _words_of(error))
         _silence_stdout()
     except MemoryError:
-        code = fail("this computer has too little memory left for it; close other programs, or take fewer points at once", UNUSABLE)
+        code = fail_in_words("system", _NO_MEMORY)
     except SystemExit as ended:  # typer ends with 1 when standard output was closed, but 1 means nonconform here
         code = UNUSABLE if ended.code == 1 else ended.code
     except Exception as error:  # Python would end with 1, which means nonconform here
         traceback.print_exc()
-        code = fail(f"a defect of cmmlink, please report it: {error}", UNUSABLE)
+        code = fail_in_words("defect", f"a defect of cmmlink, please report it: {error}")
     return code
 
 

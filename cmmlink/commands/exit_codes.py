@@ -3,6 +3,7 @@
 import json
 import logging
 import sys
+from contextlib import suppress
 
 from cmmlink.words import printable
 from inspection import NotMeasured, Verdict
@@ -35,7 +36,20 @@ def kind_of_failure(error: Exception, code: int) -> str:
 
 def fail_as_asked(error: Exception, code: int) -> int:
     """The same for an error that leaves no result; where --json was asked for, a JSON object on standard output says it as well."""
-    if "--json" in sys.argv[1:]:
-        sys.stdout.write(json.dumps({"error": {"kind": kind_of_failure(error, code), "message": str(error), "exit_status": code}}) + "\n")
-        sys.stdout.flush()
+    _say_in_json(kind_of_failure(error, code), str(error), code)
     return fail(f"{error} (NOT MEASURED)" if isinstance(error, NotMeasured) else str(error), code)
+
+
+def fail_in_words(kind: str, message: str, code: int = UNUSABLE) -> int:
+    """The same for what is no error of an inspection: a mistake in the command, the system's refusal, or a defect of the program."""
+    _say_in_json(kind, message, code)
+    return fail(message, code)
+
+
+def _say_in_json(kind: str, message: str, code: int) -> None:
+    """Where --json was asked for, say on standard output what went wrong; where that is broken, standard error still says it."""
+    if "--json" not in sys.argv[1:]:
+        return
+    with suppress(OSError, ValueError):  # a closed stream is a ValueError
+        sys.stdout.write(json.dumps({"error": {"kind": kind, "message": message, "exit_status": code}}) + "\n")
+        sys.stdout.flush()

@@ -58,6 +58,27 @@ def test_what_is_missing_is_named(nominal: Path) -> None:
     assert cmmlink("run").refused().startswith("Missing argument 'PLAN.yaml'; `cmmlink run --help`")
 
 
+@pytest.mark.parametrize(
+    ("words", "kind"),
+    [(("inspect", "--json"), "usage"), (("no-such-command", "--json"), "usage"), (("runs", "--json", "--no-such"), "usage")],
+)
+def test_a_mistake_in_the_command_is_told_in_json_where_that_was_asked_for(words: tuple[str, ...], kind: str) -> None:
+    ended = cmmlink(*words)
+    error = ended.json()["error"]
+    assert (ended.code, error["kind"], error["exit_status"]) == (2, kind, 2)
+    assert ended.err == f"cmmlink: {error['message']}\n"
+
+
+def test_what_the_system_refuses_is_told_in_json(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise PermissionError(13, "Permission denied", "/records")
+
+    monkeypatch.setattr("cmmlink.record.list_runs", refuse)
+    ended = cmmlink("runs", "--json")
+    assert ended.json()["error"] == {"kind": "system", "message": "[Errno 13] Permission denied: '/records'", "exit_status": 2}
+    assert cmmlink("runs").out == ""
+
+
 def test_an_unknown_command_is_named_and_the_near_one_offered() -> None:
     assert re.match(r"No such command 'inspcet'\. Did you mean 'inspect'\?", cmmlink("inspcet").refused())
 
