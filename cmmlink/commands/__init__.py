@@ -37,7 +37,6 @@ _NO_MEMORY = "this computer has too little memory left for it; close other progr
 _log = logging.getLogger(__name__)
 
 app = typer.Typer(
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 120},

@@ -36,8 +36,30 @@ AllowUnseen = Annotated[
 Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for deviations.csv, result.json and profile.png.")]
 Records = Annotated[Path | None, typer.Option("--records", metavar="DIR", help="Folder of the run records.")]
 NoRecord = Annotated[bool, typer.Option("--no-record", help="Keep no record of it.")]
+
+
+def runs_like(context: typer.Context, incomplete: str) -> list[str]:
+    """The names that a shell offers for a run: newest first its ids and serial numbers, and last."""
+    from datetime import datetime
+
+    from cmmlink.errors import RunError, StoreError
+    from cmmlink.record import list_runs
+
+    try:
+        found = list_runs(records_folder(context.params.get("records")), lambda: datetime.now().astimezone())
+    except (RunError, StoreError, OSError):  # a shell has no place for what is wrong
+        found = []
+    names = ["last", *(str(entry[key]) for entry in reversed(found) for key in ("run", "serial_number") if entry[key])]
+    return [name for name in dict.fromkeys(names) if name.startswith(incomplete)]
+
+
 RunName = Annotated[
-    str, typer.Argument(metavar="RUN", help="A run: its id or the beginning, its counter, a serial number, last, or last~1.")
+    str,
+    typer.Argument(
+        metavar="RUN",
+        help="A run: its id or the beginning, its counter, a serial number, last, or last~1.",
+        autocompletion=runs_like,
+    ),
 ]
 Unit = Annotated[UnitName | None, typer.Option("--unit", help="Unit of the points, above what their file states.")]
 NominalUnit = Annotated[UnitName | None, typer.Option("--nominal-unit", help="Unit of the nominal file, in place of --scale.")]

@@ -79,6 +79,16 @@ def test_what_the_system_refuses_is_told_in_json(monkeypatch: pytest.MonkeyPatch
     assert cmmlink("runs").out == ""
 
 
+@pytest.mark.parametrize(
+    ("typed", "offered"), [("cmmlink re", ["report", "replay", "restore"]), ("cmmlink replay la", ["last"]), ("cmmlink replay x", [])]
+)
+def test_a_shell_is_offered_commands_and_runs(typed: str, offered: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in (("_CMMLINK_COMPLETE", "complete_bash"), ("COMP_WORDS", typed), ("COMP_CWORD", str(typed.count(" ")))):
+        monkeypatch.setenv(name, value)
+    ended = cmmlink()
+    assert (ended.code, ended.out.split()) == (0, offered)
+
+
 def test_an_unknown_command_is_named_and_the_near_one_offered() -> None:
     assert re.match(r"No such command 'inspcet'\. Did you mean 'inspect'\?", cmmlink("inspcet").refused())
 
