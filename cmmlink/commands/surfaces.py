@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from typer.core import TyperCommand
@@ -46,11 +46,13 @@ if TYPE_CHECKING:
     from cmmlink.report import SectionPictures
     from cmmlink.stack import SectionOutcome, StackOutcome
 
+PicturesWanted = Literal["needed", "all", "none"]
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _MOST_WARNINGS = 20
+_MOST_HEIGHTS = 8  # told of a sentence that is said of many sections
 _MOST_SHARES = 12
 _PATIENCE_S = 60.0  # surfaces are inspected side by side, and each waits for its turn to be recorded
-_BESIDE_A_PLAN = ("mesh", "out", "records", "no_record", "as_json", "pictures")
+_BESIDE_A_PLAN = ("mesh", "out", "records", "no_record", "as_json", "pictures", "no_pictures")
 _OPTION_OF = {
     "mesh.scale": "--mesh-scale",
     "mesh.unit": "--mesh-unit",
@@ -131,7 +133,15 @@ def ct(
     cutter: Annotated[CutterName, typer.Option(help="auto: Open3D, and numpy for more than 50 sections; same points.")] = "auto",
     weld: Annotated[float, typer.Option(metavar="MM", help="Loose ends no farther apart are one point.")] = 1e-6,
     shortest: Annotated[float | None, typer.Option(metavar="MM", help="Shorter pieces are dust; 5 % of the longest if not given.")] = None,
-    pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="Draw them into the folder of --out.")] = True,
+    pictures: Annotated[
+        PicturesWanted,
+        typer.Option(
+            "--pictures", help="Which sections are drawn into the folder of --out: needed are those that do not conform, or not provably."
+        ),
+    ] = "needed",
+    no_pictures: Annotated[
+        bool, typer.Option("--no-pictures", help="Draw none, and write no report; the same as --pictures none.")
+    ] = False,
     out: Out = None,
     records: Records = None,
     no_record: NoRecord = False,
@@ -140,6 +150,7 @@ def ct(
     """Inspect sections of a CT surface, and record each as a run."""
     from cmmlink.plan import CtPlan, load_ct_plan, plan_given_by
 
+    pictures = "none" if no_pictures else pictures
     if mesh.suffix.lower() in (".yaml", ".yml"):
         beside = [name for name in _options_given(context) if name not in _BESIDE_A_PLAN]
         if beside:
@@ -179,7 +190,7 @@ def ct(
     return _inspect_stack(plan_given_by(CtPlan, settings, _OPTION_OF), Output(False, as_json, out, records), pictures, no_record)
 
 
-def _inspect_stack(plan: "CtPlan", output: Output, pictures: bool, no_record: bool) -> int:
+def _inspect_stack(plan: "CtPlan", output: Output, pictures: PicturesWanted, no_record: bool) -> int:
     """Inspect a stack with a progress bar; write its files and print what came of it, each even if the other fails."""
     from rich.console import Console
 
@@ -189,7 +200,8 @@ def _inspect_stack(plan: "CtPlan", output: Output, pictures: bool, no_record: bo
     prepare(pattern)
     bar = _SectionBar(Console(stderr=True), visible=not output.as_json and sys.stderr.isatty())
     with Pictures() as processes:
-        wanted = SectionPictures(plan.part.name, processes) if pictures and pattern is not None else None
+        drawn = pictures != "none" and pattern is not None
+        wanted = SectionPictures(plan.part.name, processes, every=pictures == "all") if drawn else None
         stack = _judge_stack(plan, output, bar, wanted, no_record)
         folder = None if pattern is None else stack.folder_of(pattern, plan)
         try:
@@ -203,9 +215,11 @@ def _inspect_stack(plan: "CtPlan", output: Output, pictures: bool, no_record: bo
             else:
                 _print_stack(terminal(), stack)
     if folder is not None and not output.as_json:
-        drawn = ", stack.png, stack.svg, report.pdf" if pictures else ""
+        whole = ", stack.png, stack.svg, report.pdf" if drawn else ""
         further = "".join(f", result.{name}" for name in plan.out.formats if name != "json")
-        typer.echo(f"results in {folder}: result.json, sections.csv, a folder for each section{drawn}{further}")
+        typer.echo(f"results in {folder}: result.json, sections.csv, a folder for each section{whole}{further}")
+        if wanted is not None and (left := sum(not wanted.wants(section) for section in stack.sections)):
+            typer.echo(f"sections that were not drawn: {left}; --pictures all draws those that conform as well")
     return EXIT_OF[stack.verdict]
 
 
@@ -281,33 +295,44 @@ class _SectionBar:
 
 
 def _print_stack(console: "Console", stack: "StackOutcome") -> None:
-    """Print the verdict, a line for each section, and the warnings."""
+    """Print a line for each section, what is to be said of them and of the whole, and last the verdict, which then stands on the screen."""
     from rich.markup import escape
 
     from cmmlink.report import STYLE_OF
 
     counts = stack.result_json()
     cutters = ", ".join(sorted({section.slice.cutter for section in stack.sections}))
-    missing = "" if stack.complete else f" of {stack.asked}"
-    headline = headline_of(stack.verdict, stack.ending, len(stack.sections) / stack.asked)
-    console.print(
-        f"[{STYLE_OF[headline.shape]}]{headline.words}[/]  {len(stack.sections)}{missing} sections of {escape(stack.mesh.source)}"
-    )
     console.print(f"{stack.mesh.triangles} triangles ({stack.mesh.kind}), cut by {cutters}")
-    console.print(f"received {counts['received']} = judged {counts['judged']} + rejected {counts['rejected']}; lost {counts['lost']}")
     console.print(
         f"{'height mm':>11}  {'verdict':11}  {'lowest':>7}  {'highest':>7}  {'rms':>6}  {'out':>5}  {'worst at':>8}  covered  aside"
     )
     for section in stack.sections:
         console.print(_line(section))
     _print_characteristics(console, stack)
-    told = [f"height {section.slice.asked_mm:g} mm: {text}" for section in stack.sections for text in section.warnings]
+    told = list(_grouped([(section.slice.asked_mm, text) for section in stack.sections for text in section.warnings]))
     for text in told[:_MOST_WARNINGS]:
         console.print(f"  {text}", style="yellow", markup=False)
     if len(told) > _MOST_WARNINGS:
         console.print(f"  and {len(told) - _MOST_WARNINGS} more warnings, all of them with --json", style="yellow")
-    for note in stack.notes:
+    for note in dict.fromkeys(stack.notes):
         console.print(f"  note: {note}", markup=False)
+    console.print(f"received {counts['received']} = judged {counts['judged']} + rejected {counts['rejected']}; lost {counts['lost']}")
+    missing = "" if stack.complete else f" of {stack.asked}"
+    headline = headline_of(stack.verdict, stack.ending, len(stack.sections) / stack.asked)
+    console.print(
+        f"[{STYLE_OF[headline.shape]}]{headline.words}[/]  {len(stack.sections)}{missing} sections of {escape(stack.mesh.source)}"
+    )
+
+
+def _grouped(told: Sequence[tuple[float, str]]) -> Iterator[str]:
+    """What is said of sections, from pairs of height and sentence: each sentence once, with the heights that it is said of."""
+    heights: dict[str, list[float]] = {}
+    for height_mm, text in told:
+        heights.setdefault(text, []).append(height_mm)
+    for text, places in heights.items():
+        shown = ", ".join(f"{place:g}" for place in places[:_MOST_HEIGHTS])
+        more = f" and {len(places) - _MOST_HEIGHTS} more" if len(places) > _MOST_HEIGHTS else ""
+        yield f"{'height' if len(places) == 1 else 'heights'} {shown}{more} mm: {text}"
 
 
 def _print_characteristics(console: "Console", stack: "StackOutcome") -> None:

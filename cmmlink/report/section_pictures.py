@@ -7,6 +7,7 @@ from cmmlink.other_processes import processes_here
 from cmmlink.report.judged_scan import scan_of
 from cmmlink.report.picture_content import PictureContent, content_of
 from cmmlink.report.picture_processes import Drawing, Pictures, drawn_by_none
+from inspection import Verdict
 
 if TYPE_CHECKING:
     from cmmlink.stack import SectionOutcome
@@ -18,22 +19,32 @@ _WORTH_A_PROCESS = 8  # pictures: it takes as long to load matplotlib
 class SectionPictures:
     """Pictures of the sections of one stack, in the order of its sections."""
 
-    def __init__(self, title: str, pictures: Pictures) -> None:
-        self._title, self._pictures = title, pictures
+    def __init__(self, title: str, pictures: Pictures, every: bool = True) -> None:
+        """`every` draws all sections; else those alone that do not conform, or of which that is not proven."""
+        self._title, self._pictures, self._every = title, pictures, every
         self._begun: list[dict[str, Drawing]] = []
+        self._asked = 0
+
+    def wants(self, section: "SectionOutcome") -> bool:
+        """Whether a section is drawn: points were judged, and it is not one of those left out."""
+        return bool(section.run.result is not None and section.run.result.judged and (self._every or section.verdict != Verdict.CONFORM))
 
     def expect(self, sections: int) -> None:
-        """Start the processes that are worth it for so many sections."""
-        self._pictures.start(min(processes_here(), sections // _WORTH_A_PROCESS))
+        """Start the processes that are worth it for so many sections. How many of them do not conform shows later."""
+        if self._every:
+            self._pictures.start(min(processes_here(), sections // _WORTH_A_PROCESS))
 
     def begin(self, section: "SectionOutcome") -> None:
-        """Let another process draw the next section, where there is one and points were judged."""
-        judged = section.run.result is not None and section.run.result.judged
-        content = self._content_of(section) if judged else None
+        """Let another process draw the next section, where there is one and a picture is wanted."""
+        wanted = self.wants(section)
+        self._asked += wanted
+        if wanted and not self._every and self._asked == _WORTH_A_PROCESS:
+            self._pictures.start(processes_here())
+        content = self._content_of(section) if wanted else None
         self._begun.append({} if content is None else {suffix: self._pictures.begin(content, suffix) for suffix in _KINDS})
 
     def write(self, number: int, section: "SectionOutcome", *paths: Path) -> None:
-        """Write the picture of a section, whose number in the stack counts from 1 and in which points were judged, as PNG and SVG."""
+        """Write the picture of a section, whose number in the stack counts from 1 and which is wanted, as PNG and SVG."""
         begun = self._begun[number - 1] if number <= len(self._begun) else {}
         for path in paths:
             self._pictures.write(begun.get(path.suffix, drawn_by_none()), lambda: self._content_of(section), path)

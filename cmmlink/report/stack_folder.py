@@ -73,7 +73,7 @@ def write_stack(
     Of a stack with characteristics there are characteristics.csv and, with the value of each section, stack.csv as well.
 
     plan     : says how report.pdf looks, which is written beside pictures, and in which further formats; None writes none of these
-    pictures : draws those of the sections; None where no picture is wanted
+    pictures : draws those of the sections that it wants; None where no picture is wanted, and no report
     """
     try:
         with new_files(folder, make_room) as files:
@@ -90,7 +90,7 @@ def write_stack(
                     write_deviations(result.blocks(), files(f"{own}/deviations.csv"), section.run.ending)
                     if result.uncertainty is not None:
                         write_uncertainty(result.uncertainty, files(f"{own}/uncertainty.csv"))
-                    if pictures is not None:
+                    if pictures is not None and pictures.wants(section):
                         pictures.write(number, section, files(f"{own}/profile.png"), files(f"{own}/profile.svg"))
                 on_section()
             if pictures is not None:

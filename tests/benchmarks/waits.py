@@ -256,7 +256,7 @@ def _of_commands(folder: Path, long: bool) -> Iterator[Wait]:
         name = f"cmmlink inspect, {count:,} points{', results out' if results else ''}"
         yield Wait(name, partial(_command, folder, ["inspect", str(points), *asked, *results]), goals, limit, rounds)
     surface, heights = _surface_file(curve, folder / "blade.stl", sections=100, around=5_000)
-    sections = ["ct", str(surface), *asked, "--heights", *heights, *out]
+    sections = ["ct", str(surface), *asked, "--heights", *heights, "--pictures", "all", *out]
     yield Wait("cmmlink ct, 100 sections of 5,000 points, results out", partial(_command, folder, sections), {"s": 12.0}, PICTURES, 1)
     yield Wait("first use after installing", partial(_first_use, folder), {"s": 8.0}, COMPILER, 1)
 

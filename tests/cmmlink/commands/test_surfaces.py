@@ -6,6 +6,7 @@ from pathlib import Path
 
 from scipy.interpolate import BSpline
 
+from cmmlink.commands.surfaces import _grouped
 from tests.cmmlink.blade import tapered
 from tests.cmmlink.command import cmmlink
 from tests.drivers.surface.ct_phantom import (
@@ -39,7 +40,7 @@ def test_the_command_writes_results_for_the_stack_and_every_section(blade: tuple
         "--cutter",
         "numpy",
     ]
-    ran = cmmlink("ct", blade[0], *arguments, "--out", out, "--json")
+    ran = cmmlink("ct", blade[0], *arguments, "--out", out, "--pictures", "all", "--json")
     assert ran.code == 0
     facts = json.loads(ran.out)
     assert json.loads((out / "result.json").read_text()) == facts
@@ -66,12 +67,25 @@ def test_the_exit_status_is_that_of_the_worst_section(blade: tuple[Path, Path], 
     mesh = write(tmp_path / "tapered.stl", ascii_stl(tapered(spline)))
     options = ["--nominal", blade[1], "--tolerance", -0.1, 0.1, "--cutter", "numpy"]
     assert cmmlink("ct", mesh, *options, "--heights", 0.2).code == 0
-    ran = cmmlink("ct", mesh, *options, "--heights", 0.2, 10)
+    ran = cmmlink("ct", mesh, *options, "--heights", 0.2, 10, "--out", tmp_path / "out")
     assert ran.code == 1
-    assert "NOT CONFORM  2 sections" in ran.out
+    *_, verdict, written, left = ran.out.splitlines()
+    assert verdict.startswith("NOT CONFORM  2 sections")
+    assert written.startswith("results in ")
+    assert left == "sections that were not drawn: 1; --pictures all draws those that conform as well"
+    assert [path.parent.name for path in (tmp_path / "out").rglob("profile.png")] == ["section-002_10.000mm"]
+    assert len(list((tmp_path / "out").rglob("deviations.csv"))) == 2
     small = write_spline(spline, tmp_path / "small.yaml", 0.95)
     assert cmmlink("ct", mesh, *options, "--heights", 0.2, 10, "--nominal-at", 10, small).code == 0
     assert cmmlink("ct", mesh, *options, "--heights", 0.2, "--uncertainty", 0.099).code == 3
+
+
+def test_what_is_said_of_many_sections_is_said_once_with_their_heights() -> None:
+    told = [(float(height), "The outline is open.") for height in range(10)] + [(3.5, "Nothing was cut.")]
+    assert list(_grouped(told)) == [
+        "heights 0, 1, 2, 3, 4, 5, 6, 7 and 2 more mm: The outline is open.",
+        "height 3.5 mm: Nothing was cut.",
+    ]
 
 
 def test_a_plan_says_the_same_as_options(blade: tuple[Path, Path], tmp_path: Path) -> None:
