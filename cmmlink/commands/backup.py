@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cmmlink.commands.options import Json, Records, records_folder
-from cmmlink.commands.output import now, print_json, progress
+from cmmlink.commands.output import now, print_json
+from cmmlink.commands.progress import progress
 from cmmlink.words import printable
 
 if TYPE_CHECKING:

@@ -23,6 +23,7 @@ from cmmlink.commands.options import (
     section_in,
 )
 from cmmlink.commands.output import now, print_json
+from cmmlink.commands.progress import progress
 from cmmlink.errors import PlanError
 from cmmlink.words import printable
 from inspection import FitName, Material
@@ -93,9 +94,10 @@ def compare(
         one, other = (_scan_of_file(path, {**asked, **file_settings}) for path in files)
     else:
         one, other = _scans_with_a_run(first, second, records_folder(records), file_settings)
-    comparison = compare_scans(one, other, tolerance)
-    if out is not None:
-        _draw(comparison, out)
+    with progress("comparing"):
+        comparison = compare_scans(one, other, tolerance)
+        if out is not None:
+            _draw(comparison, out)
     if as_json:
         print_json(comparison.to_json() | {"file": None if out is None else str(out)})
     else:

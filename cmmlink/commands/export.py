@@ -8,6 +8,7 @@ import typer
 
 from cmmlink.commands.options import Json, Records, records_folder
 from cmmlink.commands.output import now, print_json
+from cmmlink.commands.progress import progress
 from cmmlink.errors import PlanError
 from cmmlink.plan import FormatName
 
@@ -49,11 +50,12 @@ def export(
         raise PlanError(f"all that is on record is exported with {missing}; --format qif, dfq, xlsx, csv or json writes the result alone")
     with open_to_read(records_folder(records), now) as store:
         runs = list(dict.fromkeys(find_run(store, name) for name in names))
-        if not wanted:
-            assert out is not None
-            written = export_run(store, runs[0], out)
-        else:
-            written = _write_formats(store, runs, wanted, out)
+        with progress(f"exporting {runs[0] if len(runs) == 1 else f'{len(runs)} runs'}"):
+            if not wanted:
+                assert out is not None
+                written = export_run(store, runs[0], out)
+            else:
+                written = _write_formats(store, runs, wanted, out)
     if as_json:
         print_json({"run": runs[0], "runs": runs, "files": [str(path) for path in written]})
     else:

@@ -10,6 +10,7 @@ import typer
 
 from cmmlink.commands.exit_codes import DEVICE_FAILED, EXIT_OF, NO_RECORD, UNUSABLE, kind_of_failure, say
 from cmmlink.commands.output import print_json
+from cmmlink.commands.progress import progress
 from cmmlink.errors import PlanError, RunError, StoreError
 from cmmlink.words import headline_of, printable
 from drivers import DeviceError, PointFileError
@@ -59,7 +60,9 @@ def inspect_files(
         if stop.is_set():
             rows += [_failure(left, PlanError("not inspected: stopped by the operator"), UNUSABLE) for left in files[len(rows) :]]
             break
-        rows.append(_inspected(file, folder, inspect, pictures))
+        with progress(f"inspecting {file.name}, {len(rows) + 1} of {len(files)}") as tell:
+            tell(len(rows) / len(files))
+            rows.append(_inspected(file, folder, inspect, pictures))
         if rows[-1].error is not None:
             say(str(rows[-1].error["message"]))
     worst = min((row.code for row in rows), key=_WORST_FIRST.index)

@@ -4,8 +4,7 @@ import json
 import signal
 import sys
 import threading
-import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from cmmlink.commands.exit_codes import DEVICE_FAILED, EXIT_OF, NO_RECORD, UNUSABLE, say
+from cmmlink.commands.progress import progress
 from cmmlink.errors import StoreError
 from inspection import NotMeasured
 
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from cmmlink.report import Pictures
     from cmmlink.run import FinishedRun
 
-_PATIENCE_S = 1.0  # before a bar shows how far a command has come
 _STOPPING = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")  # as far as the system has them
 
 
@@ -87,7 +86,8 @@ def report_outcome(run: "FinishedRun", output: Output, pictures: "Pictures | Non
             from cmmlink.report import write_run
 
             folder = run.folder_of(output.out)
-            written = write_run(folder, run, pictures)
+            with progress(f"writing results to {folder}"):
+                written = write_run(folder, run, pictures)
     finally:
         if output.as_json:
             print_json(run.result_json())
@@ -125,31 +125,3 @@ def stop_on_ctrl_c() -> Iterator[threading.Event]:
         yield stop
     finally:
         restore()
-
-
-@contextmanager
-def progress(what: str) -> Iterator[Callable[[float], None]]:
-    """Yield what is told the share done, from 0 to 1. After a second it shows as a bar, where somebody looks at standard error."""
-    if not sys.stderr.isatty():
-        yield lambda share: None
-        return
-    began, bar, task = time.monotonic(), None, None
-
-    def tell(share: float) -> None:
-        nonlocal bar, task
-        if bar is None and time.monotonic() - began > _PATIENCE_S:
-            from rich.console import Console
-            from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
-
-            columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-            bar = Progress(*columns, console=Console(stderr=True), transient=True)
-            bar.start()
-            task = bar.add_task(what, total=1.0)
-        if bar is not None and task is not None:
-            bar.update(task, completed=share)
-
-    try:
-        yield tell
-    finally:
-        if bar is not None:
-            bar.stop()

@@ -34,6 +34,7 @@ from cmmlink.commands.options import (
     section_in,
 )
 from cmmlink.commands.output import Output, now, report_outcome, stop_on_ctrl_c
+from cmmlink.commands.progress import progress
 from cmmlink.errors import PlanError
 from cmmlink.words import printable
 from inspection import FitName, Material, Method
@@ -149,5 +150,6 @@ def inspect(
         pictures.start(min(processes_here(), 0 if out is None else 1))  # it loads what it draws with while points are read and judged
         if len(points) > 1:
             return inspect_files(points, inspect_one, out, pictures, stop, as_json=as_json)
-        finished = inspect_one(points[0], out)
+        with progress(f"inspecting {points[0].name}"):
+            finished = inspect_one(points[0], out)
         return report_outcome(finished, Output(headless=True, as_json=as_json, out=out), pictures)

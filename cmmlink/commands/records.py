@@ -12,6 +12,7 @@ import typer
 from cmmlink.commands.exit_codes import EXIT_OF, NO_RECORD, UNUSABLE, fail
 from cmmlink.commands.options import Json, Out, Records, RunName, records_folder
 from cmmlink.commands.output import now, print_json, terminal
+from cmmlink.commands.progress import progress
 from cmmlink.errors import PlanError
 from cmmlink.version import RESULT_SCHEMA
 from cmmlink.words import headline_of, local_words, printable, section_words, utc_words
@@ -139,7 +140,8 @@ def replay(
         recorded = recorded_run(store, find_run(store, name))
         if reason is not None and recorded.end is None:
             raise PlanError(f"run {recorded.run} has no end yet: it can be judged again when it has")
-        again = replay_run(store, recorded, decoder_of, tolerance=tolerance, method=method, settings=changes)
+        with progress(f"judging run {recorded.run} again"):
+            again = replay_run(store, recorded, decoder_of, tolerance=tolerance, method=method, settings=changes)
     kept = None
     if reason is not None:
         with open_to_record(folder, now) as store:
@@ -157,7 +159,8 @@ def replay(
         from cmmlink.report import input_of_replay, write_results
 
         title, report = f"{recorded.header['part']}, run {recorded.run} replayed", input_of_replay(again, document, recorded)
-        write_results(out, document, again.outcome.result, again.profile, title, report=report)
+        with progress(f"writing results to {out}"):
+            write_results(out, document, again.outcome.result, again.profile, title, report=report)
     if as_json:
         print_json(document)
     else:
@@ -224,7 +227,8 @@ def verify(
         run = find_run(store, name) if name else None
         if result is not None and run not in (None, result["run"]):
             raise PlanError(f"{against}: it is the result of run {result['run']}, not of run {run}")
-        found = check_chain(store, None if result is not None else run)
+        with progress("recomputing the hashes"):
+            found = check_chain(store, None if result is not None else run)
         if result is not None:
             found["against"] = {"run": result["run"], "disagreements": [] if found["altered"] else disagreements(store, result)}
     if as_json:

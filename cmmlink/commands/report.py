@@ -8,6 +8,7 @@ import typer
 
 from cmmlink.commands.options import Json, Records, RunName, records_folder
 from cmmlink.commands.output import now, print_json
+from cmmlink.commands.progress import progress
 from cmmlink.errors import PlanError, RunError
 from cmmlink.plan import LanguageName, PaperName, SectionPages
 
@@ -45,7 +46,7 @@ def report(
         found, write = _report_of(store, name, stack, look)
         file = out or Path(f"{found}.pdf")
         try:
-            with new_files(file.parent) as files:
+            with new_files(file.parent) as files, progress(f"writing {file.name}"):
                 write(files(file.name))
         except OSError as error:
             raise PlanError(f"{file}: the report cannot be written there ({error.strerror}); choose another file with --out") from None
