@@ -7,7 +7,7 @@ INSTALL := $(PIP) --no-build-isolation --editable
 # The tests start a hundred processes; where Python may keep no compiled files, each of them compiles every file anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo install test checks compiled lowest lowest-compiled lowest-drivers platforms upgrade bench slower paper faults powercuts kills fuzz soak damage memory proofs laws audit supply-chain
+.PHONY: demo install test checks compiled lowest lowest-compiled lowest-drivers platforms upgrade bench slower paper faults powercuts kills fuzz soak damage memory proofs laws audit supply-chain docs
 demo: .venv/installed
 	$(BIN)/cmmlink demo --out demo-result
 
@@ -87,6 +87,13 @@ soak: .venv/test-installed
 kills: .venv/test-installed
 	$(BIN)/python -m tests.integration.killed soak 100
 
+# The API reference for a browser, from the docstrings of the front doors, after the pages that come from the models.
+DOCS_IN ?= build/docs
+docs: .venv/docs-installed
+	$(BIN)/python docs/generate.py
+	PYTHONPATH=. $(BIN)/python docs/api.py $(DOCS_IN)
+	@echo "$(DOCS_IN)/index.html"
+
 # Licences of all that is installed, and known vulnerabilities of what is pinned, as far as the package index can be asked.
 supply-chain: .venv/test-installed
 	.ci/supply-chain $(BIN)
@@ -146,6 +153,10 @@ paper: .venv/bench-installed
 
 .venv/test-installed: .venv/all-installed
 	$(INSTALL) '.[test]'
+	touch $@
+
+.venv/docs-installed: .venv/all-installed
+	$(PIP) pdoc
 	touch $@
 
 .venv/bench-installed: .venv/test-installed

@@ -94,8 +94,10 @@ def inspect(
     device = {"type": "file", "file": file or _HANDED_OVER, "unit": unit, "columns": columns, "invalid": tuple(invalid)}
     curve: NominalFile | NominalProfile | None = None
     if plan is not None:
-        if nominal is not None or tolerance is not None or plan_keys:
-            raise PlanError("plan stands in place of nominal, tolerance and the other keys of a plan; expected either of them")
+        given = {"nominal": nominal, "tolerance": tolerance, "closed": closed, "material": material, "part": part, **plan_keys}
+        beside = [name for name, value in given.items() if value is not None] + (["scale"] if scale != 1.0 else [])
+        if beside:
+            raise PlanError(f"{beside[0]} stands beside a plan, which says it all itself; expected either of them")
         plan = plan.model_copy(update={"device": plan_given_by(FileDevice, device, {})})
     else:
         if nominal is None:

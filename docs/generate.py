@@ -1,5 +1,6 @@
 """Write the pages of docs that come from the models: `python docs/generate.py`; a test compares them with what stands there."""
 
+import ast
 import inspect
 import json
 from collections.abc import Callable, Mapping, Set
@@ -42,6 +43,7 @@ from drivers.codecs import decoders
 from drivers.codecs.register_map import PATTERNS, POINTS_FIELDS, POP_FIELDS, STATUS_FIELDS, RegisterMap
 
 DOCS = Path(__file__).parent
+EXAMPLES = DOCS / "examples"
 WRITTEN = "<!-- Written by docs/generate.py from the models. Change the descriptions there, then run it. -->\n"
 
 PLAN = """
@@ -108,6 +110,12 @@ the folder of `--out` holds the same object. Its key `schema` names its version,
 schema of it.
 """
 
+GALLERY = """
+# Gallery
+
+Every example as it stands in docs/examples: what it shows, its code, and what it prints. A test runs each of them.
+"""
+
 PYTHON = """
 # In Python
 
@@ -128,7 +136,8 @@ print(found.points.deviation_mm.shape)  # (800,)
 `found` shows itself in a notebook; `found.plot()` is a matplotlib figure, `found.to_columns()` and `found.to_dataframe()` are the points
 with the columns of deviations.csv, and `found.document` has the keys of result.json. `cmmlink.open_run("last")` gives the same of a
 recorded run, and `plan=cmmlink.load_plan(Path("plan.yaml"))` stands in place of the other arguments.
-[Example 06](examples/06_one_call.py) walks through it.
+[Example 06](examples/06_one_call.py) walks through it, and the [gallery](gallery.md) shows all examples. `make docs` writes what stands below,
+with every docstring, as pages for a browser.
 """
 
 OBJECTS: tuple[tuple[str, type[BaseModel], type[BaseModel] | None], ...] = (
@@ -250,6 +259,23 @@ def _register_map() -> str:
     return "\n".join([page(REGISTER_MAP, RegisterMap), named("The four patterns", PATTERNS), *fields])
 
 
+def gallery() -> str:
+    """Every example with its docstring as the text, and its code; a test runs each and holds it to what it says that it prints."""
+    scripts = sorted([*EXAMPLES.glob("[0-9]*.py"), *EXAMPLES.glob("[0-9]*/*.py")], key=lambda script: script.relative_to(EXAMPLES).parts)
+    return "\n".join([WRITTEN, GALLERY.strip(), *map(_example, scripts)])
+
+
+def _example(script: Path) -> str:
+    text = script.read_text(encoding="utf-8")
+    told, code = inspect.cleandoc(ast.get_docstring(ast.parse(text)) or ""), text.split('"""', 2)[2].strip()
+    title, _, rest = told.partition("\n")
+    said, _, printed = rest.strip().partition("It prints:")
+    place = script.relative_to(DOCS).as_posix()
+    parts = [f"\n## {script.relative_to(EXAMPLES).parts[0][:2]}: {title.rstrip('.')}", said.strip(), f"[{script.name}]({place})"]
+    parts += [f"```py\n{code}\n```", f"prints\n\n```text\n{inspect.cleandoc(printed)}\n```"]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
 def result_schema() -> str:
     """The JSON schema of result.json. Keys may be added without another version, so a reader has to pass over what it does not know."""
     found: dict[str, Any] = TypeAdapter(Recorded | Measured | Replayed | StackInspected).json_schema()
@@ -267,6 +293,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "results.md": results,
     "result.schema.json": result_schema,
     "python.md": front_doors,
+    "gallery.md": gallery,
 }
 
 if __name__ == "__main__":

@@ -80,8 +80,10 @@ def test_a_plan_stands_in_place_of_all_but_the_points(tmp_path: Path) -> None:
     )
     plan = load_plan(plan_file)
     np.testing.assert_allclose(front.inspect(points, plan=plan).points.deviation_mm, bumped(), atol=1e-8)
-    with pytest.raises(PlanError, match="plan stands in place"):
-        front.inspect(points, plan=plan, tolerance=(0, 1))
+    asked: tuple[dict[str, Any], ...] = ({"tolerance": (0, 1)}, {"scale": 2.0}, {"part": "p"}, {"rule": "best-fit"})
+    for beside in asked:
+        with pytest.raises(PlanError, match=f"{next(iter(beside))} stands beside a plan"):
+            front.inspect(points, plan=plan, **beside)
 
 
 @pytest.mark.parametrize(
