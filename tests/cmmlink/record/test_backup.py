@@ -87,9 +87,14 @@ def test_a_backup_made_while_a_run_is_recorded_holds_what_was_acknowledged(stati
 
 def test_what_is_recorded_while_pages_are_copied_is_not_half_in_the_backup(station: Path, tmp_path: Path) -> None:
     """Another connection commits between any two pieces of the copy."""
+    count = iter(range(1000))
     with opened(station, writing=True) as recording, opened(station) as reading:
-        count = iter(range(1000))
-        reading.back_up(tmp_path / FILE_NAME, lambda _: recording.append([Draft("c", "run", b"x" * 9000 + b"%d" % next(count))]) and None)
+
+        def commit(_: float) -> None:
+            recording.append([Draft("c", "wire", b"x" * 9000 + b"%d" % next(count))])
+
+        reading.back_up(tmp_path / FILE_NAME, commit)
+    assert next(count) > 0
     with opened(tmp_path) as copy:
         assert copy.first_alteration()[:2] == (None, 6)
 
