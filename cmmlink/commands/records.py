@@ -1,4 +1,4 @@
-"""Commands on what was recorded: list, show, evaluate again, verify."""
+"""Commands on what was recorded: list, show, judge again, verify."""
 
 import getpass
 from collections.abc import Mapping, Sequence
@@ -106,11 +106,11 @@ def _say(text: str) -> None:
 
 def replay(
     name: RunName,
-    tolerance: Annotated[tuple[float, float] | None, typer.Option(metavar="LO HI", help="Evaluate with another tolerance, mm.")] = None,
-    method: Annotated[Method | None, typer.Option(help="Evaluate with another method.")] = None,
+    tolerance: Annotated[tuple[float, float] | None, typer.Option(metavar="LO HI", help="Judge with another tolerance, mm.")] = None,
+    method: Annotated[Method | None, typer.Option(help="Judge with another method.")] = None,
     settings: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Evaluate with another value of any key of the plan; as often as wanted."),
+        typer.Option("--set", metavar="KEY=VALUE", help="Judge with another value of any key of the plan; as often as wanted."),
     ] = None,
     reason: Annotated[
         str | None, typer.Option("--reason", metavar="TEXT", help="Why: what was found is then kept in the records, chained to the run.")
@@ -122,7 +122,7 @@ def replay(
     records: Records = None,
     as_json: Json = False,
 ) -> int:
-    """Evaluate a recorded run once more; with nothing changed the result is the same to the last bit.
+    """Judge a recorded run once more; with nothing changed the result is the same to the last bit.
 
     With --set, --tolerance or --method it is another judgement. The record of the run stays as it is; with a --reason, which --set asks
     for, the new judgement is added to the records with who, when and why, and `cmmlink show` tells it.
@@ -196,7 +196,7 @@ def _user() -> str:
 def _print_replay(again: "Replay", run_id: str) -> None:
     from cmmlink.report import print_summary
 
-    heading = f"run {run_id}, evaluated again"
+    heading = f"run {run_id}, judged again"
     print_summary(terminal(), again.outcome.result, again.outcome.counts, heading, again.outcome.ending, again.notes)
     for title, changes in (("changed", again.changed), ("differs", again.differs)):
         for change in changes:

@@ -120,6 +120,7 @@ def test_help_lists_every_command_with_its_meaning(option: str) -> None:
     for command in COMMANDS:
         assert re.search(rf"^  {command} +[A-Z].*[a-z]\.$", ended.out, re.MULTILINE), command
     assert "0 conform, 1 nonconform, 3 uncertain" in ended.out
+    assert not re.search(r"[a-z,]\.\.\.$", ended.out, re.MULTILINE)  # every meaning is whole
 
 
 def test_no_command_shows_the_help_and_is_no_success() -> None:
