@@ -9,6 +9,7 @@ from cmmlink.commands.options import Json, Records, records_folder
 from cmmlink.commands.output import now, print_json
 from cmmlink.commands.progress import progress
 from cmmlink.words import printable
+from drivers import count_of
 
 if TYPE_CHECKING:
     from cmmlink.record import Copied
@@ -75,7 +76,7 @@ def _tell(made: "Copied", what: str, as_json: bool) -> int:
     if as_json:
         print_json(_document(made))
         return 0
-    typer.echo(printable(f"{what}: {made.runs} runs, {made.records} records, chain {made.chain_sha256}"))
+    typer.echo(printable(f"{what}: {count_of(made.runs, 'run')}, {count_of(made.records, 'record')}, chain {made.chain_sha256}"))
     for names, told in ((made.added, "added"), (made.unfinished, "without an end")):
         if names:
             more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""

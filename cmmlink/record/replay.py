@@ -93,7 +93,7 @@ def replay_run(
     """
     altered, _, _ = store.first_alteration(recorded.run)
     if altered is not None:
-        raise StoreError(f"{store.path}: {altered}; what was altered is not evaluated again")
+        raise StoreError(f"{store.path}: {altered}; what was altered is not judged again")
     plan = recorded_plan(recorded)
     changed = _with_changes(plan, tolerance, method, settings or {})
     profile = profile or recorded_profile(changed, recorded)
@@ -136,7 +136,7 @@ class _Reading:
         if self._failure is not None:
             raise self._failure
         if outcome.failure is not None and not self._has_begun:
-            raise StoreError(f"run {run} cannot be evaluated again: {outcome.failure}")
+            raise StoreError(f"run {run} cannot be judged again: {outcome.failure}")
 
 
 def recorded_plan(recorded: RecordedRun) -> Plan:

@@ -50,7 +50,7 @@ def identity_block(report: ReportInput, say: Speech, width: float) -> Table:
     right = [
         (say("Measured at"), moment_words(document.get("measured_at"))),
         (say("Operator"), document.get("operator")),
-        (say("Run"), (say("{run}, evaluated again", run=run) if document.get("replay_of") else run) or say("not recorded")),
+        (say("Run"), (say("{run}, judged again", run=run) if document.get("replay_of") else run) or say("not recorded")),
         (say("Software"), software_words(document.get("software"))),
     ]
     code = code_of(document)

@@ -40,6 +40,6 @@ def zone_in(tolerance: Mapping[str, Any]) -> ToleranceZone:
 
 
 def input_of_replay(again: Replay, document: Mapping[str, Any], recorded: RecordedRun) -> ReportInput:
-    """What the report of a run that was evaluated again is made of, without its drawings; `document` is what is printed of it."""
+    """What the report of a run that was judged again is made of, without its drawings; `document` is what is printed of it."""
     known = {**identity_json(RunStarted.from_header(recorded.header)), "software": software(), **document}
     return ReportInput(known, again.plan, str(again.outcome.failure or again.outcome.refusal or ""))

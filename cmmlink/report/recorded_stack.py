@@ -1,6 +1,6 @@
 """What the report of a stack on record is made of: its sections as they were recorded, and the plan of the stack.
 
-The characteristics of a stack are not on record themselves, but all that they are worked out of is: each section is evaluated again.
+The characteristics of a stack are not on record themselves, but all that they are worked out of is: each section is judged again.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -125,7 +125,7 @@ def _characteristics(
             outcome = again.outcome
             differs += [one.run] if again.identical is False else []
         judged.append(JudgedSection(place["asked_height_mm"], place["height_mm"], outcome))
-    told = ["the characteristics of the stack were evaluated again from the points on record"]
+    told = ["the characteristics of the stack were judged again from the points on record"]
     if differs:
-        told.append(f"evaluated again, {len(differs)} sections are not what is on record, the first of them run {differs[0]}")
+        told.append(f"judged again, {len(differs)} sections are not what is on record, the first of them run {differs[0]}")
     return tuple(stack_characteristic_json(found) for found in questions.judge(judged, asked)), told

@@ -41,7 +41,7 @@ def test_language_paper_and_company_are_options(measured: Path, tmp_path: Path) 
 def test_a_replay_says_that_it_is_one(measured: Path, tmp_path: Path) -> None:
     cmmlink("replay", "last", "--tolerance", -0.3, 0.3, "--out", tmp_path / "again", "--records", measured.parent)
     told = PdfReader(tmp_path / "again" / "report.pdf").pages[0].extract_text()
-    assert "evaluated again" in told
+    assert "judged again" in told
     assert "NOT CONFORM" not in told
 
 

@@ -73,7 +73,7 @@ def test_characteristics_of_a_stack_come_out_of_the_records_and_every_section_ha
     (twist,) = found["characteristics"]
     assert abs(twist["value"]) == pytest.approx(0.3, abs=1e-3)
     assert f"twist deg {twist['value']:.4f} 0.0000 {twist['deviation']:+.4f} -0.5 +0.5" in pages[0]
-    assert "evaluated again from the points on record" in " ".join(pages)
+    assert "judged again from the points on record" in " ".join(pages)
     assert "not what is on record" not in " ".join(pages)
     for height in (5, 15):
         assert any(f"at height {height:.3f} mm" in page for page in pages[1:])
