@@ -6,7 +6,7 @@
 
 A run with a device, which is recorded:
 
-    plan = load_plan(Path("blade.yaml"))
+    plan = load_plan("blade.yaml")
     profile = profile_of(plan)
     with connect(plan) as device:
         run = carry_out(plan, profile, device, records=None, clock=time.monotonic, now=lambda: datetime.now(UTC), stop=Event())

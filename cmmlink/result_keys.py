@@ -367,6 +367,9 @@ class Against(JsonObject):
 
     run: str = Field(description="the run that the result file names")
     disagreements: list[str] = Field(description="what the two say differently, in words; empty where they agree")
+    taken_over: bool = Field(
+        description="whether the result was written at another station, which the run was merged from: then it covers that run alone"
+    )
 
 
 class Verified(JsonObject):

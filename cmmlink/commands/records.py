@@ -31,6 +31,10 @@ _PROVES_AGAINST = (
     "The result of run {run} and the records agree: nothing up to the end of that run was changed, cut off or added since the result was "
     "written. What was recorded later is not covered by it."
 )
+_PROVES_OF_MERGED = (
+    "The result of run {run} and the records agree: the run was merged from another station, and nothing of it was changed since the "
+    "result was written there. The other records are not covered by it."
+)
 _LONGEST_HEADLINE = len("INTERRUPTED AT 99 %")
 
 
@@ -220,7 +224,7 @@ def verify(
     A chain has no key: whoever may write the file can write it anew, hashes and all, or cut off its end. A result file that was kept
     elsewhere shows that, with --against.
     """
-    from cmmlink.record import check_chain, disagreements, find_run, open_to_read, read_result
+    from cmmlink.record import check_chain, disagreements, find_run, open_to_read, origin_of, read_result
 
     result = None if against is None else read_result(against)
     with open_to_read(records_folder(records), now, close_interrupted=False) as store:
@@ -230,7 +234,10 @@ def verify(
         with progress("recomputing the hashes"):
             found = check_chain(store, None if result is not None else run)
         if result is not None:
-            found["against"] = {"run": result["run"], "disagreements": [] if found["altered"] else disagreements(store, result)}
+            told = [] if found["altered"] else disagreements(store, result)
+            origin = None if told or found["altered"] else origin_of(store, result["run"])
+            taken_over = origin is not None and origin.chain_sha256 == result["chain_sha256"]
+            found["against"] = {"run": result["run"], "disagreements": told, "taken_over": taken_over}
     if as_json:
         print_json(found)
     return _verified(found, silent=as_json)
@@ -238,7 +245,7 @@ def verify(
 
 def _verified(found: Mapping[str, Any], silent: bool) -> int:
     """Say what was found, and what that proves. Returns the exit code."""
-    against = found.get("against", {"run": None, "disagreements": []})
+    against = found.get("against", {"run": None, "disagreements": [], "taken_over": False})
     if found["altered"]:
         return NO_RECORD if silent else fail(found["first"]["message"], NO_RECORD)
     if against["disagreements"]:
@@ -247,5 +254,6 @@ def _verified(found: Mapping[str, Any], silent: bool) -> int:
         return NO_RECORD if silent else fail(told + (f"; and {more} more" if more > 0 else ""), NO_RECORD)
     if not silent:
         typer.echo(f"nothing was altered: {found['records']} records, chain {found['chain_sha256']}")
-        typer.echo(_PROVES if against["run"] is None else _PROVES_AGAINST.format(run=against["run"]))
+        proves = _PROVES if against["run"] is None else _PROVES_OF_MERGED if against["taken_over"] else _PROVES_AGAINST
+        typer.echo(proves.format(run=against["run"]))
     return 0

@@ -8,6 +8,7 @@ import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from math import hypot
+from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -305,8 +306,9 @@ class Plan(Deciding):
         return self.model_copy(update={"device": self.device.model_copy(update={"address": address})})
 
 
-def load_plan(path: Path) -> Plan:
+def load_plan(path: str | PathLike[str]) -> Plan:
     """Read and check a plan. Raises PlanError: file, line, key, the value found and what is allowed."""
+    path = Path(path)
     try:
         text = read_text(path)
     except PointFileError as error:

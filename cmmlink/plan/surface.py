@@ -5,6 +5,7 @@ from these descriptions.
 """
 
 from itertools import pairwise
+from os import PathLike
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -139,8 +140,9 @@ class CtPlan(Deciding):
         return asked
 
 
-def load_ct_plan(path: Path) -> CtPlan:
+def load_ct_plan(path: str | PathLike[str]) -> CtPlan:
     """Read and check a plan. Raises PlanError: file, line, key, the value found and what is allowed."""
+    path = Path(path)
     try:
         plan = read_model(read_text(path), CtPlan)
     except PointFileError as error:

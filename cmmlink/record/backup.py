@@ -22,6 +22,7 @@ from cmmlink.record.station_lock import StationLock
 from cmmlink.record.store import FILE_NAME, Store, has_records
 from cmmlink.words import utc_words
 
+_EXPECTED = "expected a backup of records, or a folder of them"
 Now = Callable[[], datetime]
 Tell = Callable[[float], None]
 
@@ -73,6 +74,7 @@ def restore(file: Path, folder: Path, now: Now, *, replace: bool = False, tell: 
     another process records there. Nothing is changed then.
     """
     with _open_given(file, now) as backup:
+        _require_another(backup, folder)
         held = _checked(backup, of=file)
         if has_records(folder) and not replace:
             return _add_what_is_missing(backup, held, folder, now)
@@ -99,6 +101,7 @@ def merge(file: Path, folder: Path, now: Now, tell: Tell = lambda share: None) -
     have a run of one id with different contents: then nothing is added.
     """
     with _open_given(file, now) as other:
+        _require_another(other, folder)
         _checked(other, of=file)
         with open_to_record(folder, now) as store:
             _checked(store, of=store.path)
@@ -196,8 +199,16 @@ def _open_given(file: Path, now: Now) -> Store:
     """Open a file of records, or that of a folder. Raises PlanError where there is none."""
     found = file / FILE_NAME if file.is_dir() else file
     if not found.is_file() or not found.stat().st_size:
-        raise PlanError(f"{found}: there are no records here; expected a backup, or a folder of records")
-    return _open(found, now)
+        raise PlanError(f"{found}: there are no records here; {_EXPECTED}")
+    try:
+        return _open(found, now)
+    except StoreError as error:
+        raise PlanError(f"{str(error).partition('; ')[0]}; {_EXPECTED}") from None
+
+
+def _require_another(given: Store, folder: Path) -> None:
+    if given.path.resolve() == (folder / FILE_NAME).resolve():
+        raise PlanError(f"{given.path}: these are the records themselves; {_EXPECTED.replace('a folder of them', 'the folder of others')}")
 
 
 @contextmanager

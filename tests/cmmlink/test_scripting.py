@@ -78,7 +78,7 @@ def test_a_plan_stands_in_place_of_all_but_the_points(tmp_path: Path) -> None:
         f"device: {{type: file, file: {points.name}}}\nregistration: {{fit: none}}\n",
         encoding="utf-8",
     )
-    plan = load_plan(plan_file)
+    plan = load_plan(str(plan_file))
     np.testing.assert_allclose(front.inspect(points, plan=plan).points.deviation_mm, bumped(), atol=1e-8)
     asked: tuple[dict[str, Any], ...] = ({"tolerance": (0, 1)}, {"scale": 2.0}, {"part": "p"}, {"rule": "best-fit"})
     for beside in asked:

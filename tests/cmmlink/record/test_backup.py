@@ -242,7 +242,10 @@ def test_a_result_of_another_station_is_held_against_the_merged_run(tmp_path: Pa
     assert copied["chain_sha256"] == shown["chain_sha256"]
     assert f"added: {shown['run']}" in cmmlink("merge", tmp_path / "two.sqlite", "--records", tmp_path / "one").out
     against = ("verify", "--records", tmp_path / "one", "--against", tmp_path / "two-result" / "result.json")
-    assert cmmlink(*against).code == 0
+    ended = cmmlink(*against)
+    assert ended.code == 0
+    assert "merged from another station" in ended.out
+    assert cmmlink(*against, "--json").json()["against"]["taken_over"] is True
     assert cmmlink("show", shown["run"], "--records", tmp_path / "one", "--json").json()["origin"]["chain_sha256"] == shown["chain_sha256"]
     assert cmmlink("replay", shown["run"], "--records", tmp_path / "one", "--json").json()["identical"] is True
     forged = json.loads((tmp_path / "two-result" / "result.json").read_text(encoding="utf-8")) | {"chain_sha256": "0" * 64}
@@ -256,3 +259,24 @@ def test_open_to_read_takes_a_restored_folder(made: Path, tmp_path: Path) -> Non
     with open_to_read(tmp_path / "new", today) as store:
         assert store.count_runs() == 3
         assert store.first_alteration()[0] is None
+
+
+@pytest.mark.parametrize("content", [b"no database at all, but long enough to be one" * 40, b"SQLite format 3\x00" + bytes(200), b""])
+def test_what_is_no_backup_is_told_as_that(content: bytes, tmp_path: Path) -> None:
+    (tmp_path / "given.sqlite").write_bytes(content)
+    for bring in (restore, merge):
+        with pytest.raises(PlanError, match=r"given[.]sqlite: .*expected a backup of records"):
+            bring(tmp_path / "given.sqlite", tmp_path / "there", today)
+    assert not (tmp_path / "there" / FILE_NAME).exists()
+
+
+def test_a_database_of_another_program_is_no_backup(tmp_path: Path) -> None:
+    change(tmp_path / "given.sqlite", "CREATE TABLE other (x)")
+    with pytest.raises(PlanError, match="no file of records of cmmlink; expected a backup"):
+        merge(tmp_path / "given.sqlite", tmp_path / "there", today)
+
+
+def test_records_are_not_restored_or_merged_into_themselves(station: Path) -> None:
+    for bring in (restore, merge):
+        with pytest.raises(PlanError, match="these are the records themselves"):
+            bring(station, station, today)
