@@ -10,7 +10,7 @@ A run with a device, which is recorded:
     profile = profile_of(plan)
     with connect(plan) as device:
         run = carry_out(plan, profile, device, records=None, clock=time.monotonic, now=lambda: datetime.now(UTC), stop=Event())
-    run.result_json()["verdict"]
+    run.result_json()["verdict"], inspected_run(run).plot()
 
 A name is loaded when it is used: the command line begins before its libraries are there.
 """

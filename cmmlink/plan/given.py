@@ -24,6 +24,8 @@ def plan_given_by(model: type[Model], settings: Mapping[str, object], name_of: M
         if problem["type"] == "extra_forbidden":
             raise PlanError(f"{place}: this is no key of a plan; `cmmlink plan keys` lists those there are") from None
         name = next((name for key, name in name_of.items() if f"{place}.".startswith(f"{key}.")), place or "the options")
+        if problem["type"] == "missing":
+            raise PlanError(f"{name} is missing") from None
         value = problem["input"]
         found = f" is {value:g}" if isinstance(value, int | float) and not isinstance(value, bool) else ""
         raise PlanError(f"{name}{found}: expected {words_of_allowed(problem)}") from None

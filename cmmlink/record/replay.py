@@ -8,6 +8,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -15,9 +16,10 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from cmmlink.characteristics import notes_on_zone
 from cmmlink.errors import PlanError, StoreError, YamlError
 from cmmlink.events import RunStarted, Sink
-from cmmlink.from_plan import inspection_of, profile_of
+from cmmlink.from_plan import inspection_of, notes_on_datum, notes_on_nominal, notes_on_temperature, profile_of
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan import Device, Plan, read_model, value_of, words_of_allowed
 from cmmlink.record.bodies import PlacedArrival, pack_document
@@ -111,7 +113,10 @@ def replay_run(
     replayed = result_json(outcome.result, outcome.counts)
     changes = (*_settings_changed(plan, changed), *_software_changed(recorded.header["software"]))
     identical, differs = _compare(recorded, replayed, (body for _, body in judged_bodies(outcome.result)))
-    notes = (*started.notes, *density_notes(density_of(stations_of(outcome.result), profile.length_mm), profile.length_mm))
+    notes = (
+        *_notes_on(changed, plan, started.notes, recorded),
+        *density_notes(density_of(stations_of(outcome.result), profile.length_mm), profile.length_mm),
+    )
     return Replay(changed, outcome, profile, replayed, changes, differs, identical, notes)
 
 
@@ -193,6 +198,8 @@ def _with_changes(plan: Plan, tolerance: tuple[float, float] | None, method: str
         key, told = ".".join(map(str, first["loc"])), words_of_allowed(first)
         if first["type"] == "extra_forbidden":
             raise PlanError(f"the recorded plan cannot be changed so: {key} is no key of a plan; `cmmlink plan keys` lists them") from None
+        if first["type"] == "missing":
+            raise PlanError(f"the recorded plan cannot be changed so: {key} is missing; set it as well") from None
         raise PlanError(f"the recorded plan cannot be changed so: {key} is {first['input']!r}; expected {told}") from None
 
 
@@ -244,13 +251,37 @@ def _value_of(key: str, text: str) -> Any:
 
 def recorded_profile(plan: Plan, recorded: RecordedRun) -> NominalProfile:
     """Discretise the nominal from its recorded file; the one that the plan names may have changed since, or be gone."""
+    with _with_recorded_file(plan, recorded) as at_hand:
+        return profile_of(at_hand)
+
+
+@contextmanager
+def _with_recorded_file(plan: Plan, recorded: RecordedRun) -> Iterator[Plan]:
+    """The plan with the nominal's file as it was recorded, which is there while this is entered."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / f"nominal-{plain_name(recorded.header['nominal'])}"
         try:
             file.write_bytes(recorded.nominal)
         except OSError as error:
             raise StoreError(f"{folder}: the nominal cannot be written there: {error.strerror or error}; free some space") from error
-        return profile_of(plan.model_copy(update={"nominal": plan.nominal.model_copy(update={"file": file})}))
+        yield plan.model_copy(update={"nominal": plan.nominal.model_copy(update={"file": file})})
+
+
+def _notes_on(changed: Plan, plan: Plan, noted: Sequence[str], recorded: RecordedRun) -> Iterator[str]:
+    """What was assumed: as it was noted for the recorded plan, but anew where it follows from what was changed."""
+    stale = _notes_from(plan) if changed != plan else []
+    head = f"{plan.nominal.file.name}: "
+    if changed.nominal != plan.nominal:
+        with _with_recorded_file(changed, recorded) as at_hand:
+            yield from (head + note.removeprefix(f"{at_hand.nominal.file.name}: ") for note in notes_on_nominal(at_hand))
+        stale += [note for note in noted if note.startswith(head)]
+    yield from (note for note in noted if note not in stale)
+    if changed != plan:
+        yield from _notes_from(changed)
+
+
+def _notes_from(plan: Plan) -> list[str]:
+    return [*notes_on_datum(plan), *notes_on_temperature(plan), *notes_on_zone(plan)]
 
 
 def _doubt_of(recorded: RecordedRun) -> Reason | None:

@@ -91,7 +91,7 @@ def test_a_plan_stands_in_place_of_all_but_the_points(tmp_path: Path) -> None:
     [
         ({"tolerance": 0.1}, PlanError, "tolerance is 0.1; expected the lower and the upper deviation"),
         ({"tolerance": (0.1, -0.1)}, PlanError, r"tolerance.upper_mm is -0.1: expected a number above the lower limit"),
-        ({}, PlanError, "tolerance"),
+        ({}, PlanError, "^tolerance is missing$"),
         ({"tolerance": (0, 1), "fit": "none"}, PlanError, "fit: this is no key of a plan"),
         ({"tolerance": (0, 1), "registration": {"fit": "x"}}, PlanError, "registration.fit: expected 'best-fit'"),
         ({"tolerance": (0, 1), "scale": 2.0}, PlanError, "scale is 2: it is for a file"),

@@ -58,6 +58,15 @@ def _lines(folder: Path) -> str:
     return f"{head} by {who}; {', '.join(sorted(listed.split(', ')))}; {why}"
 
 
+def test_notes_are_those_of_the_plan_that_judged(measured: tuple[Path, dict[str, Any]]) -> None:
+    folder, shown = measured
+    warm = ("--set", "temperature={part_c: 23, cte_per_k: 1.15e-5, compensate: true, fixed_mm: [0, 0]}", "--reason", "the part was warm")
+    told = again(folder, *warm, "--json").json()
+    assert [note for note in told["notes"] if "23" in note]
+    assert told["max_deviation_mm"] < shown["max_deviation_mm"]
+    assert again(folder, "--json").json()["notes"] == shown["notes"]
+
+
 def test_a_judgement_that_was_altered_is_found(measured: tuple[Path, dict[str, Any]]) -> None:
     folder, _ = measured
     again(folder, "--tolerance", -0.07, 0.07, "--reason", "what if")
@@ -88,6 +97,7 @@ def test_a_judgement_that_was_altered_is_found(measured: tuple[Path, dict[str, A
         (("--set", "device.file=other.csv", "--reason", "r"), "device.file cannot be changed"),
         (("--set", "nominal.file=other.yaml", "--reason", "r"), "nominal.file cannot be changed"),
         (("--set", "rule=[", "--reason", "r"), "not valid YAML"),
+        (("--set", "temperature.part_c=23", "--reason", "r"), "temperature.cte_per_k is missing"),
     ],
 )
 def test_what_cannot_be_changed_is_told_and_leaves_nothing(
