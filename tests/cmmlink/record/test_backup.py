@@ -237,18 +237,19 @@ def test_a_result_of_another_station_is_held_against_the_merged_run(tmp_path: Pa
     nominal, points = write_nominal(tmp_path / "oval.yaml"), write_points(tmp_path / "scan.csv", oval_points(0.0))
     add_run(tmp_path / "one", "x-0001")
     asked = ("inspect", points, "--nominal", nominal, "--tolerance", -0.05, 0.05, "--fit", "none", "--json")
-    shown = cmmlink(*asked, "--records", tmp_path / "two", "--out", tmp_path / "two-result").json()
+    shown = cmmlink(*asked, "--records", tmp_path / "two").json()
+    (tmp_path / "result.json").write_text(json.dumps(shown), encoding="utf-8")
     copied = cmmlink("backup", tmp_path / "two.sqlite", "--records", tmp_path / "two", "--json").json()
     assert copied["chain_sha256"] == shown["chain_sha256"]
     assert f"added: {shown['run']}" in cmmlink("merge", tmp_path / "two.sqlite", "--records", tmp_path / "one").out
-    against = ("verify", "--records", tmp_path / "one", "--against", tmp_path / "two-result" / "result.json")
+    against = ("verify", "--records", tmp_path / "one", "--against", tmp_path / "result.json")
     ended = cmmlink(*against)
     assert ended.code == 0
     assert "merged from another station" in ended.out
     assert cmmlink(*against, "--json").json()["against"]["taken_over"] is True
     assert cmmlink("show", shown["run"], "--records", tmp_path / "one", "--json").json()["origin"]["chain_sha256"] == shown["chain_sha256"]
     assert cmmlink("replay", shown["run"], "--records", tmp_path / "one", "--json").json()["identical"] is True
-    forged = json.loads((tmp_path / "two-result" / "result.json").read_text(encoding="utf-8")) | {"chain_sha256": "0" * 64}
+    forged = shown | {"chain_sha256": "0" * 64}
     (tmp_path / "forged.json").write_text(json.dumps(forged), encoding="utf-8")
     assert "the chain of run" in cmmlink(*against[:-1], tmp_path / "forged.json").failed(5)
 
