@@ -126,7 +126,7 @@ class Inspected:
 def inspected_run(run: "FinishedRun") -> Inspected:
     """What a finished run found. Raises what kept it from a result."""
     outcome = run.outcome
-    problem = outcome.failure or outcome.refusal
+    problem = outcome.failure or run.refusal
     if problem is not None or outcome.result is None:
         raise problem or ValueError(f"{run.title}: no point was judged")
     result = outcome.result

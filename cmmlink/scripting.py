@@ -42,7 +42,7 @@ AnyPath = str | PathLike[str]
 Nominal = AnyPath | Mapping[str, Any] | NurbsCurve | NominalProfile | ArrayLike
 """A file, what a plan says of one, a curve, a discretised profile, or points (k, 2) that the curve goes through."""
 
-_HANDED_OVER = Path("handed-over")  # stands for a file where there is none
+_NOMINAL, _POINTS = Path("nominal"), Path("array of points")  # stand for files where there are none
 _NAME_OF = {
     "nominal.file": "nominal",
     "nominal.scale": "scale",
@@ -91,7 +91,7 @@ def inspect(
     cannot be brought onto the nominal.
     """
     file = _path_in(points)
-    device = {"type": "file", "file": file or _HANDED_OVER, "unit": unit, "columns": columns, "invalid": tuple(invalid)}
+    device = {"type": "file", "file": file or _POINTS, "unit": unit, "columns": columns, "invalid": tuple(invalid)}
     curve: NominalFile | NominalProfile | None = None
     if plan is not None:
         given = {"nominal": nominal, "tolerance": tolerance, "closed": closed, "material": material, "part": part, **plan_keys}
@@ -107,7 +107,7 @@ def inspect(
         settings = {"part": {"name": name}, "nominal": of_file, "device": device, **plan_keys}
         plan = plan_given_by(Plan, settings | _tolerance_in(tolerance), _NAME_OF)
     if file is None:
-        read, place = points_in(points, unit=unit, columns=columns, invalid=invalid), ""
+        read, place = points_in(points, unit=unit, columns=columns, invalid=invalid), f"{_POINTS}: "
     else:
         read, place = read_points(file, unit=unit, columns=columns, invalid=invalid), f"{file.name}: "
     return inspected_run(_judge(plan, curve, PointArraySource(_words(plan), read), tuple(place + note for note in read.notes)))
@@ -156,7 +156,7 @@ def _judge(plan: Plan, curve: NominalFile | NominalProfile | None, source: Point
     if isinstance(curve, NominalProfile):
         profile, assumed = curve, ("the nominal was handed over as a profile: what was assumed when it was made is not told here",)
     elif curve is not None:
-        profile, assumed = discretize_file(curve, Path("nominal"), plan.nominal, plan.discretisation), curve.notes
+        profile, assumed = discretize_file(curve, _NOMINAL, plan.nominal, plan.discretisation), curve.notes
     else:
         profile, assumed, plan = profile_of(plan), notes_on_nominal(plan), with_section(plan)
     assumed = (*assumed, *notes_on_datum(plan), *notes_on_temperature(plan), *notes_on_zone(plan), *notes)
@@ -173,7 +173,7 @@ def _judge(plan: Plan, curve: NominalFile | NominalProfile | None, source: Point
 
 def _words(plan: Plan) -> str:
     device = plan.device
-    return "an array of points" if isinstance(device, FileDevice) and device.file == _HANDED_OVER else words_of(device)
+    return str(_POINTS) if isinstance(device, FileDevice) and device.file == _POINTS else words_of(device)
 
 
 def _path_in(points: object) -> Path | None:
@@ -190,7 +190,7 @@ def _nominal_in(
         return None, {"file": Path(fspath(nominal)), **asked}
     if asked["scale"] != 1.0:
         raise PlanError(f"scale is {asked['scale']:g}: it is for a file; expected a nominal in mm where a curve or points are handed over")
-    material = {"file": _HANDED_OVER, "material": asked["material"]}
+    material = {"file": _NOMINAL, "material": asked["material"]}
     if isinstance(nominal, NominalProfile):
         if closed is not None or asked["material"] is not None:
             raise PlanError("closed and material are settled in a discretised profile; expected neither of them beside it")

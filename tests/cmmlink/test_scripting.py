@@ -65,7 +65,7 @@ def test_rows_without_numbers_never_improve_the_verdict(profile: NominalProfile)
     missing = front.inspect(good, nominal=profile, tolerance=(-0.05, 0.05), **KNOWN)
     assert missing.verdict is Verdict.UNCERTAIN
     assert missing.reasons
-    assert missing.notes[1:] == ("1 row without numbers: rejected",)
+    assert missing.notes[1:] == ("array of points: 1 row without numbers: rejected",)
     assert "handed over as a profile" in missing.notes[0]
     assert np.flatnonzero(np.isnan(missing.points.deviation_mm)).tolist() == [7]
 
