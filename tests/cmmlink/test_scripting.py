@@ -116,6 +116,8 @@ def test_points_of_another_shape_are_refused(profile: NominalProfile) -> None:
 def test_what_contradicts_the_points_raises_and_is_no_verdict(profile: NominalProfile) -> None:
     with pytest.raises(NotMeasured):
         front.inspect(oval_points(0.0) / 25.4, nominal=profile, tolerance=(-0.05, 0.05))
+    with pytest.raises(NotMeasured, match="array of points: read in inch, as asked"):
+        front.inspect(oval_points(0.0), nominal=profile, tolerance=(-0.05, 0.05), unit="inch")
 
 
 def test_a_recorded_run_opens_by_its_name_with_the_same_result(tmp_path: Path) -> None:
