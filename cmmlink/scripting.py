@@ -185,7 +185,10 @@ def _nominal_in(
 ) -> tuple[NominalFile | NominalProfile | None, dict[str, Any]]:
     """The nominal where it was handed over, None where it is in a file; and what a plan says of it."""
     if isinstance(nominal, Mapping):
-        return None, {key: value for key, value in asked.items() if value not in (None, 1.0)} | dict(nominal)
+        given = {key: value for key, value in asked.items() if value is not None and (key, value) != ("scale", 1.0)}
+        if twice := next((key for key in given if key in nominal), None):
+            raise PlanError(f"{twice} is given beside the nominal and in it; expected it once")
+        return None, given | dict(nominal)
     if isinstance(nominal, str | PathLike):
         return None, {"file": Path(fspath(nominal)), **asked}
     if asked["scale"] != 1.0:
@@ -208,7 +211,7 @@ def _tolerance_in(tolerance: tuple[float, float] | Mapping[str, Any] | None) -> 
     if isinstance(tolerance, Mapping):
         return {"tolerance": dict(tolerance)}
     try:
-        lower, upper = tolerance
+        lower, upper = map(float, tolerance)
     except (TypeError, ValueError):
         raise PlanError(f"tolerance is {tolerance!r}; expected the lower and the upper deviation in mm, like (-0.05, 0.05)") from None
     return {"tolerance": {"lower_mm": lower, "upper_mm": upper}}

@@ -123,7 +123,7 @@ def nominal_of_points(points_mm: ArrayLike, closed: bool | None = None) -> Nomin
     from cmmlink.nominal_files.through_points import through_points  # noqa: PLC0415 - it stands on this file
 
     try:
-        points = np.asarray(points_mm, dtype=np.float64)
+        points = np.ma.filled(np.ma.asarray(points_mm, dtype=np.float64), np.nan)  # what a mask hides is no number
     except (TypeError, ValueError):
         raise NominalError("no array of numbers; expected points of shape (k, 2)") from None
     if points.ndim != 2 or points.shape[1] != 2:

@@ -295,10 +295,12 @@ def points_in(
 ) -> PointFile:
     """Take measured points from an array (m, 2) or (m, 3), or a wider one where columns are given, as `read_points` does from a file.
 
+    What a masked array hides is no number: its rows are rejected and counted.
+
     Raises PointFileError: the row (from 0), what was found, what is expected.
     """
     try:
-        values = np.asarray(array)
+        values = np.ma.filled(np.ma.asarray(array, dtype=np.float64), np.nan) if isinstance(array, np.ma.MaskedArray) else np.asarray(array)
     except ValueError:  # rows of different lengths
         raise PointFileError("rows of different lengths; expected numbers of shape (m, 2) or (m, 3)") from None
     return _read_array(values, _Asked(scale, unit, columns, tuple(invalid), np.empty))

@@ -70,6 +70,15 @@ def test_rows_without_numbers_never_improve_the_verdict(profile: NominalProfile)
     assert np.flatnonzero(np.isnan(missing.points.deviation_mm)).tolist() == [7]
 
 
+def test_what_a_mask_hides_is_no_point(profile: NominalProfile) -> None:
+    points_mm = np.ma.masked_array(oval_points(0.0))
+    points_mm[7] = np.ma.masked
+    hidden = front.inspect(points_mm, nominal=profile, tolerance=np.array([-0.05, 0.05], dtype=np.float32), **KNOWN)
+    assert (hidden.document["received"], hidden.document["rejected"], hidden.verdict) == (COUNT, 1, Verdict.UNCERTAIN)
+    with pytest.raises(NominalError, match="row 7: not a finite number"):
+        front.nominal_profile(points_mm)
+
+
 def test_a_plan_stands_in_place_of_all_but_the_points(tmp_path: Path) -> None:
     points, nominal = write_points(tmp_path / "scan.csv", oval_points(bumped())), write_nominal(tmp_path / "oval.yaml")
     plan_file = tmp_path / "plan.yaml"
@@ -154,6 +163,13 @@ def test_a_nominal_of_any_kind_becomes_the_same_profile(tmp_path: Path) -> None:
     of_points = front.nominal_profile(oval_feet()[::-1], closed=True)
     assert of_points.material == "right"
     assert of_points.length_mm == pytest.approx(LENGTH_MM, rel=1e-7)
+    feet = write_points(tmp_path / "feet.csv", oval_feet())
+    assert front.nominal_profile({"file": feet}, closed=True).curve.closed is True
+    assert front.nominal_profile({"file": feet}, closed=False, material="left").curve.closed is False
+    with pytest.raises(PlanError, match="closed is given beside the nominal and in it"):
+        front.nominal_profile({"file": feet, "closed": False}, closed=True)
+    with pytest.raises(PlanError, match="layr: this is no key of a plan"):
+        front.nominal_profile({"file": feet, "layr": "x"})
     with pytest.raises(NominalError, match="expected points of shape"):
         front.nominal_profile(np.zeros(4))
 
