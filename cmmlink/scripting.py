@@ -5,7 +5,7 @@ Nothing is recorded here, printed or written. The verdict is that of `cmmlink in
 
 import threading
 import time
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from datetime import datetime
 from os import PathLike, fspath
 from pathlib import Path
@@ -59,7 +59,7 @@ def inspect(
     points: AnyPath | ArrayLike,
     *,
     nominal: Nominal | None = None,
-    tolerance: tuple[float, float] | Mapping[str, Any] | None = None,
+    tolerance: Iterable[float] | Mapping[str, Any] | None = None,
     plan: Plan | None = None,
     scale: float = 1.0,
     closed: bool | None = None,
@@ -205,7 +205,7 @@ def _nominal_in(
     return nominal_of_points(nominal, closed), material
 
 
-def _tolerance_in(tolerance: tuple[float, float] | Mapping[str, Any] | None) -> dict[str, Any]:
+def _tolerance_in(tolerance: Iterable[float] | Mapping[str, Any] | None) -> dict[str, Any]:
     if tolerance is None:
         return {}
     if isinstance(tolerance, Mapping):
