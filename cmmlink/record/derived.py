@@ -11,13 +11,23 @@ from pydantic import BaseModel, ConfigDict
 
 from cmmlink.record.bodies import pack_document, unpack_document
 from cmmlink.record.chain import Draft
-from cmmlink.record.shapes import Moment, checked
+from cmmlink.record.shapes import Moment, Result, checked
 from cmmlink.record.store import Store, name_record
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
     """A value that is not as it was in the recorded run."""
+
+    key: str
+    recorded: Any
+    replayed: Any
+
+
+class _Changed(BaseModel):
+    """A change, as it is read."""
+
+    model_config = ConfigDict(strict=True, frozen=True)
 
     key: str
     recorded: Any
@@ -41,7 +51,7 @@ class Derived(BaseModel):
     when: Moment
     who: str
     why: str
-    changed: list[dict[str, Any]]
+    changed: list[_Changed]
     plan: str
     software: dict[str, str]
     result: dict[str, Any]
@@ -68,7 +78,7 @@ def derived_draft(
         when=when,
         who=who,
         why=why,
-        changed=[asdict(change) for change in changed],
+        changed=[_Changed(**asdict(change)) for change in changed],
         plan=plan,
         software=dict(software),
         result=dict(result),
@@ -86,6 +96,7 @@ def derived_of(store: Store, run: str) -> list[dict[str, Any]]:
     for record in store.records(run, "derived"):
         with name_record(store.path, record):
             kept = checked(Derived, unpack_document(record.body))
-        told = {key: getattr(kept, key) for key in ("when", "who", "why", "changed")}
-        found.append({**told, "verdict": kept.result.get("verdict"), "chain_sha256": bytes(record.sha256).hex()})
+            verdict = checked(Result, kept.result).verdict
+        told = {"when": kept.when, "who": kept.who, "why": kept.why, "changed": [change.model_dump() for change in kept.changed]}
+        found.append({**told, "verdict": verdict, "chain_sha256": bytes(record.sha256).hex()})
     return found

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict
 from cmmlink.errors import StoreError
 from cmmlink.record.bodies import pack_document, unpack_document
 from cmmlink.record.chain import Draft, hash_of
-from cmmlink.record.shapes import checked
+from cmmlink.record.shapes import Moment, checked
 from cmmlink.record.store import Store, name_record
 
 
@@ -32,7 +32,7 @@ class Origin(BaseModel):
     records: int
     previous: str
     chain_sha256: str
-    merged: str
+    merged: Moment
 
     def draft(self, run: str) -> Draft:
         """The record that keeps it."""

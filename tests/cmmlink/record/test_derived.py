@@ -1,6 +1,7 @@
 """A recorded run judged again with something changed leaves who, when and why in the chain, and never touches the run."""
 
 import json
+import shutil
 import sqlite3
 from contextlib import closing
 from pathlib import Path
@@ -9,6 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cmmlink.record.chain import Draft
+from cmmlink.record.store import Store
 from tests.cmmlink.command import cmmlink
 from tests.cmmlink.oval_part import oval_points, write_nominal, write_points
 
@@ -109,3 +112,29 @@ def test_what_cannot_be_changed_is_told_and_leaves_nothing(
     before = (folder / "records" / "station.sqlite").read_bytes()
     assert words in again(folder, *asked).refused()
     assert (folder / "records" / "station.sqlite").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("kind", "forged"),
+    [
+        ("derived", {"changed": [{"key": "rule"}]}),
+        ("derived", {"when": "yesterday"}),
+        ("derived", {"result": {"verdict": "excellent"}}),
+        ("derived", {"who": None}),
+        ("origin", {"file": "f", "first": 1, "records": 1, "previous": "", "chain_sha256": "", "merged": "yesterday"}),
+        ("origin", {"file": "f"}),
+    ],
+)
+def test_a_document_that_nobody_wrote_is_told_in_words(
+    measured: tuple[Path, dict[str, Any]], tmp_path: Path, kind: Any, forged: dict[str, Any]
+) -> None:
+    """Under a chain that fits: its hashes are computed anew."""
+    folder, shown = measured
+    again(folder, "--tolerance", -0.08, 0.08, "--reason", "r")
+    shutil.copytree(folder / "records", tmp_path / "records")
+    with Store(tmp_path / "records", writing=True, epoch_s=lambda: 12.5) as store:
+        (*_, last) = store.records(shown["run"], "derived")
+        whole = json.loads(last.body) if kind == "derived" else {}
+        store.append([Draft(shown["run"], kind, json.dumps(whole | forged).encode())])
+    told = cmmlink("show", "last", "--records", tmp_path / "records").failed(5)
+    assert f"({kind} of run {shown['run']}) cannot be read" in told
