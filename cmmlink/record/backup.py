@@ -22,6 +22,7 @@ from cmmlink.record.station_lock import StationLock
 from cmmlink.record.store import FILE_NAME, Store, has_records
 from cmmlink.words import utc_words
 
+_MEND = "choose another place, or free some space"
 _EXPECTED = "expected a backup of records, or a folder of them"
 Now = Callable[[], datetime]
 Tell = Callable[[float], None]
@@ -87,7 +88,7 @@ def restore(file: Path, folder: Path, now: Now, *, replace: bool = False, tell: 
             with _new_file(folder / FILE_NAME) as part:
                 backup.back_up(part, tell)
                 with _open(part, now) as copy:
-                    made = _checked(copy, of=part)
+                    made = _checked(copy, of=folder / FILE_NAME)
                 aside = _put_in_place(part, folder, now)
             return replace_fields(made, path=folder / FILE_NAME, added=_ids(backup), aside=aside)
         finally:
@@ -219,7 +220,12 @@ def _new_file(file: Path) -> Iterator[Path]:
         part.unlink(missing_ok=True)
         yield part
     except OSError as error:
-        raise StoreError(f"{file}: cannot be written: {error.strerror or error}; choose another place, or free some space") from None
+        raise StoreError(f"{file}: cannot be written: {error.strerror or error}; {_MEND}") from None
+    except StoreError as error:
+        cause, found, _ = str(error).removeprefix(f"{part}: ").partition("; ")
+        if not str(error).startswith(f"{part}: ") or not found:
+            raise
+        raise StoreError(f"{file}: {cause}; {_MEND}") from None
     finally:
         for left in (part, part.with_name(f"{part.name}-journal")):
             with suppress(OSError):

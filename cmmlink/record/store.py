@@ -131,13 +131,21 @@ class Store:
     def back_up(self, path: Path, tell: Callable[[float], None] = lambda share: None) -> None:
         """Copy what stands in the file at this moment to a new file, while others may go on recording. `tell` is told the share done."""
         with _translate_errors(path), closing(sqlite3.connect(path, isolation_level=None)) as copy:
-            self._connection.execute("BEGIN")
-            try:
-                self._connection.execute("SELECT count(*) FROM sqlite_master").fetchone()  # from here on what others write is not seen
+            with self._as_it_is():
                 self._connection.backup(copy, pages=_PAGES_AT_ONCE, progress=lambda _, left, pages: tell(1 - left / max(pages, 1)))
-            finally:
-                self._connection.execute("ROLLBACK")
             copy.execute("PRAGMA journal_mode = DELETE")  # so that one file holds all of it
+
+    @contextmanager
+    def _as_it_is(self) -> Iterator[None]:
+        """While this is entered, the file reads as it is now, whatever others add to it."""
+        with _translate_errors(self.path):
+            self._connection.execute("BEGIN")
+            self._connection.execute("SELECT count(*) FROM sqlite_master").fetchone()  # this is what begins it
+        try:
+            yield
+        finally:
+            with _translate_errors(self.path):
+                self._connection.execute("ROLLBACK")
 
     @property
     def head(self) -> tuple[int, bytes]:

@@ -114,6 +114,10 @@ def _ct(folder: Path, _: ExitStack) -> list[object]:
     return ["ct", folder / "tube.stl", "--nominal", _oval(folder), *where, "--json", "--out", folder / "out"]
 
 
+def _backup(folder: Path, _: ExitStack) -> list[object]:
+    return ["backup", folder / "kept.sqlite", "--replace", "--records", folder / "records"]
+
+
 UNUSABLE, DEVICE, RECORD = 2, 4, 5
 OF_A_RUN = frozenset({UNUSABLE, 3, DEVICE, RECORD})
 COMMANDS = {
@@ -128,6 +132,7 @@ COMMANDS = {
         Command("verify", _recorded("verify"), frozenset({UNUSABLE, RECORD})),
         Command("show", _recorded("show", "last"), frozenset({UNUSABLE, RECORD})),
         Command("ct", _ct, frozenset({UNUSABLE, RECORD})),
+        Command("backup", _backup, frozenset({UNUSABLE, RECORD})),
     )
 }
 
