@@ -9,7 +9,6 @@ from cmmlink.commands.options import Json, Records, records_folder
 from cmmlink.commands.output import now, print_json
 from cmmlink.commands.progress import progress
 from cmmlink.words import printable
-from drivers import count_of
 
 if TYPE_CHECKING:
     from cmmlink.record import Copied
@@ -73,6 +72,8 @@ def merge(
 
 
 def _tell(made: "Copied", what: str, as_json: bool) -> int:
+    from drivers import count_of
+
     if as_json:
         print_json(_document(made))
         return 0
