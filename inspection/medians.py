@@ -36,29 +36,30 @@ def value_of_rank(blocks: Callable[[], Iterable[Array]], rank: int, low: float, 
     The values are counted in bins, and those of the bin that holds the rank are looked at once more.
     """
     while True:
-        with np.errstate(over="ignore"):
-            scale = np.float64(_BINS - 1) / (high - low) if high > low else np.inf
-        if not np.isfinite(scale):
+        if not high > low:
             return float(low)
         counts = np.zeros(_BINS, dtype=np.int64)
         for block in blocks():
-            counts += np.bincount(_bins(block[(block >= low) & (block <= high)], low, scale), minlength=_BINS)
+            counts += np.bincount(_bins(block[(block >= low) & (block <= high)], low, high), minlength=_BINS)
         before = np.cumsum(counts)
         wanted = int(np.searchsorted(before, rank, side="right"))
         rank -= int(before[wanted] - counts[wanted])
         if counts[wanted] <= MANY:
-            found = [_inside(block, low, high, scale, wanted) for block in blocks()]
+            found = [_inside(block, low, high, wanted) for block in blocks()]
             return float(np.partition(np.concatenate(found), rank)[rank])
-        extremes = [(inside.min(), inside.max()) for block in blocks() if len(inside := _inside(block, low, high, scale, wanted))]
+        extremes = [(inside.min(), inside.max()) for block in blocks() if len(inside := _inside(block, low, high, wanted))]
         low, high = min(least for least, _ in extremes), max(most for _, most in extremes)
 
 
-def _bins(values: Array, low: float, scale: float) -> NDArray[np.int64]:
-    return ((values - low) * scale).astype(np.int64)
+def _bins(values: Array, low: float, high: float) -> NDArray[np.int64]:
+    with np.errstate(over="ignore"):
+        scale = np.float64(_BINS - 1) / (high - low)
+    places = (values - low) * scale if np.isfinite(scale) else (values - low) / (high - low) * (_BINS - 1)
+    return np.asarray(places.astype(np.int64))
 
 
-def _inside(block: Array, low: float, high: float, scale: float, wanted: int) -> Array:
+def _inside(block: Array, low: float, high: float, wanted: int) -> Array:
     """The values of a block that lie in the wanted bin."""
     values = block[(block >= low) & (block <= high)]
-    inside: Array = values[_bins(values, low, scale) == wanted]
+    inside: Array = values[_bins(values, low, high) == wanted]
     return inside

@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from inspection.cloud import Cloud, few_of
@@ -81,6 +81,7 @@ def test_places_that_hold_all_points_are_drawn_as_often_as_they_fit() -> None:
 
 @settings(deadline=None, max_examples=50)
 @given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=60), st.integers(0, 59))
+@example([0.0, 5e-324, 1.8e-304], 1)  # less apart than what one may be divided by
 def test_the_value_of_a_rank_is_that_of_the_sorted_values(values: list[float], rank: int) -> None:
     array = np.array(values)
     rank = min(rank, len(values) - 1)
