@@ -23,7 +23,7 @@ from drivers.links.modbus_scanner import ModbusScanner
 from drivers.links.serial_scanner import SerialScanner
 from drivers.source import Arrival, PointBatch, ScanSource
 
-SILENCE_S, RECONNECT_S, GRACE_S = 0.6, 0.6, 2.0
+SILENCE_S, RECONNECT_S, GRACE_S = 1.5, 0.6, 2.0  # a busy machine takes a second to say the first words
 SETTINGS = LinkSettings(9600, "N", SILENCE_S, RECONNECT_S)
 POINTS = 20
 Serve = Callable[[socket.socket], None]
