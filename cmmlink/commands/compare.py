@@ -24,12 +24,13 @@ from cmmlink.commands.options import (
 )
 from cmmlink.commands.output import now, print_json
 from cmmlink.commands.progress import progress
-from cmmlink.errors import PlanError
+from cmmlink.errors import PlanError, RunError
 from cmmlink.words import printable
 from inspection import FitName, Material
 
 if TYPE_CHECKING:
     from cmmlink.comparison import ComparedScan, Comparison
+    from cmmlink.record import Store
 
 _PICTURES = (".png", ".svg", ".pdf")
 _NO_LIMITS = (-1.0, 1.0)  # an inspection needs some: the fit aims at their middle, and nothing that is compared depends on their width
@@ -80,6 +81,8 @@ def compare(
     if nominal is None and len(files) == 2:
         raise PlanError(f"{first} and {second} are files of points: --nominal FILE says what both are compared with")
     if nominal is not None and len(files) < 2:
+        for name in (first, second):
+            _require_no_missing_file(name)
         raise PlanError(f"--nominal {nominal}: a recorded run brings its own nominal; leave the option out")
     file_settings: dict[str, Any] = {
         "device": {"unit": unit, "columns": columns_from(columns)},
@@ -107,12 +110,11 @@ def compare(
 
 def _scans_with_a_run(first: str, second: str, records: Path, file_settings: dict[str, Any]) -> "list[ComparedScan]":
     """Two scans of which one at least is a run on record; a file is judged against the nominal of that run, as that run was."""
-    from cmmlink.comparison import scan_of_run
     from cmmlink.record import open_to_read
 
     with ExitStack() as opened:
         store = opened.enter_context(open_to_read(records, now))
-        runs = {name: scan_of_run(store, name) for name in (first, second) if not Path(name).is_file()}
+        runs = {name: _scan_of_run(store, name) for name in (first, second) if not Path(name).is_file()}
     known = next(iter(runs.values()))
     plan, limits = known.plan, known.document["tolerance"]
     asked = {
@@ -124,6 +126,23 @@ def _scans_with_a_run(first: str, second: str, records: Path, file_settings: dic
         **file_settings,
     }
     return [runs[name] if name in runs else _scan_of_file(Path(name), asked, known) for name in (first, second)]
+
+
+def _scan_of_run(store: "Store", name: str) -> "ComparedScan":
+    from cmmlink.comparison import scan_of_run
+
+    try:
+        return scan_of_run(store, name)
+    except RunError:
+        _require_no_missing_file(name)
+        raise
+
+
+def _require_no_missing_file(name: str) -> None:
+    """Raise PlanError where a name that is no file was meant as one: it has a suffix or a folder."""
+    path = Path(name)
+    if not path.is_file() and (path.suffix or path.name != name):
+        raise PlanError(f"{name}: no such file, and no such run; `cmmlink runs` lists the runs")
 
 
 def _scan_of_file(path: Path, asked: dict[str, Any], known: "ComparedScan | None" = None) -> "ComparedScan":

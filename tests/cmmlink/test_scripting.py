@@ -1,7 +1,6 @@
 """One call from points to a result: the verdict and every number of the command line, from files and from arrays."""
 
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -196,8 +195,12 @@ def test_points_become_columns_with_the_names_of_deviations_csv(found: Inspected
     assert np.array_equal(columns["foot_y_mm"], found.points.foot_mm[:, 1])
     assert [columns["verdict"][k] for k in (0, 42, 200)] == ["conform", "nonconform", "nonconform"]
     assert set(columns["verdict"]) <= set(POINT_WORDS)
-    frames: Callable[[Any], Any] = lambda told: SimpleNamespace(set_index=lambda name: (name, told))  # noqa: E731 - a stand-in
-    monkeypatch.setitem(sys.modules, "pandas", SimpleNamespace(DataFrame=frames))
+
+    def frame_of(told: Any) -> Any:
+        """A stand-in for a table of pandas, which need not be there."""
+        return SimpleNamespace(set_index=lambda name: (name, told))
+
+    monkeypatch.setitem(sys.modules, "pandas", SimpleNamespace(DataFrame=frame_of))
     index, told = found.to_dataframe()
     assert index == "index"
     assert list(told) == list(COLUMNS)

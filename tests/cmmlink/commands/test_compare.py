@@ -113,6 +113,9 @@ def test_what_cannot_be_compared_is_refused_with_the_cause(folder: Path, tmp_pat
     assert "a recorded run brings its own nominal" in cmmlink("compare", a, first, "--nominal", folder / "oval.yaml").refused()
     assert "no drawing is known by the suffix '.gif'" in cmmlink("compare", a, b, "-o", "c.gif").refused()
     assert "there is no run 'nobody'" in cmmlink("compare", a, "nobody", "--records", folder).refused()
+    gone = tmp_path / "gone.csv"
+    for asked in ((), ("--nominal", folder / "oval.yaml")):
+        assert cmmlink("compare", a, gone, *asked, "--records", folder).refused().startswith(f"{gone}: no such file, and no such run")
     halves = [write_points(tmp_path / f"{k}.csv", oval_points(0.0)[part]) for k, part in enumerate((slice(10, 150), slice(200, 350)))]
     refused = cmmlink("compare", *halves, "--nominal", folder / "oval.yaml", "--fit", "none").refused()
     assert "have no place of the profile in common that both measured" in refused
