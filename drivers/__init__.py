@@ -9,6 +9,9 @@ TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer 
 
 if TYPE_CHECKING:
     from drivers.codecs import decoder, decoders, unseen_in
+    from drivers.codecs.dme_commands import curve_density, point_measurement, scan_on_circle, scan_on_line, scan_unknown, scans_on_curve
+    from drivers.codecs.dme_points import PointCheck
+    from drivers.codecs.dme_session import DME_UNSEEN, DmeJob
     from drivers.codecs.register_decoder import RegisterDecoder
     from drivers.codecs.register_map import RegisterMap, register_map
     from drivers.errors import CadError, DeviceError, DeviceRefused, LinkError, MeshError, PointFileError, ProtocolError
@@ -39,6 +42,16 @@ if TYPE_CHECKING:
 else:
     _PLACES = {
         "drivers.codecs": ("decoder", "decoders", "unseen_in"),
+        "drivers.codecs.dme_commands": (
+            "curve_density",
+            "point_measurement",
+            "scan_on_circle",
+            "scan_on_line",
+            "scan_unknown",
+            "scans_on_curve",
+        ),
+        "drivers.codecs.dme_points": ("PointCheck",),
+        "drivers.codecs.dme_session": ("DME_UNSEEN", "DmeJob"),
         "drivers.codecs.register_decoder": ("RegisterDecoder",),
         "drivers.codecs.register_map": ("RegisterMap", "register_map"),
         "drivers.errors": ("CadError", "DeviceError", "DeviceRefused", "LinkError", "MeshError", "PointFileError", "ProtocolError"),
@@ -86,6 +99,7 @@ else:
 
 
 __all__ = [
+    "DME_UNSEEN",
     "HARMLESS_REASONS",
     "Arrival",
     "AxisName",
@@ -96,6 +110,7 @@ __all__ = [
     "Decoder",
     "DeviceError",
     "DeviceRefused",
+    "DmeJob",
     "Heartbeat",
     "LinkDown",
     "LinkError",
@@ -104,6 +119,7 @@ __all__ = [
     "MeshError",
     "PointArraySource",
     "PointBatch",
+    "PointCheck",
     "PointFile",
     "PointFileError",
     "PointFileSource",
@@ -118,18 +134,24 @@ __all__ = [
     "WireBytes",
     "convert_to_mm",
     "count_of",
+    "curve_density",
     "decoder",
     "decoders",
     "device_address",
     "mm_per",
     "numbers_of",
     "parse_columns",
+    "point_measurement",
     "points_in",
     "points_of",
     "read_bytes",
     "read_points",
     "read_text",
     "register_map",
+    "scan_on_circle",
+    "scan_on_line",
+    "scan_unknown",
+    "scans_on_curve",
     "shipped_map",
     "shipped_maps",
     "shorten",

@@ -21,6 +21,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--points", type=int, default=100, help="points to read (default 100)")
     group.addoption("--baud-rate", type=int, default=115_200)
     group.addoption("--parity", default="N", choices=["N", "E", "O"])
+    group.addoption("--dme-sessions", metavar="FOLDER", help="logs of I++ DME clients of the NIST test suite, for test_dme_recorded.py")
     group = parser.getgroup("damage", "tests/cmmlink/record/test_damage.py")
     group.addoption("--damages", type=int, default=8, metavar="N", help="kinds of damage to the records to try (default 8)")
     group = parser.getgroup("browser", "tests/cmmlink/console in Chromium")
