@@ -21,6 +21,7 @@ class FaultKind:
     default: float
     once: bool = False
     registers_only: bool = False
+    dme_only: bool = False
 
 
 CATALOGUE: Mapping[str, FaultKind] = MappingProxyType(
@@ -42,6 +43,19 @@ CATALOGUE: Mapping[str, FaultKind] = MappingProxyType(
         "word-swap": FaultKind("1: the halves of 32-bit numbers in Modbus registers come swapped", 1, registers_only=True),
         "sentinel": FaultKind("share of points whose registers hold the value for none", 0.01, registers_only=True),
         "overflow": FaultKind("number of points that a full Modbus buffer costs; its flag stays set", 20, once=True, registers_only=True),
+        "torn-line": FaultKind("largest number of bytes that the network carries in one piece", 7, dme_only=True),
+        "split-points": FaultKind("share of I++ lines whose last point goes on in the next line", 0.1, dme_only=True),
+        "wrong-tag": FaultKind("share of I++ data lines under the tag of another command", 0.01, dme_only=True),
+        "lone-lf": FaultKind("share of I++ data lines that end with line feed alone", 0.01, dme_only=True),
+        "early-data": FaultKind("1: data of an I++ scan come before its acknowledgement", 1, once=True, dme_only=True),
+        "no-complete": FaultKind("1: the I++ server does not say that its scan is complete", 1, once=True, dme_only=True),
+        "jog-key": FaultKind("1: somebody presses a key of the jog box while the machine scans", 1, once=True, dme_only=True),
+        "emergency-stop": FaultKind("1: somebody presses the emergency stop while the machine scans", 1, once=True, dme_only=True),
+        "tool-change": FaultKind("1: somebody changes the tool by hand while the machine scans", 1, once=True, dme_only=True),
+        "no-surface": FaultKind("1: the probe of the machine finds no surface any more", 1, once=True, dme_only=True),
+        "cut-line": FaultKind("1: the link is cut in the middle of an I++ line", 1, once=True, dme_only=True),
+        "bare-cause": FaultKind("1: the causes of I++ errors come without quotes", 1, dme_only=True),
+        "not-homed": FaultKind("1: the machine does not know where it is before it is sent home", 1, dme_only=True),
         "die": FaultKind("exit status with which the device ends at once", 9, once=True),
     }
 )
@@ -133,6 +147,10 @@ class Injector:
     def lasting_value(self, name: str, index: int) -> float:
         """Return the value of a fault that lasts from its point on; 0 before."""
         return self._share(name, index)
+
+    def strikes(self, name: str, index: int) -> bool:
+        """Tell whether a fault that strikes a share of the points strikes this one."""
+        return self._strikes(name, index)
 
     def note_progress(self, index: int) -> None:
         """Take note of how far the scan is."""

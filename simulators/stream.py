@@ -72,9 +72,10 @@ class Device:
 
 def stream(settings: SimulatorSettings, device: Device, announce: Announce, move: Callable[..., Walk] = walk) -> None:
     """Serve one scan of any streaming device; `move` moves the probe along the path."""
-    strange = [fault.name for fault in settings.faults if CATALOGUE[fault.name].registers_only]
-    if strange:
-        raise ValueError(f"fault {strange[0]!r} strikes Modbus devices only")
+    for fault in settings.faults:
+        if CATALOGUE[fault.name].registers_only or CATALOGUE[fault.name].dme_only:
+            kind = "Modbus devices" if CATALOGUE[fault.name].registers_only else "measuring machines"
+            raise ValueError(f"fault {fault.name!r} strikes {kind} only")
     scan = move(settings.path_mm, settings.motion)
     injector = Injector(settings.faults, settings.motion.seed)
     line = open_line(settings.address)

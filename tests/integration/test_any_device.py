@@ -16,7 +16,11 @@ import pytest
 
 from cmmlink.plan.own_maps import map_of
 from drivers.codecs import decoder, decoders
+from drivers.codecs.dme_commands import curve_density, scans_on_curve
+from drivers.codecs.dme_points import PointCheck
+from drivers.codecs.dme_session import DmeJob
 from drivers.codecs.register_decoder import RegisterDecoder
+from drivers.links.dme_machine import DmeMachine
 from drivers.links.link_settings import LinkSettings
 from drivers.links.modbus_scanner import ModbusScanner
 from drivers.links.serial_scanner import SerialScanner
@@ -24,12 +28,25 @@ from drivers.source import Arrival, PointBatch, ScanClosed, ScanSource, WireByte
 from tests.drivers.codecs.streams import Account, account
 from tests.integration.simulated import simulated
 
-SIMULATED = {"serial": "ascii", "binary": "binary", "binary-block": "binary", "modbus-ring": "generic-ring", "modbus-fifo": "generic-fifo"}
+CORNERS_MM = np.array([[0.0, 0.0], [60.0, 0.0], [60.0, 20.0], [0.0, 20.0]])  # of the part that is simulated
+SIDES = np.array([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]])  # out of the material
+COURSE = np.hstack([CORNERS_MM, np.zeros((4, 1)), SIDES, np.zeros((4, 1))])
+MACHINE = DmeJob(PointCheck(0.0, 0.001, 50.0), scans_on_curve(COURSE, closed=True), preparations=(curve_density(0.01, 10.0),))
+SIMULATED = {
+    "dme": "dme",
+    "serial": "ascii",
+    "binary": "binary",
+    "binary-block": "binary",
+    "modbus-ring": "generic-ring",
+    "modbus-fifo": "generic-fifo",
+}
 Open = Callable[[], ScanSource]
 
 
 def opener(address: str, name: str, options: dict[str, float], settings: LinkSettings) -> Open:
     """Return what makes a source: a format's name is a stream, a map's name or file is Modbus."""
+    if name == "dme":
+        return lambda: DmeMachine(address, MACHINE, silence_s=30.0)
     if name in decoders():
         return lambda: SerialScanner(address, decoder(name, **options), settings)
     return lambda: ModbusScanner(address, RegisterDecoder(map_of(name)), settings)

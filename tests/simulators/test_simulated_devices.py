@@ -31,7 +31,7 @@ def test_every_name_of_the_front_door_is_there_and_no_device_is_loaded_by_it() -
 
 
 @pytest.mark.parametrize(
-    ("arguments", "complaint"), [([], "name a device: binary, binary-block, gocator, "), (["toaster"], "name a device")]
+    ("arguments", "complaint"), [([], "name a device: binary, binary-block, dme, gocator, "), (["toaster"], "name a device")]
 )
 def test_a_device_that_is_not_known_is_one_message(arguments: list[str], complaint: str) -> None:
     ended = subprocess.run([sys.executable, "-m", "simulators", *arguments], cwd=ROOT, capture_output=True, text=True, check=False)
@@ -47,3 +47,14 @@ def test_a_simulated_device_serves_nothing_but_what_its_address_names(device: st
     path.write_text("x_mm,y_mm\n0,0\n1,0\n", encoding="utf-8")
     with pytest.raises(ValueError, match="expected pty or host:port"):
         known_devices()[device](settings_from(["--address", address, "--path", str(path)]), lambda _: None)
+
+
+@pytest.mark.parametrize(
+    ("device", "fault"), [("dme", "flip"), ("dme", "slow"), ("serial", "emergency-stop"), ("serial", "slow"), ("modbus-ring", "lone-lf")]
+)
+def test_a_fault_that_cannot_strike_a_device_is_refused(device: str, fault: str, tmp_path: Path) -> None:
+    path = tmp_path / "path.csv"
+    path.write_text("x_mm,y_mm\n0,0\n10,0\n10,10\n", encoding="utf-8")
+    settings = settings_from(["--address", "127.0.0.1:0", "--path", str(path), "--fault", fault])
+    with pytest.raises(ValueError, match=f"fault '{fault}' "):
+        known_devices()[device](settings, lambda _: None)
