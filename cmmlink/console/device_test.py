@@ -21,7 +21,7 @@ def listen_to_device(job: Job, connect: Callable[[], AbstractContextManager[Conn
     """Listen until the device has shown itself, the time is over, or the job is aborted."""
     try:
         with connect() as connected:
-            job.attach(connected.source)
+            job.attach(connected.trial or connected.source)
             message = _listen(connected, clock)
     except (DeviceError, PlanError, PointFileError) as error:
         return DeviceTest("failed", without_folders(str(error)))
@@ -30,11 +30,12 @@ def listen_to_device(job: Job, connect: Callable[[], AbstractContextManager[Conn
 
 def _listen(connected: Connected, clock: Callable[[], float]) -> str:
     began_s, points, device = clock(), 0, ""
-    timer = threading.Timer(_LONGEST_S, connected.source.stop)
+    source = connected.trial or connected.source
+    timer = threading.Timer(_LONGEST_S, source.stop)
     timer.name, timer.daemon = "device test's end", True
     timer.start()
     try:
-        for arrival in connected.source.arrivals():
+        for arrival in source.arrivals():
             if isinstance(arrival, ScanOpened):
                 device = " ".join(filter(None, (arrival.device, arrival.serial_number)))
             elif isinstance(arrival, PointBatch):
@@ -43,8 +44,10 @@ def _listen(connected: Connected, clock: Callable[[], float]) -> str:
                 break
     finally:
         timer.cancel()
-        connected.source.stop()
+        source.stop()
     device = device or connected.device
+    if connected.trial is not None:
+        return f"{device}: it answers; nothing was moved"
     if not points:
         return f"{device}: the link opened, but no point came within {_LONGEST_S:g} s"
     return f"{device}: {points} points in {clock() - began_s:.1f} s"

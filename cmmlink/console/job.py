@@ -37,6 +37,7 @@ class Job:
         self.unwritten: PlanError | None = None
         self._on_end = on_end
         self._lock = threading.Lock()
+        self.moves = False  # a machine, which somebody has to look at
         self._source: ScanSource | None = None
         self._over = False
         self._done = threading.Event()
@@ -54,10 +55,10 @@ class Job:
         """End a job that was never started."""
         self._end()
 
-    def attach(self, source: ScanSource) -> None:
-        """Set the device that the job listens to; it is stopped at once where the job was aborted before."""
+    def attach(self, source: ScanSource, *, moves: bool = False) -> None:
+        """Set the device that the job listens to, and whether it moves; it is stopped at once where the job was aborted before."""
         with self._lock:
-            self._source = source
+            self._source, self.moves = source, moves
         if self.stop.is_set():
             source.stop()
 

@@ -41,7 +41,7 @@ def measure(job: Job, view: RunView, checked: CheckedPlan, setup: StationSetup, 
     """Measure a part as its plan says, keep the record, and write the results where the plan wants them."""
     plan, records = checked.plan, setup.records
     with setup.connect(plan) as connected:
-        job.attach(connected.source)
+        job.attach(connected.source, moves=connected.moves)
         finished = job.finished = carry_out(
             plan,
             checked.profile,

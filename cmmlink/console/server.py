@@ -55,6 +55,7 @@ from cmmlink.console.protocol import (
 from cmmlink.console.refused import Refused, without_folders, words_of
 from cmmlink.console.run_file import RunFiles
 from cmmlink.console.station import Station
+from cmmlink.console.unseen import Onlooker
 from cmmlink.plan import LanguageName, PaperName
 from cmmlink.run_state import RunState
 
@@ -63,6 +64,7 @@ _log = logging.getLogger(__name__)
 _PERIOD_S = 1 / 30  # at most so often a page is sent something
 _ALIVE_S = 0.5
 _LIST_PLANS_S = 1.0
+_LOOK_ON_S = 0.5
 _TOKEN_WITHIN_S = 5.0
 _MOST_PAGES = 16
 _EXPORT_S = 3600.0
@@ -118,6 +120,7 @@ class ConsoleServer:
         self._server = BoundedServer(config, self._socket, self.encryption)
         self._thread = threading.Thread(target=self._server.run, name="console", daemon=True)
         self._lister = threading.Thread(target=self._keep_listing_plans, name="plans", daemon=True)
+        self._onlooker = threading.Thread(target=self._keep_looking_on, name="onlooker", daemon=True)
 
     def new_address(self) -> str:
         """What to open in a browser: an address that opens one page, once, within a minute."""
@@ -144,6 +147,7 @@ class ConsoleServer:
         """Serve until `stop`."""
         self._thread.start()
         self._lister.start()
+        self._onlooker.start()
 
     def stop(self) -> None:
         """Close every page's socket, and end."""
@@ -162,6 +166,12 @@ class ConsoleServer:
         while not self._stopped.wait(_LIST_PLANS_S):
             if self._pages:
                 self.station.list_plans()
+
+    def _keep_looking_on(self) -> None:
+        """Stop what moves when no page is open any more."""
+        onlooker = Onlooker(self.station, time.monotonic)
+        while not self._stopped.wait(_LOOK_ON_S):
+            onlooker.look(self.pages)
 
     def _application(self) -> ASGIApp:
         files = {path.name: (path.read_bytes(), _MEDIA[path.name.rpartition(".")[2]]) for path in _static_files()}
