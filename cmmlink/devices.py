@@ -5,21 +5,27 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 
 from cmmlink.errors import PlanError
-from cmmlink.plan import Device, FileDevice, ModbusDevice, Plan, SerialDevice, map_of
+from cmmlink.plan import Device, DmeDevice, FileDevice, ModbusDevice, Plan, SerialDevice, map_of
 from cmmlink.scratch import Scratch, scratch_in
-from drivers import Decoder, PointFileSource, RegisterDecoder, ScanSource, decoder, unseen_in
+from drivers import DME_UNSEEN, Decoder, PointFileSource, RegisterDecoder, ScanSource, decoder, unseen_in
 from drivers.links.axis import Beam, ConstantFeed, FollowedAxis
 from drivers.links.link_settings import LinkSettings
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Connected:
-    """A device made ready for one scan. `simulated` says that no real device is measured; `notes` are what was assumed about it."""
+    """A device made ready for one scan. `simulated` says that no real device is measured; `notes` are what was assumed about it.
+
+    moves : a scan moves a machine, so that somebody has to look on
+    trial : what tells that the device answers without moving it; None where listening to its scan does no harm
+    """
 
     source: ScanSource
     device: str
     simulated: bool
     notes: tuple[str, ...] = ()
+    moves: bool = False
+    trial: ScanSource | None = None
 
 
 Connect = Callable[[Plan], AbstractContextManager[Connected]]
@@ -37,12 +43,16 @@ def connect(plan: Plan, scratch: Scratch | None = None) -> Iterator[Connected]:
         notes = tuple(f"{device.file.name}: {note}" for note in source.notes)
     else:
         notes = tuple(notes_on(device))
-    yield Connected(source, words_of(device), simulated=False, notes=notes)
+    trial = _trial(plan, device) if isinstance(device, DmeDevice) else None
+    yield Connected(source, words_of(device), simulated=False, notes=notes, moves=trial is not None, trial=trial)
 
 
 def notes_on(device: Device) -> Iterator[str]:
     """Say what a device's format cannot show, and what is taken for granted of the axis that moves it."""
     if isinstance(device, FileDevice):
+        return
+    if isinstance(device, DmeDevice):
+        yield DME_UNSEEN
         return
     if isinstance(device, SerialDevice):
         yield from (f"{device.format}: {words}" for words in unseen_in(device.format))
@@ -66,14 +76,17 @@ def source_of(plan: Plan, scratch: Scratch | None = None) -> ScanSource:
         room = scratch or scratch_in(plan.records)
         return PointFileSource(device.file, device.scale, unit=device.unit, columns=device.columns, invalid=device.invalid, room=room)
     try:
-        return _source_with_axis(device)
+        return _machine(plan, device) if isinstance(device, DmeDevice) else _source_with_axis(device)
     except ValueError as error:
         raise PlanError(f"device: {error}") from None
 
 
 def decoder_of(device: Device) -> Decoder | None:
-    """The decoder of what a device sends. None for files and devices on an axis: of these the points themselves are recorded."""
-    return None if isinstance(device, FileDevice) or device.axis is not None else _decoder(device)
+    """The decoder of what a device sends. None where the points themselves are recorded.
+
+    That is so for files and for devices on an axis, and for machines: what their answers mean depends on what they were asked.
+    """
+    return None if isinstance(device, FileDevice | DmeDevice) or device.axis is not None else _decoder(device)
 
 
 def _decoder(device: SerialDevice | ModbusDevice) -> Decoder:
@@ -98,6 +111,20 @@ def _source_with_axis(device: SerialDevice | ModbusDevice) -> ScanSource:
         return FollowedAxis(source, _link(axis.follow), beam)
     assert axis.feed_mm_s is not None
     return ConstantFeed(source, beam, axis.feed_mm_s)
+
+
+def _machine(plan: Plan, device: DmeDevice) -> ScanSource:
+    from cmmlink.dme_job import job_of  # noqa: PLC0415 - it loads what reads a nominal
+    from drivers.links.dme_machine import DmeMachine  # noqa: PLC0415 - for those who have one
+
+    return DmeMachine(device.address, job_of(plan, device), device.silence_s)
+
+
+def _trial(plan: Plan, device: DmeDevice) -> ScanSource:
+    from cmmlink.dme_job import questions_of  # noqa: PLC0415 - likewise
+    from drivers.links.dme_machine import DmeMachine  # noqa: PLC0415 - likewise
+
+    return DmeMachine(device.address, questions_of(plan, device), device.silence_s)
 
 
 def _link(device: SerialDevice | ModbusDevice) -> ScanSource:

@@ -21,8 +21,10 @@ from inspection import (
     Evaluation,
     FitName,
     LiveInspection,
+    Material,
     Method,
     NominalProfile,
+    NurbsCurve,
     RigidTransform,
     Room,
     RuleName,
@@ -92,6 +94,12 @@ def profile_of(plan: Plan) -> NominalProfile:
     """The nominal that a plan names, discretised as it says."""
     nominal = plan.nominal
     return discretize_file(_load(plan), nominal.file, nominal, plan.discretisation)
+
+
+def nominal_of(plan: Plan) -> tuple[NurbsCurve, Material]:
+    """The exact curve of a plan's nominal, and the side of its material. Raises PlanError where that side is not known."""
+    curve = _load(plan).curve
+    return curve, _side_of(curve, plan.nominal.file, plan.nominal)
 
 
 def load_from(nominal: Nominal, path: Path, section: SectionPlane | None = None) -> NominalFile:
@@ -186,13 +194,18 @@ def zone_of(plan: Plan | CtPlan, profile: NominalProfile) -> ToleranceZone:
 
 def discretize_file(file: NominalFile, path: Path, nominal: Nominal, finely: Discretisation) -> NominalProfile:
     """Discretise a nominal that was read from `path`. The material lies inside a closed profile unless the plan says otherwise."""
-    side = nominal.material or material_side(file.curve)
+    side = _side_of(file.curve, path, nominal)
+    return discretize(file.curve, finely.samples, finely.pole_angle_min_deg, finely.step_min, side)
+
+
+def _side_of(curve: NurbsCurve, path: Path, nominal: Nominal) -> Material:
+    side = nominal.material or material_side(curve)
     if side is None:
         raise PlanError(
             f"{path}: an open profile does not show on which side its material lies; "
             "set nominal.material to left or right in the plan, or give --material left or --material right"
         )
-    return discretize(file.curve, finely.samples, finely.pole_angle_min_deg, finely.step_min, side)
+    return side
 
 
 def inspection_of(

@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
@@ -19,6 +20,9 @@ from cmmlink.live_characteristics import LiveCharacteristics
 from cmmlink.live_proof import LiveProof
 from drivers import HARMLESS_REASONS, Arrival, Damaged, DeviceError, Lost, PointBatch, Rejected, ScanClosed, ScanOpened, ScanSource
 from inspection import InspectionError, InspectionResult, LiveInspection, Missing, Reason, Rejection, Verdict, doubt_part, reasons_of_abort
+
+CutShort = Literal["never", "when failed", "as recorded"]
+"""Whether a scan is ended once it is proven that the part can no longer pass; that of a record was, where it has no end."""
 
 Refusal = Callable[[int, int | None], str]
 """Says, from the points received and those announced, why there is no room for more; nothing where there is."""
@@ -54,6 +58,7 @@ class _Tally:
     damaged_bytes: int = 0
     announced: int | None = None
     begun: int = 1
+    closed: bool = False
 
     def add(self, arrival: Arrival) -> None:
         if isinstance(arrival, PointBatch):
@@ -68,8 +73,10 @@ class _Tally:
         elif isinstance(arrival, ScanOpened):
             self.begun += self._arrived > 0
             self.announced = max(self.announced or 0, arrival.expected or 0) or None
-        elif isinstance(arrival, ScanClosed) and arrival.sent is not None:
-            self.announced = max(self.announced or 0, arrival.sent)
+        elif isinstance(arrival, ScanClosed):
+            self.closed = True
+            if arrival.sent is not None:
+                self.announced = max(self.announced or 0, arrival.sent)
 
     @property
     def _arrived(self) -> int:
@@ -113,6 +120,7 @@ def run_inspection(
     doubt: Reason | None = None,
     no_room: Refusal = lambda received, announced: "",
     shown: bool = False,
+    cut_short: CutShort = "never",
 ) -> RunOutcome:
     """Carry out one run to its end and publish every event to every sink. Setting `stop` aborts the run.
 
@@ -120,6 +128,7 @@ def run_inspection(
     doubt : a reason known beforehand why no verdict can be proven
     no_room : asked now and then whether there is room for what is still to come; where it says why not, the run ends with what it has
     shown : somebody looks on, who is told the characteristics while the scan runs
+    cut_short : whether the scan is ended once the part can no longer pass; without its end such a scan is not complete
     """
     buffer: Buffer[tuple[float, Arrival]] = Buffer(buffer_points)
     failures: list[DeviceError] = []
@@ -130,7 +139,7 @@ def run_inspection(
         try:
             _publish(sinks, started)
             _start(reader, failures, acquired)
-            full = _judge_all(source, live, lookers, sinks, buffer, tally, acquired, clock, stop, watch, no_room)
+            full = _judge_all(source, live, lookers, sinks, buffer, tally, acquired, clock, stop, watch, no_room, cut_short)
         finally:
             lookers.end_soon()
             source.stop()
@@ -139,7 +148,8 @@ def run_inspection(
                 reader.join()
         failure = full or (failures[0] if failures else None)
         ending: Ending = "interrupted" if failure else "aborted" if stop.is_set() else "complete"
-        result, refusal = _finish(live, ending, tally.missing(), doubt)
+        complete = ending == "complete" and (tally.closed or cut_short == "never")
+        result, refusal = _finish(live, ending, tally.missing(), doubt, complete)
         judged, reasons = (result.judged, result.rejected_by_reason) if result else (0, _reasons_without_pose(live))
         counts = tally.counts(judged, reasons, buffer)
         _publish(sinks, RunFinished(ending, result, counts, str(failure or refusal or "")))
@@ -225,9 +235,10 @@ def _judge_all(
     stop: threading.Event,
     watch: Callable[[], None],
     no_room: Refusal,
+    cut_short: CutShort,
 ) -> StoreError | None:
     """Take what arrives and judge it until acquisition has ended and the buffer is empty. Returns why, where there was no room for more."""
-    full, next_look = None, 0
+    full, next_look, failed = None, 0, False
     while True:
         ended = acquired.is_set()  # read before the buffer is emptied: after it is set, nothing more is handed over
         taken = buffer.take(0.0 if ended else _LOOK_S)
@@ -243,7 +254,7 @@ def _judge_all(
             if isinstance(arrival, PointBatch):
                 batches.append((time_s, arrival))
                 if sum(len(batch) for _, batch in batches) >= _MOST_AT_ONCE:
-                    _judge(live, sinks, buffer, tally, batches, clock)
+                    failed |= _judge(live, sinks, buffer, tally, batches, clock)
                     batches = []
             if tally.received >= next_look or isinstance(arrival, ScanOpened):
                 next_look = tally.received + _ROOM_EVERY
@@ -251,10 +262,13 @@ def _judge_all(
                     full = StoreError(why)
                     source.stop()
         if batches:
-            _judge(live, sinks, buffer, tally, batches, clock)
+            failed |= _judge(live, sinks, buffer, tally, batches, clock)
             lookers.offer()
         for event in lookers.news(clock):
             _publish(sinks, event)
+            failed |= isinstance(event, ProvenOut)
+        if failed and cut_short == "when failed":
+            source.stop()
 
 
 def _judge(
@@ -264,11 +278,13 @@ def _judge(
     tally: _Tally,
     batches: list[tuple[float, PointBatch]],
     clock: Callable[[], float],
-) -> None:
+) -> bool:
+    """Judge points and tell the sinks. Returns whether one is out of tolerance for good: that is known at once where the pose is."""
     update = live.add(np.concatenate([batch.points_mm for _, batch in batches]))
     now = clock()
     counts = tally.counts(live.judged, live.rejected_by_reason, buffer)
     _publish(sinks, Judged(now, now - batches[-1][0], update, counts))
+    return update.state == "settled" and bool((update.verdicts == Verdict.NONCONFORM).any())
 
 
 def _reasons_without_pose(live: LiveInspection) -> dict[str, int]:
@@ -279,7 +295,7 @@ def _reasons_without_pose(live: LiveInspection) -> dict[str, int]:
 
 
 def _finish(
-    live: LiveInspection, ending: Ending, missing: Missing, doubt: Reason | None
+    live: LiveInspection, ending: Ending, missing: Missing, doubt: Reason | None, complete: bool
 ) -> tuple[InspectionResult | None, InspectionError | None]:
     """The result of a run. What the operator aborted has no verdict, whatever was out by then: the part may have slipped.
 
@@ -287,7 +303,7 @@ def _finish(
     machine is, and a replay has to find the same.
     """
     try:
-        result = live.finish(complete=ending == "complete", missing=missing)
+        result = live.finish(complete=complete, missing=missing)
     except InspectionError as error:
         return None, error
     if doubt is not None:

@@ -127,7 +127,7 @@ def carry_out(
     scratch = scratch_in(records)
     _log.info("%s", words_of_room(scratch.folder))
     live = inspection_of(plan, profile, scratch, provisional=followed)
-    started = run_started(plan, device.device, device.simulated, (*assumed, *notes_on_zone(plan), *device.notes))
+    started = run_started(plan, device.device, device.simulated, (*assumed, *notes_on_zone(plan), *_notes_on_end(plan), *device.notes))
     on_ready()
     with ExitStack() as stack:
         recorder: Recorder | None = None
@@ -148,8 +148,15 @@ def carry_out(
             watch=recorder.check if recorder else lambda: None,
             no_room=scratch.refusal,
             shown=shown,
+            cut_short="when failed" if plan.stop_when_failed else "never",
         )
     evidence = recorder.evidence if recorder else None
     if evidence is not None:
         _log.info("recorded in %s as run %s, chain %s, plan %s", records, evidence.run, evidence.chain_sha256, evidence.plan_sha256)
     return FinishedRun(plan, profile, started, outcome, evidence, began)
+
+
+def _notes_on_end(plan: Plan) -> tuple[str, ...]:
+    """That the scan may end before its end."""
+    told = "the scan is ended as soon as it is proven that the part can no longer pass (stop_when_failed)"
+    return (told,) if plan.stop_when_failed else ()

@@ -7,6 +7,7 @@ if TYPE_CHECKING:
     from cmmlink.plan.cutters import CutterName
     from cmmlink.plan.datum import Datum
     from cmmlink.plan.deciding import PROFILE, Deciding
+    from cmmlink.plan.dme import CircleScan, CurveScan, LineScan, PointsScan, UnknownScan
     from cmmlink.plan.formats import FormatName
     from cmmlink.plan.given import plan_given_by
     from cmmlink.plan.key_search import KeyEntry, all_keys, keys_named
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from cmmlink.plan.scan import (
         Device,
         Discretisation,
+        DmeDevice,
         FileDevice,
         ModbusDevice,
         Nominal,
@@ -54,6 +56,7 @@ else:
         "cmmlink.plan.scan": (
             "Device",
             "Discretisation",
+            "DmeDevice",
             "FileDevice",
             "ModbusDevice",
             "Nominal",
@@ -68,6 +71,7 @@ else:
         ),
         "cmmlink.plan.characteristics": ("AskedCharacteristic", "AskedDatum", "AskedFilter", "AskedProfile", "Place"),
         "cmmlink.plan.cutters": ("CutterName",),
+        "cmmlink.plan.dme": ("CircleScan", "CurveScan", "LineScan", "PointsScan", "UnknownScan"),
         "cmmlink.plan.stack_characteristics": ("AskedOfStack",),
         "cmmlink.plan.surface": ("CtPlan", "NominalAt", "load_ct_plan"),
         "cmmlink.plan.yaml_model": ("Positive", "Settings", "line_of", "read_model", "value_of", "words_of_allowed"),
@@ -84,16 +88,20 @@ __all__ = [
     "AskedFilter",
     "AskedOfStack",
     "AskedProfile",
+    "CircleScan",
     "CtPlan",
+    "CurveScan",
     "CutterName",
     "Datum",
     "Deciding",
     "Device",
     "Discretisation",
+    "DmeDevice",
     "FileDevice",
     "FormatName",
     "KeyEntry",
     "LanguageName",
+    "LineScan",
     "ModbusDevice",
     "Nominal",
     "NominalAt",
@@ -102,6 +110,7 @@ __all__ = [
     "Place",
     "Plan",
     "PlanMistake",
+    "PointsScan",
     "Positive",
     "Registration",
     "ReportSettings",
@@ -111,6 +120,7 @@ __all__ = [
     "SerialDevice",
     "SerialNumbers",
     "Settings",
+    "UnknownScan",
     "all_keys",
     "find_mistakes",
     "keys_named",

@@ -21,6 +21,7 @@ serial_number: {required: true, pattern: B-####}
 nominal: {file: blade.dat, scale: 100}
 tolerance: {lower_mm: -0.05, upper_mm: 0.05, uncertainty_mm: 0.004}
 device: {type: serial, address: COM3}
+stop_when_failed: true
 probe: {tip_radius_mm: 1.0}
 section: {origin_mm: [0, 0, 60], normal: [0, 0, 1], x_axis: [1, 0, 0], off_plane_max_mm: 0.5}
 registration: {fit: best-fit, method: exact, coverage_min: 0.95, reject_outliers: false}
@@ -165,6 +166,32 @@ report: {language: en, paper: a4, section_pages: not-conform}
 records: records
 """
 
+_ON_A_MACHINE = """
+part: {name: blade 7}
+nominal: {file: blade.dat, scale: 100}
+tolerance: {lower_mm: -0.05, upper_mm: 0.05}
+probe: {tip_radius_mm: 1.5}
+device:
+  type: dme
+  address: "192.168.1.10:1294"
+  tool: Probe1
+  home: false
+  coordinate_system: PartCsy
+  speed_mm_s: 10
+  radius_tolerance_mm: 0.001
+  quality_max: 50
+  silence_s: 30
+  scan: %s
+"""
+_SCANS_OF_A_MACHINE = (
+    "{type: curve, step_mm: 0.1, angle_deg: 10, chord_error_mm: 0.002}",
+    "{type: points, step_mm: 1, chord_error_mm: 0.002}",
+    "{type: circle, centre_mm: [0, 0, 0], start_mm: [10, 0, 0], axis: [0, 0, 1], sweep_deg: 360, surface: outside, step_deg: 0.5}",
+    "{type: line, start_mm: [0, 0, 0], end_mm: [20, 0, 0], normal: [0, 1, 0], step_mm: 0.1}",
+    "{type: unknown, start_mm: [0, 0, 0], start_direction: [0, 1, 0], plane_normal: [0, 0, 1], towards_mm: [2, 0, 0], step_mm: 0.1, "
+    "end_mm: [9, 0, 0], end_diameter_mm: 1.4, end_count: 1, end_direction: [0, 1, 0], dialect: 1.4.3}",
+)
+
 PLANS: tuple[tuple[type[BaseModel], str], ...] = (
     (Plan, SCAN),
     (CtPlan, _SURFACE),
@@ -174,6 +201,7 @@ PLANS: tuple[tuple[type[BaseModel], str], ...] = (
     (Plan, _MORE_OF_A_SCAN),
     (Plan, _OWN_DATUMS),
     (CtPlan, _MANY_SECTIONS),
+    *((Plan, _ON_A_MACHINE % scan) for scan in _SCANS_OF_A_MACHINE),
 )
 
 

@@ -18,6 +18,7 @@ from cmmlink.buffer import CAPACITY_POINTS
 from cmmlink.errors import PlanError, YamlError
 from cmmlink.plan.datum import Datum
 from cmmlink.plan.deciding import Deciding
+from cmmlink.plan.dme import DmeSettings
 from cmmlink.plan.report import REPORT, ReportSettings
 from cmmlink.plan.results import OUT, Results, ResultsOrFolder
 from cmmlink.plan.serial_numbers import SERIAL_NUMBER, SerialNumbers
@@ -42,6 +43,10 @@ _SILENCE = "how long a device may send nothing before it counts as failed"
 _RECONNECT = "how long a lost link is tried again while the run goes on"
 _PARITY = "the parity of a serial port: none, even or odd"
 RECORDS = "the folder of the run records; null: the user's own. A console keeps all its runs in one folder"
+_STOP = (
+    "whether the scan is ended as soon as it is proven that the part can no longer pass; a machine that can be told so stops. A scan of "
+    "such a plan that somebody ends early is not complete either"
+)
 _AXIS = "what makes points of the distances of a one-dimensional sensor"
 _LEAST_SINE = 1e-3  # between x axis and normal: below it the direction of x in the plane is noise
 
@@ -150,6 +155,13 @@ class ModbusDevice(Settings):
         return Path(self.map) if isinstance(self.map, str) and self.map not in shipped_maps() else None
 
 
+class DmeDevice(DmeSettings):
+    """A coordinate measuring machine that an I++ DME server moves and reads."""
+
+    type: Literal["dme"] = Field(description="a coordinate measuring machine behind an I++ DME server")
+    address: Address = Field(description="host:port of the server; the usual port is 1294")
+
+
 class FileDevice(Settings):
     """A file of points in place of a device."""
 
@@ -169,7 +181,7 @@ class FileDevice(Settings):
     )
 
 
-Device = Annotated[SerialDevice | ModbusDevice | FileDevice, Field(discriminator="type")]
+Device = Annotated[SerialDevice | ModbusDevice | DmeDevice | FileDevice, Field(discriminator="type")]
 Axis.model_rebuild()
 
 
@@ -265,6 +277,7 @@ class Plan(Deciding):
     serial_number: SerialNumbers | None = Field(default=None, description=SERIAL_NUMBER)
     nominal: Nominal = Field(description="a mapping with the nominal's file")
     device: Device = Field(description="a mapping with the device's type and address")
+    stop_when_failed: bool = Field(default=False, description=_STOP)
     probe: Probe = Field(default=Probe(), description="the tip of the probe")
     section: Section = Field(default=Section(), description="the plane of the section in machine coordinates")
     registration: Registration = Field(default=Registration(), description="how the points come onto the nominal")
@@ -345,7 +358,7 @@ def place_of(path: Path, key: str) -> str:
 
 def with_own_maps(device: Device, replaced: Callable[[Path], str | dict[str, Any]]) -> Device:
     """Return the device with the user's own register maps replaced, also in the device that its axis follows."""
-    if isinstance(device, FileDevice):
+    if isinstance(device, FileDevice | DmeDevice):
         return device
     update: dict[str, Any] = {}
     if isinstance(device, ModbusDevice) and device.own_map is not None:

@@ -105,9 +105,17 @@ def replay_run(
     source = Capture(reading, decoder, _failure(recorded))
     started = RunStarted.from_header(recorded.header)
     live = inspection_of(changed, profile, scratch_in(store.path.parent), numbers=numbers)
-    doubt = _doubt_of(recorded)
     outcome = run_inspection(
-        source, live, sinks, started, buffer_points=plan.buffer_points, clock=clock, stop=stop, doubt=doubt, shown=shown
+        source,
+        live,
+        sinks,
+        started,
+        buffer_points=plan.buffer_points,
+        clock=clock,
+        stop=stop,
+        doubt=_doubt_of(recorded),
+        shown=shown,
+        cut_short="as recorded" if plan.stop_when_failed else "never",
     )
     reading.raise_failure(recorded.run, outcome)
     replayed = result_json(outcome.result, outcome.counts)
