@@ -10,7 +10,7 @@ from typing import Any
 from cmmlink.characteristics_json import characteristic_json
 from cmmlink.events import Evaluated
 from cmmlink.run_state import WorstPoint
-from cmmlink.words import LOOKS_OUT, SO_FAR, VERDICT_NAMES, Headline, Shape, VerdictName, headline_of
+from cmmlink.words import LOOKS_OUT, SO_FAR, VERDICT_NAMES, Headline, Shape, VerdictName, deciding_words, headline_of, named_first
 from inspection import CharacteristicResult, Verdict
 
 MOST_ROWS, _MOST_LETTERS, _MOST_OF_A_REASON = 100, 200, 600  # rows that are shown, letters of a name, and letters of a reason
@@ -92,14 +92,13 @@ def most_shown(rows: Sequence[CharacteristicRow]) -> tuple[CharacteristicRow, ..
 
 def names_of(rows: Sequence[CharacteristicRow], shape: Shape) -> str:
     """The first of the characteristics with a sign by its name, and how many more have it; nothing where there is but one in all."""
-    names = [row.name for row in rows if row.shape == shape] if len(rows) > 1 else []
-    return " and ".join([*names[:1], *([f"{len(names) - 1} more"] if len(names) > 1 else [])])
+    return named_first([row.name for row in rows if row.shape == shape] if len(rows) > 1 else [])
 
 
 def worst_words(rows: Sequence[CharacteristicRow]) -> str:
     """Which of several characteristics gave the part its verdict."""
     all_of_them = f"all {len(rows)} characteristics" if len(rows) > 1 else ""
-    return names_of(rows, "not-conform") or names_of(rows, "not-proven") or all_of_them
+    return deciding_words([(row.name, row.verdict) for row in rows]) or all_of_them
 
 
 def _row_so_far(one: CharacteristicResult, refuted: bool) -> CharacteristicRow:

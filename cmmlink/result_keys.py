@@ -9,17 +9,7 @@ from typing import Any, Literal
 from pydantic import ConfigDict, Field
 
 from cmmlink.events import Ending
-from cmmlink.inspection_keys import (
-    Characterised,
-    JsonObject,
-    LargestGap,
-    OutStretch,
-    Registered,
-    Uncertainty,
-    VerdictReason,
-    Worst,
-    Zone,
-)
+from cmmlink.inspection_keys import Characterised, JsonObject, LargestGap, OutStretch, Registered, Uncertainty, VerdictReason, Worst, Zone
 from cmmlink.record_keys import JudgedAgain, JudgementKept, RunOrigin
 from cmmlink.version import ResultSchema
 from cmmlink.words import VerdictName
@@ -256,6 +246,7 @@ class RunLine(JsonObject):
     received: int | None = Field(description="the points received; null while the run goes on")
     verdict: VerdictName | None = Field(description="the verdict; null where there is none")
     stack: StackPlace | None = Field(default=None, description="only of sections of a surface: the place in the stack")
+    decided_by: str = Field(default="", description="only where some of several characteristics do not conform: what gave the verdict")
 
 
 class Runs(JsonObject):

@@ -4,7 +4,7 @@ While a scan runs there is one more: points look out of tolerance, and it is not
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any, Literal
@@ -76,6 +76,23 @@ def headline_of(verdict: Verdict | None, ending: str = "complete", share: float 
         at = "" if not share else f" AT {math.floor(100 * share)} %"  # rounded down: 99.9 % is not the whole
         return Headline(_ENDINGS[ending] + at, "ended-early")
     return NOT_MEASURED if verdict is None else Headline(VERDICT_WORDS[verdict], _SHAPES[verdict])
+
+
+def deciding_words(verdicts: Sequence[tuple[str, str]]) -> str:
+    """Which of several characteristics gave a part its verdict: the first by its name, and how many more; nothing where all conform.
+
+    verdicts : names with verdicts as results spell them; of a single one nothing is said
+    """
+    if len(verdicts) > 1:
+        for worst in ("nonconform", "uncertain"):
+            if names := [name for name, verdict in verdicts if verdict == worst]:
+                return named_first(names)
+    return ""
+
+
+def named_first(names: Sequence[str]) -> str:
+    """The first of some names, and how many more there are; nothing without one."""
+    return " and ".join([*names[:1], *([f"{len(names) - 1} more"] if len(names) > 1 else [])])
 
 
 def printable(text: str) -> str:

@@ -42,16 +42,18 @@ def runs(records: Records = None, as_json: Json = False) -> int:
     """List the recorded runs."""
     from cmmlink.record import list_runs
 
-    found = list_runs(records_folder(records), now)
+    found = list_runs(records_folder(records), now, deciding=True)
     if as_json:
         from cmmlink.result_keys import RunLine
 
-        print_json({"runs": [{key: entry[key] for key in RunLine.model_fields if key != "stack" or entry[key]} for entry in found]})
+        optional = ("stack", "decided_by")
+        print_json({"runs": [{key: entry[key] for key in RunLine.model_fields if key not in optional or entry[key]} for entry in found]})
         return 0
     for entry in found:
         received = "-" if entry["received"] is None else entry["received"]
         head = f"{entry['run']}  {_local(entry['started']):<25}  {entry['state']:<11}  {_headline(entry):<{_LONGEST_HEADLINE}}"
-        _say(f"{head}  {received:>9} points  {_part_in(entry)}")
+        decided = f"  decided by {entry['decided_by']}" if entry["decided_by"] else ""
+        _say(f"{head}  {received:>9} points  {_part_in(entry)}{decided}")
     if not found:
         _say(f"no run was recorded yet in {records_folder(records)}")
     return 0

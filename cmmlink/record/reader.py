@@ -7,7 +7,7 @@ Where that cannot be written, it is read as interrupted all the same.
 import dataclasses
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
@@ -25,6 +25,7 @@ from cmmlink.record.recorder import end_draft
 from cmmlink.record.shapes import End, Header, Result, checked
 from cmmlink.record.station_lock import PATIENCE_S
 from cmmlink.record.store import Store, has_records, name_record
+from cmmlink.words import deciding_words
 from drivers import Arrival, PointBatch, Rejected, WireBytes
 
 _FROM_HEADER = ("run", "started", "part", "serial_number", "simulated")
@@ -84,15 +85,18 @@ def open_to_read(folder: Path, now: Callable[[], datetime], *, close_interrupted
         yield store
 
 
-def list_runs(folder: Path, now: Callable[[], datetime]) -> list[dict[str, Any]]:
+def list_runs(folder: Path, now: Callable[[], datetime], deciding: bool = False) -> list[dict[str, Any]]:
     """Every run, oldest first: what its header says of it, its place in a stack, and how it ended; none where there is none.
 
     The state of a run that another process records just now is "running"; a run that gave no result has no verdict.
+
+    deciding : read the results as well, and tell which of several characteristics decided; else nothing is told of that
     """
     if not has_records(folder):
         return []
     with open_to_read(folder, now) as store:
-        return [_entry(store, begin, end) for begin, end in store.begins_and_ends()]
+        entries = [_entry(store, begin, end) for begin, end in store.begins_and_ends()]
+        return [entry | {"decided_by": _decider(store, entry) if deciding else ""} for entry in entries]
 
 
 def earlier_run(folder: Path, part: str, serial_number: str, now: Callable[[], datetime]) -> str | None:
@@ -293,6 +297,17 @@ def _entry(store: Store, begin: Record, end: Record | None) -> dict[str, Any]:
     stack = header.get("stack")
     place = {key: value for key, value in stack.items() if key != "plan"} if stack else None
     return {key: header.get(key) for key in _FROM_HEADER} | {"stack": place} | {key: closing.get(key) for key in _FROM_END}
+
+
+def _decider(store: Store, entry: Mapping[str, Any]) -> str:
+    """Which of several characteristics gave a run its verdict; nothing where it conforms, or where its result cannot be read."""
+    if entry["verdict"] in (None, "conform"):
+        return ""
+    try:
+        result = recorded_result(store, entry["run"])
+    except StoreError:
+        return ""
+    return deciding_words([(one["name"], one["verdict"]) for one in result.get("characteristics", ())])
 
 
 def end_missing(store: Store, run: str) -> dict[str, Any]:

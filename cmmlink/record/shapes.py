@@ -95,6 +95,13 @@ class Reason(_Document):
     words: str
 
 
+class Judged(_Document):
+    """A characteristic of a result."""
+
+    name: str
+    verdict: VerdictName
+
+
 class Result(_Document):
     """The result of a run, as far as anything but a person reads it."""
 
@@ -111,6 +118,7 @@ class Result(_Document):
     tolerance: Limits | None = None
     registration: Pose | None
     reasons: list[Reason] = []
+    characteristics: list[Judged] = []
 
 
 class Placed(_Document):

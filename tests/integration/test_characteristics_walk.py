@@ -269,6 +269,11 @@ def test_another_program_verifies_the_minimum_zone_and_finds_what_was_altered(wa
     assert ended.json()["zones"][0]["problem"] == "the points that hold the zone are not at its limits"
 
 
+def test_the_list_of_runs_names_the_characteristic_that_decides(walk: Walk) -> None:
+    assert cmmlink("runs", "--records", walk.folder / "kept").out.rstrip().endswith("blade  decided by twist")
+    assert cmmlink("runs", "--records", walk.folder / "kept", "--json").json()["runs"][0]["decided_by"] == "twist"
+
+
 def test_the_record_gives_the_same_characteristics_to_the_last_bit(walk: Walk, tmp_path: Path) -> None:
     again = cmmlink("replay", walk.facts["run"], "--records", walk.folder / "kept", "--json").json()
     assert again["identical"] is True
