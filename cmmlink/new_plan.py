@@ -25,7 +25,7 @@ Open = Literal["unit", "chord", "curve", "ends"]
 """What a nominal file may leave open: its unit, the length of its chord, which of its curves is meant, and whether its ends meet."""
 
 RESULTS = "results/{part}/{serial}_{run}"
-_NO_RESULTS = ("none", "null")
+NO_RESULTS = ("none", "null")
 SURFACES = (".stl", ".ply", ".obj")
 POINTS = (".csv", ".txt", ".asc", ".xyz", ".npy", ".dat", ".pts")
 MAP_OF_A_CONTROLLER = "generic-ring"
@@ -143,19 +143,21 @@ def _number(word: str) -> float | None:
     return number if np.isfinite(number) else None
 
 
-def source_from(text: str, folder: Path) -> dict[str, Any]:
+def source_from(text: str, folder: Path, seen_from: Path = Path()) -> dict[str, Any]:
     """Where the points come from: a file of points, the surface of a CT scan, or a device, as keys of a plan. Raises PlanError.
 
     text   : a file; or an address (a port like COM3, or host:port), with `modbus` before it where it keeps its points in registers, and
              behind it the format or the register map, and options of the format like range_mm=50
     folder : the folder of the plan, from which files are named
+    seen_from : the folder that the name of a file in the text is seen from
     """
     words = text.split()
-    suffix = Path(text.strip()).suffix.lower()
+    file = seen_from / text.strip()
+    suffix = file.suffix.lower()
     if suffix in SURFACES:
-        return _surface(Path(text.strip()), folder)
+        return _surface(file, folder)
     if suffix in POINTS:
-        return {"device": {"type": "file", "file": name_from(Path(text.strip()), folder)}}
+        return {"device": {"type": "file", "file": name_from(file, folder)}}
     kind = words.pop(0) if words and words[0] in ("serial", "modbus") else "serial"
     if not words:
         raise PlanError(f"'{text}': expected a file of points, a surface (STL, PLY, OBJ), or an address like COM3 or 192.168.1.10:4001")
@@ -166,7 +168,7 @@ def source_from(text: str, folder: Path) -> dict[str, Any]:
         raise PlanError(f"'{text}': expected an address and one {'register map' if kind == 'modbus' else 'format, then its options'}")
     device: dict[str, Any] = {"type": kind, "address": address}
     if kind == "modbus":
-        own = Path(named[0]) if named and Path(named[0]).suffix.lower() in (".yaml", ".yml") else None
+        own = seen_from / named[0] if named and Path(named[0]).suffix.lower() in (".yaml", ".yml") else None
         return {"device": device | {"map": name_from(own, folder) if own else (named or [MAP_OF_A_CONTROLLER])[0]}}
     return {"device": device | ({"format": named[0]} if named else {}) | ({"options": options} if options else {})}
 
@@ -235,7 +237,7 @@ def plan_text(answers: PlanAnswers, understood: NominalFile, folder: Path) -> st
         ("tolerance", {"lower_mm": _plain(answers.lower_mm), "upper_mm": _plain(answers.upper_mm)}, "positive is out of material"),
         *([("probe", {"tip_radius_mm": _plain(answers.tip_radius_mm)}, "the points are ball centres")] if answers.tip_radius_mm else []),
         *((key, value, _SOURCE_COMMENTS.get(key, "")) for key, value in answers.source.items()),
-        ("out", None if answers.results in _NO_RESULTS else answers.results, "a folder for every run; null: none"),
+        ("out", None if answers.results in NO_RESULTS else answers.results, "a folder for every run; null: none"),
     ]
     head = f"# An inspection plan: `cmmlink check` checks it, `cmmlink {'ct' if surface else 'run'}` carries it out."
     hints = _HINTS[:1] if surface or answers.tip_radius_mm else _HINTS

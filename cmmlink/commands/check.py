@@ -8,7 +8,6 @@ import typer
 
 from cmmlink.commands.exit_codes import UNUSABLE, fail
 from cmmlink.commands.options import PlanFile, records_folder
-from cmmlink.errors import PlanError
 
 if TYPE_CHECKING:
     from cmmlink.plan import CtPlan, Plan, PlanMistake
@@ -43,43 +42,32 @@ def _fail_with(plan_file: Path, mistakes: "Sequence[PlanMistake]") -> int:
     return fail("\n".join(lines), UNUSABLE)
 
 
-def _problems(plan_file: Path, problems: Sequence[PlanError]) -> int:
-    """The same for what only the files show that a plan names."""
-    from cmmlink.plan import PlanMistake
-
-    return _fail_with(plan_file, [PlanMistake(str(problem).removeprefix(f"{plan_file}: ")) for problem in problems])
-
-
 def _check_scan(plan: "Plan", plan_file: Path) -> int:
-    from cmmlink.devices import connect, words_of
-    from cmmlink.from_plan import Problems, find_problems, notes_on_nominal, notes_on_temperature, zone_of
+    from cmmlink.devices import words_of
+    from cmmlink.from_plan import zone_of
+    from cmmlink.scan_check import as_mistakes, check_scan
     from cmmlink.scratch import words_of_room
 
-    profile, problems = find_problems(plan, plan_file)
-
-    def notes_on_device() -> tuple[str, ...]:
-        with connect(plan) as device:
-            return device.notes
-
-    of_device = Problems(plan_file)
-    notes = of_device.attempt("device", notes_on_device)
-    if problems or of_device.problems or profile is None:
-        return _problems(plan_file, [*problems, *of_device.problems])
+    found = check_scan(plan, plan_file)
+    profile = found.profile
+    if found.problems or profile is None:
+        return _fail_with(plan_file, as_mistakes(plan_file, found.problems))
     zone = zone_of(plan, profile)
     typer.echo(f"{plan_file} can be run: {plan.part.name}, zone {zone.lower_mm:+g} .. {zone.upper_mm:+g} mm, {words_of(plan.device)}")
     typer.echo(f"records in {words_of_room(plan.records or records_folder(None))}")
     typer.echo(f"nominal {profile.length_mm:.3f} mm long, {len(profile)} samples, material on the {profile.material}")
     typer.echo(f"decision rule: {zone.decision_rule}")
-    _print_notes([*notes_on_nominal(plan), *notes_on_temperature(plan), *(notes or ())])
+    _print_notes(found.notes)
     return 0
 
 
 def _check_stack(plan: "CtPlan", plan_file: Path) -> int:
+    from cmmlink.scan_check import as_mistakes
     from cmmlink.stack_check import check_stack
 
     found = check_stack(plan, plan_file)
     if found.problems:
-        return _problems(plan_file, found.problems)
+        return _fail_with(plan_file, as_mistakes(plan_file, found.problems))
     zone, heights = plan.zone, found.heights_mm
     typer.echo(f"{plan_file} can be inspected: {plan.part.name}, zone {zone.lower_mm:+g} .. {zone.upper_mm:+g} mm, {found.surface}")
     typer.echo(f"{len(heights)} section{'' if len(heights) == 1 else 's'} at heights {_words_of_heights(heights)} mm")

@@ -64,7 +64,7 @@ def serve_console(
     past = _past_runs(records)
     scans, surfaces = (lambda: _plans_in(folder, surfaces=False)), (lambda: _plans_in(folder, surfaces=True))
     inspect = partial(inspect_surface, past.folder)
-    setup = StationSetup(scans, connect, serial_ports, past, time.monotonic, now, surfaces, inspect, _write_for())
+    setup = StationSetup(scans, connect, serial_ports, past, time.monotonic, now, surfaces, inspect, _write_for(), folder)
     if key is not None and certificate is None:
         raise PlanError("--key belongs to a certificate; give that with --certificate")
     access = Access(host, port, certificate, key, unencrypted)

@@ -33,7 +33,8 @@ def declarations_ts() -> str:
     for union in (protocol.Message, protocol.Command):
         for message in get_args(union):
             _collect(message, seen)
-    _collect(protocol.Device, seen)
+    for answer in (protocol.Device, protocol.Understood, protocol.PlanSaved):
+        _collect(answer, seen)
     lines += [_interface(record) for record in seen]
     lines += [f"\nexport type {name} = {_type(union)};\n" for name, union in _unions().items()]
     return _HEAD + "".join(lines)

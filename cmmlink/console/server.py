@@ -35,6 +35,7 @@ from cmmlink.console.guard import Guard
 from cmmlink.console.keys import Keys
 from cmmlink.console.listening import Access, encryption_of, listen_at
 from cmmlink.console.open_page import OpenPage
+from cmmlink.console.plan_post import POST_S, Posts
 from cmmlink.console.protocol import (
     TOO_MANY_PAGES,
     WRONG_TOKEN,
@@ -99,6 +100,7 @@ class ConsoleServer:
         self.port: int = self._socket.getsockname()[1]
         self._pages: list[OpenPage] = []
         self._files = RunFiles()
+        self._posts = Posts()
         self._controller: OpenPage | None = None
         self._seen = 0
         self._ever = threading.Event()
@@ -181,6 +183,8 @@ class ConsoleServer:
                 Route("/export/{run}", self._export),
                 Route("/report/{run}", self._report),
                 Route("/compare/{first}/{second}", self._compare),
+                Route("/nominal", self._understand_nominal, methods=["POST"]),
+                Route("/plan", self._save_plan, methods=["POST"]),
                 Route("/{name}", lambda request: _file_response(files.get(request.path_params["name"]))),
                 WebSocketRoute("/live", self._live),
             ]
@@ -200,9 +204,32 @@ class ConsoleServer:
         first, second = request.path_params["first"], request.path_params["second"]
         return await self._send_file(request, lambda folder: self.station.compare_runs(first, second, folder), "application/pdf")
 
+    async def _understand_nominal(self, request: Request) -> Response:
+        if not self._has_token(request):
+            return _no_token()
+        _visitor(request).admit(POST_S)
+        return await self._posts.answer(request, self.station.understand_nominal)
+
+    async def _save_plan(self, request: Request) -> Response:
+        """Save a new plan for the page in control, which says its number."""
+        if not self._has_token(request):
+            return _no_token()
+        page = next((page for page in self._pages if str(page.number) == request.query_params.get("page")), None)
+        try:
+            if page is None:
+                raise Refused("the page is not connected to the station")
+            self._take_control(page)
+        except Refused as refusal:
+            return PlainTextResponse(str(refusal), 409)
+        _visitor(request).admit(POST_S)
+        return await self._posts.answer(request, self.station.save_plan)
+
+    def _has_token(self, request: Request) -> bool:
+        return self._keys.knows(request.headers.get("authorization", "").removeprefix("Bearer "))
+
     async def _send_file(self, request: Request, make: Callable[[Path], Path], media_type: str) -> Response:
-        if not self._keys.knows(request.headers.get("authorization", "").removeprefix("Bearer ")):
-            return PlainTextResponse("the token is wrong or missing", 401)
+        if not self._has_token(request):
+            return _no_token()
         _visitor(request).admit(_EXPORT_S)
         return await self._files.answer(make, media_type)
 
@@ -287,9 +314,7 @@ class ConsoleServer:
         command = received.command()
         action = action_of(command, self.station)
         if action is not None:
-            self._controller = self._controller or page
-            if self._controller is not page:
-                raise Refused("another page is in control; this one watches")
+            self._take_control(page)
             page.opened = None if received.do in ("start", "replay") else page.opened
             return await anyio.to_thread.run_sync(action)
         if isinstance(command, OfRun):
@@ -299,6 +324,12 @@ class ConsoleServer:
         elif isinstance(command, Plain):
             return await self._obey_plain(page, command)
         return "opened"
+
+    def _take_control(self, page: OpenPage) -> None:
+        """Let a page control the station, unless another one does. Raises Refused."""
+        self._controller = self._controller or page
+        if self._controller is not page:
+            raise Refused("another page is in control; this one watches")
 
     async def _obey_plain(self, page: OpenPage, command: Plain) -> str:
         """Carry out what any page may ask of the server."""
@@ -356,6 +387,10 @@ def _static_files() -> list[Any]:
 
 def _file_response(file: tuple[bytes, str] | None) -> Response:
     return Response(file[0], media_type=file[1]) if file else PlainTextResponse("there is no such page", 404)
+
+
+def _no_token() -> Response:
+    return PlainTextResponse("the token is wrong or missing", 401)
 
 
 def _visitor(connection: HTTPConnection) -> Visitor:

@@ -16,7 +16,8 @@ from cmmlink.console.ct_import import CtImport, InspectSurface
 from cmmlink.console.device_test import TESTING, listen_to_device
 from cmmlink.console.entry import Entry
 from cmmlink.console.job import Job, JobKind
-from cmmlink.console.protocol import DeviceTest, History, StationState
+from cmmlink.console.plan_form import PlanForm, save_form, understand_nominal
+from cmmlink.console.protocol import DeviceTest, History, PlanSaved, StationState, Understood
 from cmmlink.console.refused import Refused, answer_errors
 from cmmlink.console.run_job import measure, raise_alarms, sink_of
 from cmmlink.console.station_setup import Records, StationSetup
@@ -106,6 +107,19 @@ class Station:
         if choice.checked is None:
             raise Refused(choice.shown.problem)
         return f"{name} can be run"
+
+    def understand_nominal(self, answers: Mapping[str, str], content: bytes) -> Understood:
+        """Read a nominal that a page hands in, for a new plan."""
+        return understand_nominal(PlanForm.of(answers), content, self._folder_of_plans())
+
+    def save_plan(self, answers: Mapping[str, str], content: bytes) -> PlanSaved:
+        """Save a new plan and the nominal that a page hands in, and choose it; or say what is wrong, and save nothing."""
+        folder = self._folder_of_plans()
+        saved = save_form(PlanForm.of(answers), content, folder, overwrite=answers.get("replace") == "yes")
+        self.list_plans()
+        if saved.name and not saved.surface:
+            self.choose(saved.name)
+        return saved
 
     def enter(self, serial_number: str | None = None, operator: str | None = None, address: str | None = None) -> str:
         """Enter what belongs to the next part; None leaves a value as it is."""
@@ -310,6 +324,12 @@ class Station:
             raise Refused("this station keeps no records")
         return self._setup.records
 
+    def _folder_of_plans(self) -> Path:
+        self._refuse_while_running("a plan can be made")
+        if self._setup.folder is None:
+            raise Refused("this station has no folder of plans: start it with cmmlink console FOLDER")
+        return self._setup.folder
+
     def _check(self, name: str) -> Choice:
         with answer_errors():
             file = self._setup.plans().get(name)
@@ -360,4 +380,5 @@ class Station:
             running=running,
             can_start=not running and choice is not None and choice.checked is not None,
             keeps_records=self._setup.records is not None,
+            can_make_plans=self._setup.folder is not None,
         )

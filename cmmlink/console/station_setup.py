@@ -53,6 +53,7 @@ class StationSetup:
     clock   : monotonic, s; now : date and time of day
     ct_plans, inspect_surface : plans of CT surfaces, and what inspects one; None where that is not possible
     write   : writes the results of a run where its plan wants them
+    folder  : of the plans, where new ones are saved; None where the page makes none
     """
 
     plans: Callable[[], Mapping[str, Path]]
@@ -64,3 +65,4 @@ class StationSetup:
     ct_plans: Callable[[], Mapping[str, Path]] = dict
     inspect_surface: InspectSurface | None = None
     write: Callable[[Plan, FinishedRun], None] = lambda *_: None
+    folder: Path | None = None

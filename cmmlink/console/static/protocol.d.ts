@@ -86,6 +86,7 @@ export interface StationState {
   readonly running: boolean;
   readonly can_start: boolean;
   readonly keeps_records: boolean;
+  readonly can_make_plans: boolean;
   readonly type: "station";
 }
 
@@ -335,6 +336,39 @@ export interface Plain {
 export interface Device {
   readonly address: string;
   readonly description: string;
+}
+
+/** What is wrong with the answer in a field of a new plan. */
+export interface FormMistake {
+  readonly field: "nominal" | "unit" | "curve" | "ends" | "side" | "part" | "tolerance" | "source" | "radius" | "results" | "name";
+  readonly words: string;
+}
+
+/** What is understood of a nominal that a page hands in. The answer to its post at `/nominal`, as JSON. problem : why it cannot be read; empty where it can asks : what it leaves open: the unit is that of the file, or the length of the chord that it is drawn in units of curves : number and words of each curve of a drawing; empty where there is one turns_left : a profile that goes round does so counter-clockwise points_mm : along the curve, from its start; in units of the file where the unit is not known, as are length and size part, name : names for part and plan that are offered; files: of points and surfaces beside the plans */
+export interface Understood {
+  readonly problem: string;
+  readonly mistakes: readonly FormMistake[];
+  readonly asks: readonly ("unit" | "chord" | "curve" | "ends" | "side")[];
+  readonly curves: readonly (readonly [number, string])[];
+  readonly closed: boolean;
+  readonly turns_left: boolean;
+  readonly length_mm: number;
+  readonly size_mm: readonly [number, number];
+  readonly unit_known: boolean;
+  readonly source_format: string;
+  readonly notes: readonly string[];
+  readonly points_mm: readonly (readonly [number, number])[];
+  readonly part: string;
+  readonly name: string;
+  readonly files: readonly string[];
+}
+
+/** What came of a new plan: its name once it is saved, else what is wrong. The answer to a post at `/plan`, as JSON. surface : it is a plan of a CT surface; taken: there was a plan of this name */
+export interface PlanSaved {
+  readonly name: string;
+  readonly surface: boolean;
+  readonly taken: boolean;
+  readonly mistakes: readonly FormMistake[];
 }
 
 export type Message = Admitted | Hello | Alive | Answer | Control | StationState | AlarmList | ShownRun | CharacteristicList | History | SurfaceState;
