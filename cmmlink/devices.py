@@ -3,11 +3,12 @@
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
+from typing import Literal
 
 from cmmlink.errors import PlanError
 from cmmlink.plan import Device, DmeDevice, FileDevice, ModbusDevice, Plan, SerialDevice, map_of
 from cmmlink.scratch import Scratch, scratch_in
-from drivers import DME_UNSEEN, Decoder, PointFileSource, RegisterDecoder, ScanSource, decoder, unseen_in
+from drivers import DME_UNSEEN, Decoder, PointFileSource, RegisterDecoder, RegisterSurvey, ScanSource, decoder, unseen_in
 from drivers.links.axis import Beam, ConstantFeed, FollowedAxis
 from drivers.links.link_settings import LinkSettings
 
@@ -138,6 +139,27 @@ def _link(device: SerialDevice | ModbusDevice) -> ScanSource:
 
     registers = _register_decoder(device)
     return ModbusScanner(device.address, registers, settings, device_id=device.device_id, timeout_s=device.timeout_s)
+
+
+@dataclass(frozen=True, slots=True)
+class ModbusPlace:
+    """Where a Modbus device is asked for its registers: host:port, or the port of an RTU line with its speed and parity."""
+
+    address: str
+    device_id: int = 1
+    baud_rate: int = 19_200
+    parity: Literal["N", "E", "O"] = "E"
+
+
+def source_of_survey(place: ModbusPlace, survey: RegisterSurvey, pause_s: float) -> ScanSource:
+    """What reads registers for their own sake, with a pause between two readings of all of them. Raises PlanError for an address."""
+    from drivers.links.modbus_scanner import ModbusScanner  # noqa: PLC0415 - it loads pymodbus
+
+    settings = LinkSettings(place.baud_rate, place.parity)
+    try:
+        return ModbusScanner(place.address, survey, settings, device_id=place.device_id, poll_s=pause_s)
+    except ValueError as error:
+        raise PlanError(str(error)) from None
 
 
 def serial_ports() -> list[tuple[str, str]]:

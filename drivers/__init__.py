@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from drivers.codecs.dme_session import DME_UNSEEN, DmeJob
     from drivers.codecs.register_decoder import RegisterDecoder
     from drivers.codecs.register_map import RegisterMap, register_map
+    from drivers.codecs.register_survey import WORD_ORDERS, RegisterSurvey, Table, WordOrder, registers_of, stored_number
     from drivers.errors import CadError, DeviceError, DeviceRefused, LinkError, MeshError, PointFileError, ProtocolError
     from drivers.files.column_choice import AxisName
     from drivers.files.point_file import PointArraySource, PointFile, PointFileSource, convert_to_mm, points_in, points_of, read_points
@@ -54,6 +55,7 @@ else:
         "drivers.codecs.dme_session": ("DME_UNSEEN", "DmeJob"),
         "drivers.codecs.register_decoder": ("RegisterDecoder",),
         "drivers.codecs.register_map": ("RegisterMap", "register_map"),
+        "drivers.codecs.register_survey": ("WORD_ORDERS", "RegisterSurvey", "Table", "WordOrder", "registers_of", "stored_number"),
         "drivers.errors": ("CadError", "DeviceError", "DeviceRefused", "LinkError", "MeshError", "PointFileError", "ProtocolError"),
         "drivers.files.column_choice": ("AxisName",),
         "drivers.files.point_file": (
@@ -101,6 +103,7 @@ else:
 __all__ = [
     "DME_UNSEEN",
     "HARMLESS_REASONS",
+    "WORD_ORDERS",
     "Arrival",
     "AxisName",
     "CadError",
@@ -126,12 +129,15 @@ __all__ = [
     "ProtocolError",
     "RegisterDecoder",
     "RegisterMap",
+    "RegisterSurvey",
     "Rejected",
     "ScanClosed",
     "ScanOpened",
     "ScanSource",
+    "Table",
     "UnitName",
     "WireBytes",
+    "WordOrder",
     "convert_to_mm",
     "count_of",
     "curve_density",
@@ -148,6 +154,7 @@ __all__ = [
     "read_points",
     "read_text",
     "register_map",
+    "registers_of",
     "scan_on_circle",
     "scan_on_line",
     "scan_unknown",
@@ -155,5 +162,6 @@ __all__ = [
     "shipped_map",
     "shipped_maps",
     "shorten",
+    "stored_number",
     "unseen_in",
 ]

@@ -24,6 +24,7 @@ from cmmlink.commands.plans import example, plan
 from cmmlink.commands.point_files import inspect
 from cmmlink.commands.proofs import verify_zone
 from cmmlink.commands.records import replay, runs, show, verify
+from cmmlink.commands.registers import registers
 from cmmlink.commands.report import report
 from cmmlink.commands.setup import doctor, list_ports, nominal, prepare, simulate
 from cmmlink.commands.surfaces import ManyHeights, ct
@@ -53,6 +54,7 @@ app.command("console", short_help="Serve the operator console in a browser.")(se
 app.command(short_help="Compile the inspection, once after an installation.")(prepare)
 app.command(short_help="Look at what cmmlink needs of this computer.")(doctor)
 app.command("ports")(list_ports)
+app.command(short_help="Show what a Modbus device's registers hold, and write a register map.")(registers)
 app.command(add_help_option=False, context_settings={"allow_extra_args": True, "ignore_unknown_options": True})(simulate)
 app.command()(runs)
 app.command()(show)

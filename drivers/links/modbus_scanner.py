@@ -20,7 +20,6 @@ from pymodbus.exceptions import ConnectionException, ModbusIOException
 from pymodbus.pdu import ModbusPDU
 from pymodbus.pdu.file_message import ReadFifoQueueResponse
 
-from drivers.codecs.register_decoder import RegisterDecoder
 from drivers.codecs.register_pdus import EXCEPTIONS, PASSING, READ_FIFO
 from drivers.errors import DeviceError, LinkError
 from drivers.links.address import HostPort, device_address, require_port
@@ -28,7 +27,7 @@ from drivers.links.link_settings import LinkSettings
 from drivers.links.reconnect import keep_up
 from drivers.links.tcp_line import open_tcp
 from drivers.links.watch import Watch, explained
-from drivers.source import Arrival, PointBatch, ScanClosed, WireBytes
+from drivers.source import Arrival, Decoder, PointBatch, ScanClosed, WireBytes
 
 TRIES = 3  # of one request, before the link counts as lost
 USUAL = LinkSettings(19_200, "E")  # of an RTU line, as the standard says
@@ -46,13 +45,21 @@ class FifoAnswer(ReadFifoQueueResponse):
         return 6 + int.from_bytes(data[2:4], "big") if len(data) >= 4 else 0
 
 
+class Asker(Decoder, Protocol):
+    """What decides which registers are read next."""
+
+    @property
+    def idle(self) -> bool:
+        """Whether nothing new was there, so that the next request may wait a little."""
+
+
 class ModbusScanner:
     """Points of one scan from registers: `host:port` speaks TCP, any other address is the port of an RTU line."""
 
     def __init__(
         self,
         address: str,
-        decoder: RegisterDecoder,
+        decoder: Asker,
         settings: LinkSettings = USUAL,
         *,
         device_id: int = 1,

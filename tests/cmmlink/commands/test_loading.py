@@ -43,7 +43,7 @@ def loaded_by(*commands: tuple[object, ...]) -> list[tuple[int, str, set[str]]]:
 
 
 def test_help_version_and_mistakes_load_nothing_heavy() -> None:
-    working = ("demo", "run", "inspect", "ct", "nominal", "check", "console", "prepare", "doctor", "ports")
+    working = ("demo", "run", "inspect", "ct", "nominal", "check", "console", "prepare", "doctor", "ports", "registers")
     commands = (*working, "runs", "show", "export", "report", "compare", "replay", "verify", "backup", "restore", "merge")
     helped = loaded_by(("--version",), ("--help",), *((command, "--help") for command in commands))
     assert [(code, loaded) for code, _, loaded in helped] == [(0, set())] * (2 + len(commands))
