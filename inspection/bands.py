@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inspection.consumption import fit_least_consumption
+from inspection.freedoms import Freedoms
 from inspection.kernels import Feet
 from inspection.minimum_zone import fit_minimum_zone
 from inspection.nominal import NominalProfile
@@ -42,9 +43,12 @@ class Band(Protocol):
         """The lowest lower and the highest upper limit (m,) that places (m, 2) may come to while they move by `moves_mm` (m,)."""
 
     def fit(
-        self, points: Array, nominal: NominalProfile, start: Start, tip_radius_mm: float, is_over: Callable[[], bool]
+        self, points: Array, nominal: NominalProfile, start: Start, tip: float, is_over: Callable[[], bool], freedoms: Freedoms | None
     ) -> tuple[RigidTransform, Rows]:
-        """A pose at which points (m, 2) reach least far towards its limits, nearby, and the points that hold it there."""
+        """A pose at which points (m, 2) reach least far towards its limits, nearby, and the points that hold it there.
+
+        start : where the fit begins, and from where its freedoms count; tip : radius of the ball of which points are the centre, mm
+        """
 
 
 class EvenBand:
@@ -64,10 +68,10 @@ class EvenBand:
         return self._limits
 
     def fit(
-        self, points: Array, nominal: NominalProfile, start: Start, tip_radius_mm: float, is_over: Callable[[], bool]
+        self, points: Array, nominal: NominalProfile, start: Start, tip: float, is_over: Callable[[], bool], freedoms: Freedoms | None
     ) -> tuple[RigidTransform, Rows]:
         """See `Band`."""
-        zone = fit_minimum_zone(points, nominal, start, "exact", tip_radius_mm, self._middle_mm, is_over)
+        zone = fit_minimum_zone(points, nominal, start, "exact", tip, self._middle_mm, is_over, freedoms)
         return zone.nominal_from_section, zone.active
 
 
@@ -97,10 +101,10 @@ class VaryingBand:
         return self._of(lower_low, upper_high)
 
     def fit(
-        self, points: Array, nominal: NominalProfile, start: Start, tip_radius_mm: float, is_over: Callable[[], bool]
+        self, points: Array, nominal: NominalProfile, start: Start, tip: float, is_over: Callable[[], bool], freedoms: Freedoms | None
     ) -> tuple[RigidTransform, Rows]:
         """See `Band`."""
-        found = fit_least_consumption(points, nominal, self._zone, start, "exact", tip_radius_mm, is_over)
+        found = fit_least_consumption(points, nominal, self._zone, start, "exact", tip, is_over, freedoms)
         return found.nominal_from_section, found.active
 
     def _of(self, lower: Array, upper: Array) -> Limits:

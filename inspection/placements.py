@@ -6,7 +6,8 @@ centre puts it by at most rho_i = sqrt(2) h + 2 sin(t / 2) |p_i - anchor|. A box
 centre is farther out of the zone than rho_i, and where the zone varies along the profile, out of the loosest zone of all stations
 that its foot may come to (see `bands`). When every box is refuted, no placement of the part can pass: whatever fit is
 used, whatever datum, and whatever points are still to come, since the maximum over more points is never smaller. The root of the
-search is every anchor in the nominal's box grown by the zone, and every angle, so the answer depends on no start.
+search is every anchor in the nominal's box grown by the zone, and every angle, so the answer depends on no start. Where a fit is
+locked or limited, the root is what it may do from its known start (see `motions`), and the answer is of those motions alone.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,8 +19,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from inspection.bands import Band, EvenBand
 from inspection.coarse import check_registrable
+from inspection.freedoms import Freedoms
 from inspection.kernels import project
 from inspection.kernels.layout import OPEN_END
+from inspection.motions import Motions, every_motion, motions_within
 from inspection.nominal import NominalProfile
 from inspection.rigid import RigidTransform
 from inspection.telling_points import MANY, telling_rows
@@ -56,7 +59,7 @@ class PlacementProof:
 
 @dataclass(slots=True)
 class _Boxes:
-    """Boxes of motions: centre place (k, 2) and angle (k,), half widths (k,), and how far out of the zone their parent was (k,)."""
+    """Boxes of motions: centre shift (k, 2), angle (k,), half widths (k, 2), (k,), and how far out of the zone their parent was (k,)."""
 
     place: Array
     angle: Array
@@ -74,6 +77,12 @@ class _Boxes:
         every = [self, *others]
         return _Boxes(*(np.concatenate([getattr(boxes, name) for boxes in every]) for name in self.__slots__))
 
+    def moves_mm(self, reach_mm: Array | float) -> Array:
+        """How far (k,), or (k, j), each box moves points that are so far from the anchor, at most."""
+        turns = 2 * np.sin(self.turn / 2)
+        shifts = np.hypot(self.half[:, 0], self.half[:, 1])
+        return np.asarray(shifts + turns * reach_mm if isinstance(reach_mm, float) else shifts[:, None] + turns[:, None] * reach_mm)
+
 
 class PlacementSearch:
     """The search for a placement that passes, over the points of a growing scan.
@@ -81,14 +90,18 @@ class PlacementSearch:
     allowed       : the deviations between which every point must lie for a placement to pass: a band, or half the width of one that
                     is the same everywhere, about zero. With an uncertainty U it is the tolerance zone, wider by U on both sides
     tip_radius_mm : the points are centres of a ball of this radius
+    freedoms      : only the motions that they allow from the start of a look count; None lets every motion count
 
     A search remembers which points refuted most, and a placement that passed, so that the next one is quick. Points beyond an open
     end count with their distance to that end; hand over only points that belong to the profile.
     """
 
-    def __init__(self, nominal: NominalProfile, allowed: Band | float, tip_radius_mm: float = 0.0) -> None:
+    def __init__(
+        self, nominal: NominalProfile, allowed: Band | float, tip_radius_mm: float = 0.0, freedoms: Freedoms | None = None
+    ) -> None:
         self._band = EvenBand(allowed) if isinstance(allowed, float) else allowed
-        self._nominal, self._tip = nominal, tip_radius_mm
+        self._nominal, self._tip, self._freedoms = nominal, tip_radius_mm, freedoms
+        self._start: RigidTransform | None = None
         self._ends = np.empty((0, 2)) if nominal.curve.closed else nominal.curve.point(np.array(nominal.curve.domain))
         self._hits: dict[int, int] = {}
         self._passed: RigidTransform | None = None
@@ -103,14 +116,19 @@ class PlacementSearch:
     ) -> PlacementProof:
         """Search every placement of section points (m, 2). Earlier ones the same as in the last call make the search quick.
 
-        start      : a pose near which a placement that passes is sought first; None begins at the points' best fit
+        start      : a pose near which a placement that passes is sought first; None begins at the points' best fit. With freedoms it
+                     is where these count from, and is needed
         most_boxes : the search gives up after so many boxes, undecided
         is_over    : asked every few milliseconds, between two waves of boxes or programs; the search gives up once it says so, undecided
         """
         points = check_registrable(points_mm)
+        if self._freedoms is not None:
+            if start is None:
+                raise ValueError("a search within locked or limited freedoms needs the pose from which they count")
+            self._start = start
         if self._passed is not None and self._excess(points, self._passed) <= 0:
             return PlacementProof("fits", self._passed, (), 0)
-        pose, active = self._band.fit(points, self._nominal, start, self._tip, is_over)
+        pose, active = self._band.fit(points, self._nominal, start, self._tip, is_over, self._freedoms)
         if self._excess(points, pose) <= 0:
             self._passed = pose
             return PlacementProof("fits", pose, (), 0)
@@ -169,33 +187,36 @@ class PlacementSearch:
 
     def _search(self, points: Array, active: list[int], most_boxes: int, is_over: Callable[[], bool]) -> PlacementProof:
         """Refute boxes of motions until none is left, best first; `active` are the points that hold the minimum zone nearby."""
-        anchor = int(np.argmin(((points - points.mean(axis=0)) ** 2).sum(axis=1)))
-        arms = points - points[anchor]
+        motions = self._motions(points)
         even = np.linspace(0, len(points) - 1, _EVEN_WITNESSES).astype(int).tolist()
         hits = {row: count for row, count in self._hits.items() if row < len(points)}
         self._hits = dict.fromkeys([*hits, *active, *even], 0) | hits
-        waiting, looked_at = self._root(), 0
+        waiting, looked_at = _root(motions), 0
         while len(waiting):
             if looked_at >= most_boxes or is_over():
                 return PlacementProof("undecided", None, self._witnesses(), looked_at)
             wave, waiting = _best(waiting)
             looked_at += len(wave)
-            left = self._not_refuted(wave, arms)
+            left = self._not_refuted(wave, motions)
             if len(left):
-                left, passing = self._asked_of_all(left, arms)
+                left, passing = self._asked_of_all(left, motions)
                 if passing is not None:
-                    self._passed = _pose(*passing, points[anchor])
+                    self._passed = motions.pose(*passing)
                     return PlacementProof("fits", self._passed, self._witnesses(), looked_at)
-                waiting = waiting.joined(_halves(left, float(np.hypot(*arms.T).max())))
+                if float(left.moves_mm(motions.reach_mm).min(initial=np.inf)) < _ROUNDING_MM:
+                    return PlacementProof("undecided", None, self._witnesses(), looked_at)  # nothing that is left to cut tells more
+                waiting = waiting.joined(_halves(left, motions))
         return PlacementProof("refuted", None, self._witnesses(), looked_at, self._finest_mm)
 
-    def _root(self) -> _Boxes:
-        """Return the one box that holds every motion which could pass."""
+    def _motions(self, points: Array) -> Motions:
+        """Every motion of points (m, 2) that could pass."""
         low, high = self._nominal.points_mm.min(axis=0), self._nominal.points_mm.max(axis=0)
-        side = float((high - low).max()) / 2 + self._band.farthest_mm + self._tip
-        return _Boxes((low + high)[None, :] / 2, np.zeros(1), np.array([side]), np.array([np.pi]), np.zeros(1))
+        bounds = points, low, high, self._band.farthest_mm + self._tip
+        if self._freedoms is None or self._start is None:
+            return every_motion(*bounds)
+        return motions_within(*bounds, self._start, self._freedoms)
 
-    def _not_refuted(self, wave: _Boxes, arms: Array) -> _Boxes:
+    def _not_refuted(self, wave: _Boxes, motions: Motions) -> _Boxes:
         """Return the boxes that none of the witnesses refutes, each with how far out its centre is."""
         alive = np.arange(len(wave))
         ordered = sorted(self._hits, key=lambda row: -self._hits[row])
@@ -204,7 +225,7 @@ class PlacementSearch:
             if not len(alive) or not len(rows):
                 break
             boxes = wave.rows(alive)
-            margin, excess = self._margins(boxes, arms[rows])
+            margin, excess = self._margins(boxes, motions, rows)
             wave.excess[alive] = np.maximum(wave.excess[alive], excess.max(axis=1))
             refuted = margin.max(axis=1) > 0
             by = margin[refuted].argmax(axis=1)
@@ -215,18 +236,17 @@ class PlacementSearch:
             alive = alive[~refuted]
         return wave.rows(alive)
 
-    def _asked_of_all(self, boxes: _Boxes, arms: Array) -> tuple[_Boxes, tuple[Array, float] | None]:
-        """Ask the small boxes with every point; return what is left, and the place and angle of a centre that passes."""
-        reach = float(np.hypot(*arms.T).max())
-        moves = np.sqrt(2) * boxes.half + 2 * np.sin(boxes.turn / 2) * reach
-        small = np.flatnonzero(moves < _SMALL * self._band.narrowest_mm)
+    def _asked_of_all(self, boxes: _Boxes, motions: Motions) -> tuple[_Boxes, tuple[Array, float] | None]:
+        """Ask the small boxes with every point; return what is left, and the shift and angle of a centre that passes."""
+        every = np.arange(len(motions.arms))
+        small = np.flatnonzero(boxes.moves_mm(motions.reach_mm) < _SMALL * self._band.narrowest_mm)
         left = np.ones(len(boxes), dtype=bool)
         first = small[np.argsort(boxes.excess[small])][:_FULL_LOOKS]
         if not len(first):
             return boxes, None
-        margins, excesses = self._margins(boxes.rows(first), arms)
+        margins, excesses = self._margins(boxes.rows(first), motions, every)
         for box, margin, excess in zip(first.tolist(), margins, excesses, strict=True):
-            if excess.max() <= 0 and self._outside(_moved(boxes, box, arms)).max() <= 0:
+            if excess.max() <= 0 and self._outside(_moved(boxes, box, motions)).max() <= 0:
                 return boxes, (boxes.place[box], float(boxes.angle[box]))
             left[box] = margin.max() <= 0
             if not left[box]:
@@ -235,13 +255,12 @@ class PlacementSearch:
             boxes.excess[box] = max(boxes.excess[box], float(excess.max()))
         return boxes.rows(left), None
 
-    def _margins(self, boxes: _Boxes, arms: Array) -> tuple[Array, Array]:
-        """By how much each point (j) refutes each box (k), and how far out of the zone the box's centre puts it, both (k, j)."""
-        cosine, sine = np.cos(boxes.angle)[:, None], np.sin(boxes.angle)[:, None]
-        x = boxes.place[:, :1] + cosine * arms[:, 0] - sine * arms[:, 1]
-        y = boxes.place[:, 1:] + sine * arms[:, 0] + cosine * arms[:, 1]
-        moves = np.sqrt(2) * boxes.half[:, None] + 2 * np.sin(boxes.turn / 2)[:, None] * np.hypot(*arms.T)
-        excess = self._outside(np.stack([x, y], axis=-1).reshape(-1, 2), moves.reshape(-1)).reshape(x.shape)
+    def _margins(self, boxes: _Boxes, motions: Motions, rows: Rows) -> tuple[Array, Array]:
+        """By how much each of rows (j,) refutes each box (k), and how far out of the zone the box's centre puts it, both (k, j)."""
+        arms = motions.arms[rows]
+        moves = boxes.moves_mm(np.hypot(*arms.T))
+        places = motions.places(boxes.place, boxes.angle, arms)
+        excess = self._outside(places.reshape(-1, 2), moves.reshape(-1)).reshape(moves.shape)
         return excess - moves - _ROUNDING_MM, excess
 
     def _excess(self, points: Array, pose: RigidTransform) -> float:
@@ -251,7 +270,7 @@ class PlacementSearch:
         """How far places (j, 2) lie out of the zone, or of the loosest one that they may come to when they move by `moves` (j,).
 
         The sign of a distance turns round in the region beyond an open end. Where a place may come there, the kinder sign counts,
-        so that the bound holds across the jump.
+        so that the bound holds across the jump. Within freedoms such a place says nothing, for at the pose of a fit it takes no part.
         """
         feet = project(places, self._nominal.grid)
         lower, upper = self._band.limits(feet) if moves is None else self._band.loosest(places, feet, moves)
@@ -264,16 +283,22 @@ class PlacementSearch:
         if len(self._ends):
             to_end = np.hypot(*(places[:, None, :] - self._ends).T).min(axis=0)
             either = (feet.vertex == OPEN_END) | (to_end <= np.abs(feet.distance_mm) + (0.0 if moves is None else 2 * moves))
-            found = np.where(either, np.minimum(outside(1.0), outside(-1.0)), found)
+            kinder = np.minimum(outside(1.0), outside(-1.0)) if self._freedoms is None else -np.inf
+            found = np.where(either, kinder, found)
         return found
 
     def _witnesses(self) -> tuple[int, ...]:
         return tuple(row for row in sorted(self._hits, key=lambda row: -self._hits[row]) if self._hits[row])
 
 
-def _moved(boxes: _Boxes, box: int, arms: Array) -> Array:
-    """The places (m, 2) to which the centre of a box brings points that lie at `arms` (m, 2) from the anchor."""
-    return RigidTransform(float(boxes.angle[box]), boxes.place[box]).apply(arms)
+def _root(motions: Motions) -> _Boxes:
+    """Return the one box that holds every motion which could pass."""
+    return _Boxes(motions.shift_mm[None], np.array([motions.angle]), motions.half_mm[None], np.array([motions.turn]), np.zeros(1))
+
+
+def _moved(boxes: _Boxes, box: int, motions: Motions) -> Array:
+    """The places (m, 2) to which the centre of a box brings the points, as the pose of that motion does."""
+    return RigidTransform(float(boxes.angle[box]), motions.origin + boxes.place[box] @ motions.axes).apply(motions.arms)
 
 
 def _best(waiting: _Boxes) -> tuple[_Boxes, _Boxes]:
@@ -284,18 +309,10 @@ def _best(waiting: _Boxes) -> tuple[_Boxes, _Boxes]:
     return waiting.rows(order[:_WAVE]), waiting.rows(order[_WAVE:])
 
 
-def _halves(boxes: _Boxes, reach_mm: float) -> list[_Boxes]:
-    """Cut every box in place, into four, or in angle, into two: whichever moves points more."""
-    in_place = np.sqrt(2) * boxes.half >= _TURN_SHARE * 2 * np.sin(boxes.turn / 2) * reach_mm
+def _halves(boxes: _Boxes, motions: Motions) -> list[_Boxes]:
+    """Cut every box in place, into four, or in angle, into two: whichever moves points more. What is locked is not cut."""
+    in_place = np.hypot(*boxes.half.T) >= _TURN_SHARE * 2 * np.sin(boxes.turn / 2) * motions.reach_mm
     wide, long = boxes.rows(in_place), boxes.rows(~in_place)
     h, t = wide.half / 2, long.turn / 2
-    quarters = [
-        _Boxes(wide.place + np.column_stack([x * h, y * h]), wide.angle, h, wide.turn, wide.excess) for x in (-1, 1) for y in (-1, 1)
-    ]
+    quarters = [_Boxes(wide.place + np.array(way) * h, wide.angle, h, wide.turn, wide.excess) for way in motions.ways]
     return quarters + [_Boxes(long.place, long.angle + way * t, long.half, t, long.excess) for way in (-1, 1)]
-
-
-def _pose(place: Array, angle: float, anchor: Array) -> RigidTransform:
-    """Return the motion that turns by an angle and brings the anchor to a place."""
-    turned = RigidTransform(angle, np.zeros(2)).apply(anchor[None, :])[0]
-    return RigidTransform(angle, place - turned)

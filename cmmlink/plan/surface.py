@@ -116,12 +116,16 @@ class CtPlan(Deciding):
         if stack_fit == "common" and registration is not None:
             if registration.fit == "none":
                 raise ValueError("each where the pose is known: a datum places all sections already")
-            if registration.fit == "minimum-zone" or registration.reject_outliers:
-                raise ValueError("each where registration asks for a minimum zone or for outliers: a common fit is of least squares")
+            if registration.fit == "minimum-zone":
+                raise ValueError("each where registration.fit is minimum-zone: a common fit is of least squares, a zone is of one section")
+            if registration.reject_outliers:
+                raise ValueError("each where registration.reject_outliers: a common fit is of all points")
         if stack_fit == "common" and info.data.get("tolerance") is None and info.data.get("characteristics"):
             first = next((one for one in info.data["characteristics"] if isinstance(one, AskedProfile)), None)
             if first is not None and first.fit != "none":
-                raise ValueError(f"each, or fit none of {first.name}: with a fit of its own it is not judged where the common fit puts it")
+                raise ValueError(
+                    f"each, or fit none of {first.name}: a common fit is of least squares, and fit {first.fit} is of one section"
+                )
         return stack_fit
 
     @field_validator("stack_characteristics")

@@ -30,6 +30,7 @@ Rows = NDArray[np.int64]
 
 _PLACED = 0.95  # share of the region whose points place it, where the plan asks for no coverage
 _MOST_BOXES = 200_000  # of placements, before the search for one that passes is given up
+_LESS = 1e-3  # of a zone: by no more than this another placement may consume less than that of a limited fit
 _FEWEST_POINTS = 8  # of a region, after whose fit its uncertainty is asked
 _DECIDED = {"none": "at the pose of the run", "datum": "at the datum"}
 
@@ -281,7 +282,7 @@ def _decide(
     if seen.verdict is not Verdict.NONCONFORM or (placed.is_known and placed.converged):
         return placed, seen, seen.verdict, why
     if asked.filter is not None or (asked.rule == "best-fit" and asked.fit in ("best-fit", "none")):
-        return placed, seen, *_doubt_fit(asked, basis, placed, why)
+        return placed, seen, *_doubt_fit(asked, basis, few, placed, why)
     if asked.fit == "best-fit" and placed.is_free:
         elsewhere = _smallest(asked, basis, few, placed.pose)
         at_elsewhere = _see(asked, basis, rows, elsewhere)
@@ -317,7 +318,7 @@ def _smallest(asked: LineProfile, basis: Basis, few: Rows, start: RigidTransform
     return consume_least(asked, basis, points, start).nominal_from_section.snap_to_grid()
 
 
-def _doubt_fit(asked: LineProfile, basis: Basis, placed: Placed, why: Reason | None) -> tuple[Verdict, Reason | None]:
+def _doubt_fit(asked: LineProfile, basis: Basis, few: Rows, placed: Placed, why: Reason | None) -> tuple[Verdict, Reason | None]:
     """The verdict of points that are out at the pose of a fit, by the rule that this pose decides."""
     covered = basis.measured(asked.region).coverage
     if not basis.complete or covered < (basis.terms.coverage_min or _PLACED):
@@ -328,19 +329,39 @@ def _doubt_fit(asked: LineProfile, basis: Basis, placed: Placed, why: Reason | N
     if basis.result.registration.rivals:
         words = "The part fits the nominal in another pose as well: only a datum can tell whether points are out."
         return Verdict.UNCERTAIN, Reason("placement", words)
-    if placed.certificate is not None and not placed.certificate.proven:
+    if asked.fit in ("minimum-zone", "tolerance") and not _is_least(asked, basis, few, placed):
         return Verdict.UNCERTAIN, Reason("placement", "It was not proven that no other placement has a smaller zone.")
     return Verdict.NONCONFORM, why
 
 
+def _is_least(asked: LineProfile, basis: Basis, few: Rows, placed: Placed) -> bool:
+    """Whether it is proven that no motion which the fit may make has a smaller zone than its pose, or consumes less."""
+    if placed.certificate is not None:
+        return placed.certificate.proven
+    d = basis.deviations_at(few, placed.pose)
+    share = float(np.abs(asked.zone.consumption(d.deviation_mm, d.station_mm)[~d.beyond_end]).max(initial=0.0)) - _LESS
+    search = PlacementSearch(basis.nominal, _band(asked, basis, share, 0.0), basis.terms.tip_radius_mm, asked.freedoms)
+    return share <= 0 or search.look(basis.result.section_at(few), placed.begin, _MOST_BOXES).outcome == "refuted"
+
+
+def _band(asked: LineProfile, basis: Basis, share: float, u: float) -> Band:
+    """Where deviations lie that consume no more than a share of the zone, wider by U."""
+    zone = asked.zone
+    if is_constant(zone):
+        lower, upper = float(zone.lower_mm[0]), float(zone.upper_mm[0])
+        return EvenBand(share * ((upper - lower) / 2 + u), (lower + upper) / 2)
+    return VaryingBand(basis.nominal, replace(zone, lower_mm=zone.lower_mm - u, upper_mm=zone.upper_mm + u), share)
+
+
 def _ask_every_placement(asked: LineProfile, basis: Basis, few: Rows, placed: Placed, why: Reason | None) -> tuple[Verdict, Reason | None]:
-    """The verdict of points that are out at a fitted pose: NONCONFORM where no placement at all brings them into the zone."""
-    zone, u = asked.zone, basis.guard(_u(asked))
-    band: Band = EvenBand(float(zone.upper_mm[0] - zone.lower_mm[0]) / 2 + u, float(zone.upper_mm[0] + zone.lower_mm[0]) / 2)
-    if not is_constant(zone):
-        band = VaryingBand(basis.nominal, replace(zone, lower_mm=zone.lower_mm - u, upper_mm=zone.upper_mm + u), 1.0)
-    search = PlacementSearch(basis.nominal, band, basis.terms.tip_radius_mm)
-    proof = search.look(basis.result.section_at(few), placed.pose, _MOST_BOXES)
+    """The verdict of points that are out at a fitted pose: NONCONFORM where no placement that it may have brings them into the zone.
+
+    Where freedoms count from a known pose, only the motions that they allow may place the part; else every placement may.
+    """
+    band = _band(asked, basis, 1.0, basis.guard(_u(asked)))
+    within = asked.freedoms if placed.begin_known else None
+    search = PlacementSearch(basis.nominal, band, basis.terms.tip_radius_mm, within)
+    proof = search.look(basis.result.section_at(few), placed.pose if within is None else placed.begin, _MOST_BOXES)
     if proof.outcome == "refuted":
         return Verdict.NONCONFORM, why
     words = (

@@ -49,6 +49,7 @@ class Placed:
     converged   : the fit settled
     certificate : of a minimum zone or a least consumption over every placement; its rows are those of the run
     datum       : the features that the part was placed by, where these were measured
+    begin       : where the freedoms of the fit count from, where these are locked or limited; `begin_known` whether that is the datum
     doubt       : why the pose decides nothing, where it does not: the datum that was asked for was not found, or too few points for a fit
     """
 
@@ -59,6 +60,8 @@ class Placed:
     converged: bool = True
     certificate: ZoneCertificate | ConsumptionCertificate | None = None
     datum: FoundDatum | None = None
+    begin: RigidTransform | None = None
+    begin_known: bool = False
     doubt: Reason | None = None
 
 
@@ -88,23 +91,25 @@ def place(asked: LineProfile, basis: Basis, every: Rows, rows: Rows) -> Placed:
         shares=basis.shares(drawn) if asked.region is not None else None,
     )
     points = basis.result.section_at(rows)
-    words, free = _words(asked), asked.freedoms is None
+    free = asked.freedoms is None
+    placed = Placed(start, _words(asked), is_free=free, begin=None if free else start, begin_known=start_known)
     if asked.fit == "best-fit":
         registration = best.registration
-        return Placed(registration.nominal_from_section.snap_to_grid(), words, start_known and not free, free, registration.converged)
+        pose = registration.nominal_from_section.snap_to_grid()
+        return replace(placed, pose=pose, is_known=start_known and not free, converged=registration.converged)
     if asked.fit == "tolerance":
         least = consume_least(asked, basis, points, best.registration.nominal_from_section, None if free else start)
         proof = _certify_consumption(asked, basis, points, least, rows) if free else None
         fit = least if proof is None else proof.fit
-        return Placed(fit.nominal_from_section.snap_to_grid(), words, is_free=free, converged=fit.converged, certificate=proof)
+        return replace(placed, pose=fit.nominal_from_section.snap_to_grid(), converged=fit.converged, certificate=proof)
     if not free:
         zone = shrink_zone(asked, basis, points, start)
-        return Placed(zone.nominal_from_section.snap_to_grid(), words, converged=zone.converged)
+        return replace(placed, pose=zone.nominal_from_section.snap_to_grid(), converged=zone.converged)
     gap_mm = float(asked.zone.upper_mm[0] - asked.zone.lower_mm[0]) * (_GAP_SHARE if asked.region is None else _GAP_SHARE_REGION)
     certificate = _certify(basis, points, best.registration, middle_of(asked.zone, basis, rows), gap_mm)
     settled = certificate.balanced or certificate.proven  # points all on the nominal balance nothing, and no zone is smaller
     pose = certificate.nominal_from_section.snap_to_grid()
-    return Placed(pose, words, is_free=True, converged=settled, certificate=_in_run(certificate, rows))
+    return replace(placed, pose=pose, converged=settled, certificate=_in_run(certificate, rows))
 
 
 def _too_few(points: int) -> Reason | None:

@@ -79,3 +79,7 @@ def test_a_common_fit_takes_no_known_pose_and_no_minimum_zone() -> None:
         plan_of(mesh, nominal, HEIGHTS, stack_fit="common", registration={"datum": {}})
     with pytest.raises(ValidationError, match="a common fit is of least squares"):
         plan_of(mesh, nominal, HEIGHTS, stack_fit="common", registration={"fit": "minimum-zone"})
+    zone = {"name": "contour", "type": "line-profile", "zone": {"lower_mm": -0.05, "upper_mm": 0.05}}
+    for fit in ("minimum-zone", "tolerance"):
+        with pytest.raises(ValidationError, match=f"a common fit is of least squares, and fit {fit} is of one section"):
+            plan_of(mesh, nominal, HEIGHTS, stack_fit="common", tolerance=None, characteristics=[zone | {"fit": fit}])

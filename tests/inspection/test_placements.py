@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from inspection import RigidTransform, discretize, fit_minimum_zone
+from inspection import FreedomName, Freedoms, RigidTransform, deviations, discretize, fit_minimum_zone
 from inspection.bands import EvenBand
 from inspection.placements import PlacementSearch
+from inspection.rigid import rotation_about
 from tests.inspection import profiles
 from tests.inspection.profiles import Array
 from tests.inspection.reference_parts import middles, nominal_of, reference_form, scan, stations
@@ -94,3 +95,37 @@ def test_what_few_of_many_points_prove_holds_for_all() -> None:
     form = reference_form(name, count)
     form[4321] -= 0.12
     assert PlacementSearch(nominal_of(name), half + 0.005).look(scan(name, count, form, 92, (15, -7))).outcome == "refuted"
+
+
+@pytest.mark.parametrize(
+    ("free", "between", "is_limited"),
+    [
+        ((), (0.0, 0.0), False),
+        (("x",), (-0.03, 0.2), True),
+        (("x",), (-0.2, 0.2), False),
+        (("y",), (-0.2, 0.2), False),
+        (("rotation",), (-5e-4, 2e-3), True),
+        (("rotation",), (-3e-3, 3e-3), False),
+    ],
+)
+def test_within_freedoms_the_smallest_zone_is_that_of_a_walk_through_them(
+    free: tuple[FreedomName, ...], between: tuple[float, float], is_limited: bool
+) -> None:
+    """Of one free motion every amount can be tried in steps; of none there is one placement. The axis x lies along 30 degrees."""
+    nominal, points = nominal_of("goe404"), scan("goe404", 200, reference_form("goe404", 200), 0, (0, 0))
+    start = rotation_about(np.array([40.0, 3.0]), np.radians(0.05), np.array([0.05, -0.03]))
+    freedoms = Freedoms.about((40.0, 3.0), free, np.radians(30.0), {free[0]: between} if is_limited else None)
+    amounts = np.linspace(*between, 1001)[:, None][:, : len(free)]
+    least = min(float(np.abs(deviations(freedoms.pose(start, one).apply(points), nominal).deviation_mm).max()) for one in amounts)
+    step = (between[1] - between[0]) / 1000 * (65.0 if "rotation" in free else 1.0)  # mm, of the point that is farthest from the pivot
+    assert PlacementSearch(nominal, least - step / 2 - 1e-8, freedoms=freedoms).look(points, start).outcome == "refuted"
+    assert PlacementSearch(nominal, least - 1e-10, freedoms=freedoms).look(points, start, 2000).outcome != "refuted"  # by round-off alone
+    found = PlacementSearch(nominal, least + 1e-6, freedoms=freedoms).look(points, start)
+    assert found.pose is not None
+    assert np.abs(deviations(found.pose.apply(points), nominal).deviation_mm).max() <= least + 1e-6
+    assert PlacementSearch(nominal, least - step).look(points, start).outcome == "fits"  # where every motion counts, it goes in
+
+
+def test_a_search_within_freedoms_needs_the_pose_from_which_they_count() -> None:
+    with pytest.raises(ValueError, match="needs the pose"):
+        PlacementSearch(nominal_of("goe404"), 0.05, freedoms=Freedoms.about((0.0, 0.0), ("x",))).look(dented("goe404"))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from inspection import (
+    CharacteristicFit,
     CharacteristicResult,
     ConsumptionCertificate,
     FreedomName,
@@ -151,15 +152,26 @@ def test_points_far_out_at_a_pose_that_is_not_known_are_not_proven_out_where_ano
     assert found["not so far"].verdict is Verdict.NONCONFORM
 
 
-def test_a_minimum_zone_with_locked_freedoms_that_is_not_proven_too_wide_is_no_nonconform() -> None:
-    """The part turned by 0.2 degrees fits in other placements, so that nothing is proven of the few that are allowed."""
-    twisted = rotation_about(np.array([50.0, 0.0]), np.radians(0.2), np.zeros(2)).apply(DATUM.apply(good()))
-    locked = Freedoms.about((50.0, 0.0), ("x",))
-    asked = LineProfile("locked", even(-0.06, 0.06), fit="minimum-zone", freedoms=locked, datum=DATUM)
-    found = named(run(DATUM.inverse().apply(twisted), asked=(asked,)))["locked"]
-    assert found.verdict is Verdict.UNCERTAIN
-    assert found.reasons[0].kind == "placement"
-    assert found.value > 0.12
+@pytest.mark.parametrize("fit", ["minimum-zone", "tolerance"])
+@pytest.mark.parametrize("filter_", [None, ProfileFilter(2.0)])
+def test_what_locked_freedoms_bring_into_no_zone_is_proven_out_of_those_motions_alone(
+    fit: CharacteristicFit, filter_: ProfileFilter | None
+) -> None:
+    """The part turned by 0.2 degrees fits in other placements, of which a datum that locks the rotation allows none."""
+    twisted = DATUM.inverse().apply(rotation_about(np.array([50.0, 0.0]), np.radians(0.2), np.zeros(2)).apply(DATUM.apply(good())))
+    free, locked = (
+        Freedoms.about((50.0, 0.0), ("x", "y")),
+        Freedoms.about((50.0, 0.0), ("x", "rotation"), limits={"rotation": (-0.01, 0.01)}),
+    )
+    asked = [
+        LineProfile(name, even(-0.06, 0.06), fit=fit, freedoms=freedoms, datum=datum, filter=filter_)
+        for name, freedoms, datum in (("out", free, DATUM), ("in", locked, DATUM), ("of no datum", free, None))
+    ]
+    found = named(run(twisted, asked=tuple(asked)))
+    assert found["out"].verdict is Verdict.NONCONFORM
+    assert found["out"].value > 0.3
+    assert found["in"].verdict is Verdict.CONFORM
+    assert found["of no datum"].verdict is Verdict.CONFORM  # it counts from the best fit of the run, where the part is not turned
 
 
 def test_too_few_points_for_a_fit_prove_nothing() -> None:
