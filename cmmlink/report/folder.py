@@ -74,14 +74,14 @@ def write_results(
         if result is not None and drawn:
             ending, regions = document.get("ending", "complete"), regions_in(document)
             content = content_of(scan_of(result), profile, title, ending, _said_at_foot(document), regions, places_in(document))
-        asked: list[tuple[str, Sheet]] = [(name, content) for name in ("profile.png", "profile.svg") if content is not None]
+        asked: list[tuple[Sheet, tuple[str, ...]]] = [] if content is None else [(content, ("profile.png", "profile.svg"))]
         if report is not None:
-            asked.append(("report.pdf", replace(report, content=content)))
-        begun = [(name, sheet, pictures.begin(sheet, Path(name).suffix)) for name, sheet in asked]
+            asked.append((replace(report, content=content), ("report.pdf",)))
+        begun = [(names, sheet, pictures.begin(sheet, *(Path(name).suffix for name in names))) for sheet, names in asked]
         if result is not None and drawn:
             _write_tables(result, document, profile, files)
-        for name, sheet, drawing in begun:
-            pictures.write(drawing, partial(_give, sheet), files(name))
+        for names, sheet, drawing in begun:
+            pictures.write(drawing, partial(_give, sheet), *(files(name) for name in names))
         if part is not None:
             from cmmlink.exports import write_exports  # noqa: PLC0415 - most runs have no further formats
 

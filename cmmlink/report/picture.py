@@ -4,6 +4,7 @@ import pathlib
 from typing import TYPE_CHECKING
 
 import matplotlib as mpl
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from cmmlink.report.heading import draw_heading, save_picture
@@ -25,6 +26,7 @@ class ProfilePictures:
     def __init__(self, say: Speech | None = None) -> None:
         self._say = say or Speech()
         self._figure = Figure(figsize=_INCHES, dpi=_DOTS_PER_INCH)
+        FigureCanvasAgg(self._figure)  # stays with the figure, with the sizes of all that was written on it before
         self._profile, self._strip = self._figure.subplots(2, 1, gridspec_kw=_PLACES)
         self._foot = self._figure.text(0.99, 0.005, "", ha="right", va="bottom", fontsize=5.5, parse_math=False)
         for axes in (self._profile, self._strip):

@@ -22,8 +22,8 @@ if TYPE_CHECKING:  # whoever only starts a process loads no matplotlib
 Sheet = PictureContent | ReportInput
 """What is drawn: the picture of a profile, or a report."""
 
-Drawing = Future[Path | None]
-"""A picture that may come from another process: its file, or None."""
+Drawing = Future[tuple[Path, ...] | None]
+"""A picture that may come from another process: its files, one of each kind that was asked for, or None."""
 
 
 class Pictures:
@@ -50,21 +50,22 @@ class Pictures:
             with suppress(OSError):
                 self._beside = self._opened.enter_context(closing(_Beside(processes)))
 
-    def begin(self, sheet: Sheet, suffix: str = ".png") -> Drawing:
-        """Let another process draw it, where there is one, as a file of that kind."""
-        return drawn_by_none() if self._beside is None else self._beside.draw(sheet, suffix)
+    def begin(self, sheet: Sheet, *suffixes: str) -> Drawing:
+        """Let another process draw it, where there is one, once and as a file of each of these kinds."""
+        return drawn_by_none() if self._beside is None else self._beside.draw(sheet, suffixes)
 
-    def write(self, drawing: Drawing, sheet: Callable[[], Sheet], path: Path) -> None:
-        """Put a picture that was begun in its place; where nobody has drawn it, draw it here."""
+    def write(self, drawing: Drawing, sheet: Callable[[], Sheet], *paths: Path) -> None:
+        """Put a picture that was begun in its places, one of each kind; where nobody has drawn it, draw it here."""
         if (drawn := drawing.result()) is not None:
-            shutil.move(drawn, path)
+            for file, path in zip(drawn, paths, strict=True):
+                shutil.move(file, path)
             self.drawn_beside += 1
             return
         if self._own is None:
             from cmmlink.report.picture import ProfilePictures  # noqa: PLC0415 - it loads matplotlib, half a second
 
             self._own = ProfilePictures()
-        _draw(self._own, sheet(), path)
+        _draw(self._own, sheet(), *paths)
         self.drawn_here += 1
 
 
@@ -85,10 +86,10 @@ class _Beside:
             self._asked = 0
             self._opened = opened.pop_all()
 
-    def draw(self, sheet: Sheet, suffix: str) -> Drawing:
-        """Draw in one of the processes, once one is free. Gives the file, None where that failed; waits while too many wait."""
+    def draw(self, sheet: Sheet, suffixes: tuple[str, ...]) -> Drawing:
+        """Draw in one of the processes, once one is free. Gives the files, None where that failed; waits while too many wait."""
         self._asked += 1
-        return self._processes.ask((sheet, self._folder / f"{self._asked}{suffix}"))
+        return self._processes.ask((sheet, tuple(self._folder / f"{self._asked}{suffix}" for suffix in suffixes)))
 
     def close(self) -> None:
         """End the processes; what was not fetched is gone."""
@@ -100,22 +101,24 @@ def serve() -> None:
     answer_all(_begin_to_draw)
 
 
-def _begin_to_draw() -> Callable[[tuple[Sheet, Path]], Path]:
+def _begin_to_draw() -> Callable[[tuple[Sheet, tuple[Path, ...]]], tuple[Path, ...]]:
     from cmmlink.report.picture import ProfilePictures  # noqa: PLC0415 - only the process that draws loads matplotlib
 
     pictures = ProfilePictures()
 
-    def draw(asked: tuple[Sheet, Path]) -> Path:
-        _draw(pictures, *asked)
-        return asked[1]
+    def draw(asked: tuple[Sheet, tuple[Path, ...]]) -> tuple[Path, ...]:
+        sheet, paths = asked
+        _draw(pictures, sheet, *paths)
+        return paths
 
     return draw
 
 
-def _draw(pictures: "ProfilePictures", sheet: Sheet, path: Path) -> None:
+def _draw(pictures: "ProfilePictures", sheet: Sheet, *paths: Path) -> None:
     if isinstance(sheet, PictureContent):
-        pictures.write(sheet, path)
+        pictures.write(sheet, *paths)
         return
     from cmmlink.report.pdf import write_report  # noqa: PLC0415 - a process that draws pictures alone needs no reportlab
 
-    write_report(sheet, path)
+    for path in paths:
+        write_report(sheet, path)

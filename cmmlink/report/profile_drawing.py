@@ -14,7 +14,7 @@ from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
 from cmmlink.report.heading import fix_labels
-from cmmlink.report.picture_content import ABOVE, LOOKS, NamedRegion, PictureContent
+from cmmlink.report.picture_content import ABOVE, LOOKS, Look, NamedRegion, PictureContent
 from cmmlink.report.speech import Speech
 from inspection import ToleranceZone
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
+Rows = NDArray[np.int64]
 Side = Literal["left", "center", "right"]
 
 _PLACE_OF: dict[Side, float] = {"left": 0.0, "center": 0.5, "right": 1.0}  # of what a label stands at, within its width
@@ -32,6 +33,8 @@ _TEXT_PT, _SMALL_PT, _FRAME_PT = 7.0, 6.0, 0.6
 _BESIDE_PT, _BELOW_PT = 35.0, 15.0  # of the labels from their axes
 _TICK, _TICK_TEXT, _REGION, _LEVEL = 0.012, 0.03, 0.065, 0.055  # of the part's size, beyond the magnified zone
 _LETTER = 0.012  # of the part's size: the width of a letter
+_STEP, _TURN_DEG = 0.0025, 2.0  # between samples that are drawn, of the part's size: a curve lies 0.02 dots beside its chord
+_DOT = 0.5  # of the size of a mark: how wide matplotlib draws a dot
 _BESIDE = 0.5  # a name whose line runs more upright than this stands beside it
 _MOST_REGIONS = 6  # whose names are drawn
 
@@ -60,7 +63,7 @@ def wipe(axes: "Axes") -> None:
 
 def draw_contour(axes: "Axes", content: PictureContent, say: Speech) -> None:
     """Draw the nominal with its band, whiskers, stations and regions, as large as its frame allows."""
-    _draw_profile(axes, content)
+    _draw_profile(axes, content, rows_that_show(content))
     _draw_stations(axes, content, say)
     for level, region in enumerate(content.regions[:_MOST_REGIONS]):
         _draw_region(axes, content, region, _beyond_zone(content) + content_size(content) * (_REGION + _LEVEL * (level % 3)))
@@ -82,7 +85,7 @@ def draw_contour(axes: "Axes", content: PictureContent, say: Speech) -> None:
 
 def draw_cut_out(axes: "Axes", content: PictureContent, stretch: tuple[float, float]) -> None:
     """Draw the nominal with its whiskers around a stretch, from station to station, and a little beyond."""
-    _draw_profile(axes, content)
+    _draw_profile(axes, content, slice(None))
     length = content.length_mm
     start, width = stretch[0], (stretch[1] - stretch[0]) % length
     around = max(0.25 * width, 0.02 * length)
@@ -112,7 +115,7 @@ def draw_strip(axes: "Axes", content: PictureContent, say: Speech, basis: bool =
     _draw_limits(axes, zone, say)
     axes.axhline(0, color=NOMINAL, lw=_FRAME_PT)
     for look, shown in zip(LOOKS, content.shown, strict=True):
-        axes.scatter(shown.station_mm, shown.deviation_mm, s=look.size / 2, c=look.colour, marker=look.mark, lw=0)
+        _draw_points(axes, np.column_stack([shown.station_mm, shown.deviation_mm]), look, content.length_mm)
     if content.worst is not None:
         station, deviation = content.worst.station_mm, content.worst.deviation_mm
         text = say(
@@ -136,6 +139,16 @@ def draw_strip(axes: "Axes", content: PictureContent, say: Speech, basis: bool =
     axes.margins(y=0.25)
     axes.set(xlim=(0, content.length_mm), xlabel=say("station (mm)"), ylabel=say("deviation (mm)"))
     axes.set_title(content.basis if basis else "", fontsize=_TEXT_PT, y=1.0, pad=3)
+
+
+def _draw_points(axes: "Axes", places: Array, look: Look, length_mm: float) -> None:
+    if look.mark != ".":
+        axes.scatter(places[:, 0], places[:, 1], s=look.size / 2, c=look.colour, marker=look.mark, lw=0)
+        return
+    # Thousands of dots are one path of strokes without a length to speak of and with round ends: an SVG holds them in a fifth of the room.
+    stroke = np.array([1e-5 * length_mm, 0.0])
+    dots, width = path_of_pieces(places - stroke, places + stroke), _DOT * np.sqrt(look.size / 2)
+    axes.add_collection(PathCollection([dots], facecolors="none", edgecolors=look.colour, linewidths=width, capstyle="round"))
 
 
 def side_of_label(share: float) -> Side:
@@ -169,14 +182,25 @@ def content_size(content: PictureContent) -> float:
     return float(np.hypot(*np.ptp(content.nominal_mm, axis=0)))
 
 
-def _draw_profile(axes: "Axes", content: PictureContent) -> None:
+def rows_that_show(content: PictureContent) -> Rows:
+    """Samples (k,) of the nominal that show all of it: no two neighbours are farther apart, nor turned more, than can be seen."""
+    turned = np.unwrap(np.arctan2(*content.outward.T[::-1]))
+    steps = np.floor(content.station_mm / (_STEP * content_size(content))), np.floor(turned / np.radians(_TURN_DEG))
+    differ = (np.diff(steps) != 0).any(axis=0)
+    shown = np.concatenate([[True], differ | np.append(differ[1:], True)])  # the last before a step and the first after it
+    return np.flatnonzero(shown)
+
+
+def _draw_profile(axes: "Axes", content: PictureContent, rows: Rows | slice) -> None:
+    """Draw band, nominal and whiskers; `rows` are the samples that band and nominal are drawn through."""
     factor, zone = content.magnification, content.zone
-    edges = [_loop(content.nominal_mm + factor * limit * content.outward, content) for limit in (zone.lower_mm, zone.upper_mm)]
+    nominal, outward = content.nominal_mm[rows], content.outward[rows]
+    edges = [_loop(nominal + factor * limit * outward, content) for limit in (zone.lower_mm, zone.upper_mm)]
     # A collection finds its limits by numpy; `fill` goes through every corner of its polygon in Python.
     axes.add_collection(PolyCollection([np.vstack([edges[0], edges[1][::-1]])], facecolors=BAND, linewidths=0))
     for start, end in content.unmeasured:
         axes.plot(*_at(content, np.linspace(start, end, 200))[0].T, color=UNMEASURED, lw=3.0, solid_capstyle="butt")
-    axes.plot(*_loop(content.nominal_mm, content).T, color=NOMINAL, lw=0.8)
+    axes.plot(*_loop(nominal, content).T, color=NOMINAL, lw=0.8)
     for look, shown in zip(LOOKS, content.shown, strict=True):
         whiskers = path_of_pieces(shown.foot_mm, shown.tip_mm)
         axes.add_collection(PathCollection([whiskers], facecolors="none", edgecolors=look.colour, linewidths=0.5))

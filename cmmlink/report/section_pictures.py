@@ -22,7 +22,7 @@ class SectionPictures:
     def __init__(self, title: str, pictures: Pictures, every: bool = True) -> None:
         """`every` draws all sections; else those alone that do not conform, or of which that is not proven."""
         self._title, self._pictures, self._every = title, pictures, every
-        self._begun: list[dict[str, Drawing]] = []
+        self._begun: list[Drawing] = []
         self._asked = 0
 
     def wants(self, section: "SectionOutcome") -> bool:
@@ -41,13 +41,12 @@ class SectionPictures:
         if wanted and not self._every and self._asked == _WORTH_A_PROCESS:
             self._pictures.start(processes_here())
         content = self._content_of(section) if wanted else None
-        self._begun.append({} if content is None else {suffix: self._pictures.begin(content, suffix) for suffix in _KINDS})
+        self._begun.append(drawn_by_none() if content is None else self._pictures.begin(content, *_KINDS))
 
-    def write(self, number: int, section: "SectionOutcome", *paths: Path) -> None:
+    def write(self, number: int, section: "SectionOutcome", png: Path, svg: Path) -> None:
         """Write the picture of a section, whose number in the stack counts from 1 and which is wanted, as PNG and SVG."""
-        begun = self._begun[number - 1] if number <= len(self._begun) else {}
-        for path in paths:
-            self._pictures.write(begun.get(path.suffix, drawn_by_none()), lambda: self._content_of(section), path)
+        begun = self._begun[number - 1] if number <= len(self._begun) else drawn_by_none()
+        self._pictures.write(begun, lambda: self._content_of(section), png, svg)
 
     def _content_of(self, section: "SectionOutcome") -> PictureContent:
         assert section.run.result is not None

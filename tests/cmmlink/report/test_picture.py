@@ -11,10 +11,20 @@ from matplotlib.image import imread
 from cmmlink.report.judged_scan import scan_of, unmeasured_stretches
 from cmmlink.report.picture import ProfilePictures
 from cmmlink.report.picture_content import NamedRegion, content_of, headline_on_picture, magnification
-from cmmlink.report.profile_drawing import names_of_limits, round_stations, side_of_label
-from inspection import InspectionResult, LiveInspection, NominalProfile, RigidTransform, StatedUncertainty, ToleranceZone, UncertaintyBudget
+from cmmlink.report.profile_drawing import names_of_limits, round_stations, rows_that_show, side_of_label
+from inspection import (
+    InspectionResult,
+    LiveInspection,
+    NominalProfile,
+    RigidTransform,
+    StatedUncertainty,
+    ToleranceZone,
+    UncertaintyBudget,
+    discretize,
+)
 from tests.cmmlink.judged_oval import bumped, inspect_oval
 from tests.cmmlink.oval_part import oval_points
+from tests.inspection import profiles
 
 
 def write_picture(
@@ -89,6 +99,21 @@ def test_pictures_on_one_figure_are_those_on_a_new_one_each(profile: NominalProf
         pictures.write(content_of(scan_of(result), profile, f"part {number}", "complete", said), tmp_path / "one.png")
         write_picture(result, profile, f"part {number}", tmp_path / "new.png", "complete", said)
         np.testing.assert_array_equal(imread(tmp_path / "one.png"), imread(tmp_path / "new.png"))
+
+
+def test_samples_that_are_left_out_of_a_drawing_do_not_show() -> None:
+    """A fine nominal is drawn through some of its samples: none that is left out lies a fiftieth of a dot off."""
+    for curve in (profiles.naca("2412", 60.0), profiles.p3()):
+        profile = discretize(curve)
+        live = LiveInspection(profile, ToleranceZone(-0.05, 0.05), datum=RigidTransform.identity())
+        live.add(profile.points_mm[::20])
+        rows = rows_that_show(content_of(scan_of(live.finish()), profile, "part"))
+        assert len(rows) < 0.3 * len(profile.points_mm)
+        drawn = profile.points_mm[rows]
+        feet = np.searchsorted(rows, np.arange(len(profile.points_mm)), side="right").clip(1, len(rows) - 1)
+        along, beside = drawn[feet] - drawn[feet - 1], profile.points_mm - drawn[feet - 1]
+        off = np.abs(along[:, 0] * beside[:, 1] - along[:, 1] * beside[:, 0]) / np.hypot(*along.T)
+        assert off.max() < 0.02 * np.hypot(*np.ptp(drawn, axis=0)) / 1200
 
 
 def test_an_svg_beside_the_picture_has_the_same_bytes_each_time(profile: NominalProfile, tmp_path: Path) -> None:

@@ -35,7 +35,7 @@ live.add(profile.points_mm)
 content = content_of(scan_of(live.finish()), profile, "part")
 with Pictures() as pictures:
     pictures.start(1)
-    pictures.write(pictures.begin(content), lambda: content, Path(sys.argv[1]))
+    pictures.write(pictures.begin(content, ".png"), lambda: content, Path(sys.argv[1]))
 print((pictures.drawn_beside, pictures.drawn_here))
 """
 
@@ -54,11 +54,12 @@ def sections(profile: NominalProfile) -> list[Any]:
 
 def drawn(pictures: SectionPictures, sections: list[Any], folder: Path) -> dict[str, bytes]:
     """What is written of the sections in which points were judged."""
-    files = {}
+    files: dict[str, bytes] = {}
     for number, each in enumerate(sections, start=1):
         if each.run.result is not None:
-            pictures.write(number, each, folder / f"{number}.png")
-            files[f"{number}.png"] = (folder / f"{number}.png").read_bytes()
+            names = [f"{number}.png", f"{number}.svg"]
+            pictures.write(number, each, *(folder / name for name in names))
+            files |= {name: (folder / name).read_bytes() for name in names}
     return files
 
 
@@ -88,8 +89,9 @@ def test_another_process_draws_the_same_pictures_and_this_one_none(sections: lis
     for name, content in beside.items():
         each = sections[int(name[0]) - 1]
         own = content_of(scan_of(each.run.result), each.profile, f"blade, height {each.slice.height_mm:g} mm")
-        ProfilePictures().write(own, tmp_path / "own.png")
-        assert content == (tmp_path / "own.png").read_bytes()
+        path = tmp_path / f"own{Path(name).suffix}"
+        ProfilePictures().write(own, path)
+        assert content == path.read_bytes()
 
 
 def test_what_a_process_that_was_ended_has_not_drawn_is_drawn_here(sections: list[Any], tmp_path: Path, begun: list[_Process]) -> None:
@@ -99,7 +101,7 @@ def test_what_a_process_that_was_ended_has_not_drawn_is_drawn_here(sections: lis
         begun[0]._child.kill()
         for each in sections:
             of_sections.begin(each)
-        assert len(drawn(of_sections, sections, tmp_path)) == 3
+        assert len(drawn(of_sections, sections, tmp_path)) == 6
     assert (pictures.drawn_beside, pictures.drawn_here) == (0, 3)
     assert begun[0]._child.returncode is not None
 
@@ -111,7 +113,7 @@ def test_few_sections_and_one_core_are_not_worth_a_process(
         of_sections = SectionPictures("blade", pictures)
         of_sections.expect(7)
         of_sections.begin(sections[0])
-        of_sections.write(1, sections[0], tmp_path / "1.png")
+        of_sections.write(1, sections[0], tmp_path / "1.png", tmp_path / "1.svg")
         monkeypatch.setattr(os, "cpu_count", lambda: 1)
         of_sections.expect(100)
     assert (len(begun), pictures.drawn_here) == (0, 1)
