@@ -5,19 +5,19 @@ refused: such a file is read with care (text_table).
 """
 
 from collections.abc import Callable, Iterator
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.files.decimal_rows import decimal_rows
 from drivers.files.row_reading import shorten
 
 Array = NDArray[np.float64]
 Room = Callable[[tuple[int, ...], type[np.generic]], NDArray[Any]]
 """Gives an array of a shape and a type, whose values are not set: numpy.empty, or what keeps long arrays on a disk."""
 
-_CHUNK = 1 << 16
-_ROWS_AT_ONCE = 1 << 13
+_CHUNK = 1 << 17  # some thousand lines, which stay in the cache while they are read
 _SIGNS = b"0123456789+-eEnNaAiIfF \r\n"  # numbers, nan and inf; what else these letters spell is no number and is refused
 
 
@@ -29,21 +29,26 @@ def read_plain_rows(file: BinaryIO, delimiter: str | None, decimal: str, room: R
 
     Raises ValueError, which names the line, where anything else than such rows is in it.
     """
-    lines = _Lines(file, delimiter, decimal, first_line)
-    values = _parse(lines.take(_ROWS_AT_ONCE), delimiter, first_line)
-    count = len(values)
-    if count < _ROWS_AT_ONCE:
+    pieces = _pieces(file, delimiter, decimal, first_line)
+    values = _parse(next(pieces), delimiter, first_line)
+    count, piece = len(values), next(pieces, None)
+    if piece is None:
         return values
-    begun, values = values, room((count + _most_lines(file) + 1, values.shape[1]), np.float64)
+    begun, values = values, room((count + piece.count(b"\n") + _most_lines(file) + 1, values.shape[1]), np.float64)
     values[:count] = begun
-    while rows := lines.take(_ROWS_AT_ONCE):
-        values[count : count + len(rows)] = _parse(rows, delimiter, first_line + count, values.shape[1])
-        count += len(rows)
+    while piece is not None:
+        found = _parse(piece, delimiter, first_line + count, values.shape[1])
+        values[count : count + len(found)] = found
+        count, piece = count + len(found), next(pieces, None)
     return values[:count]
 
 
-def _parse(lines: list[str], delimiter: str | None, first_line: int, columns: int = 0) -> Array:
-    """Numbers of lines (m, c), where they are as many on every line; of a file that goes on, as many as above."""
+def _parse(text: bytes, delimiter: str | None, first_line: int, columns: int = 0) -> Array:
+    """Numbers of whole lines (m, c), where they are as many on every line; of a file that goes on, as many as above."""
+    found = decimal_rows(text, delimiter)
+    if found is not None and columns in (0, found.shape[1]):
+        return found
+    lines = text.decode("ascii").splitlines()
     found = _numbers(lines, delimiter)
     if found is not None and len(found) == len(lines) and columns in (0, found.shape[1]):
         return found
@@ -79,41 +84,34 @@ def _most_lines(file: BinaryIO) -> int:
     return count
 
 
-class _Lines:
-    """The lines of a file, with decimal points."""
+def _pieces(file: BinaryIO, delimiter: str | None, decimal: str, first_line: int) -> Iterator[bytes]:
+    """The rest of a file, some thousand whole lines at a time, with decimal points and a line feed at the end of every line.
 
-    def __init__(self, file: BinaryIO, delimiter: str | None, decimal: str, first_line: int) -> None:
-        self._file, self._decimal, self._next_line = file, decimal.encode(), first_line
-        self._signs = _SIGNS + self._decimal + (delimiter or "\t").encode()
-        self._coming, self._ready = self._pieces(), list[str]()
+    Raises ValueError for the first line that is not of plain numbers, or ends in another way than the others.
+    """
+    signs = _SIGNS + decimal.encode() + (delimiter or "\t").encode()
+    begun = b""  # a line whose end is still to come
+    while chunk := file.read(_CHUNK):
+        if chunk.translate(None, signs) or len(begun) > _CHUNK:
+            _refuse(begun + chunk, signs, first_line)
+        whole, end, begun = (begun + chunk).rpartition(b"\n")
+        if piece := _with_points(whole + end, signs, decimal, first_line):
+            first_line += piece.count(b"\n")
+            yield piece
+    if piece := _with_points(begun.rstrip(b"\r"), signs, decimal, first_line):
+        yield piece + b"\n"
 
-    def take(self, count: int) -> list[str]:
-        """The next lines, so many or all that are left."""
-        while len(self._ready) < count and (lines := next(self._coming, None)) is not None:
-            self._ready += lines
-        taken, self._ready = self._ready[:count], self._ready[count:]
-        return taken
 
-    def _pieces(self) -> Iterator[list[str]]:
-        begun = b""  # a line whose end is still to come
-        while chunk := self._file.read(_CHUNK):
-            if chunk.translate(None, self._signs) or len(begun) > _CHUNK:
-                self._refuse(begun + chunk)
-            whole, end, begun = (begun + chunk).rpartition(b"\n")
-            yield self._lines(whole + end)
-        yield self._lines(begun.rstrip(b"\r"))
+def _with_points(lines: bytes, signs: bytes, decimal: str, first_line: int) -> bytes:
+    ends = lines.count(b"\r")
+    if ends != (lines.count(b"\r\n") if ends else 0):
+        _refuse(lines, signs, first_line)
+    return (lines.replace(b"\r", b"") if ends else lines).replace(decimal.encode(), b".")
 
-    def _lines(self, chunk: bytes) -> list[str]:
-        if chunk.count(b"\r") != chunk.count(b"\r\n"):
-            self._refuse(chunk)
-        lines = chunk.replace(self._decimal, b".").decode("ascii").splitlines()
-        self._next_line += len(lines)
-        return lines
 
-    def _refuse(self, chunk: bytes) -> None:
-        """Raise ValueError for the first line of a chunk that is not of plain numbers, or ends in another way than the others."""
-        inside = self._signs.translate(None, b"\r\n")
-        for number, line in enumerate(chunk.split(b"\n"), self._next_line):
-            if line.removesuffix(b"\r").translate(None, inside) or len(line) > _CHUNK:
-                raise ValueError(_words_of(number, line.decode("latin-1")))
-        raise ValueError(f"line {self._next_line}: a line here is very long")
+def _refuse(text: bytes, signs: bytes, first_line: int) -> NoReturn:
+    inside = signs.translate(None, b"\r\n")
+    for number, line in enumerate(text.split(b"\n"), first_line):
+        if line.removesuffix(b"\r").translate(None, inside) or len(line) > _CHUNK:
+            raise ValueError(_words_of(number, line.decode("latin-1")))
+    raise ValueError(f"line {first_line}: a line here is very long")

@@ -64,6 +64,7 @@ def main() -> None:
     parser.add_argument("--long", action="store_true", help="also ten million points (needs some minutes and 2 GB)")
     parser.add_argument("--quick", action="store_true", help="one round, nothing is kept: does it run?")
     parser.add_argument("--only", default="", metavar="WORDS", help="only waits with these words in their name; nothing is kept")
+    parser.add_argument("--no-page", action="store_true", help="only say the figures; nothing is kept")
     parser.add_argument("--slower", action="store_true", help="only say what got slower in the last run on record")
     options = parser.parse_args()
     if options.slower:
@@ -72,7 +73,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         every = [wait for wait in waits(Path(name), options.long) if options.only in wait.name]
         figures = measure(every, 1 if options.quick else max(wait.rounds for wait in every))
-    is_kept = not (options.quick or options.only)
+    is_kept = not (options.quick or options.only or options.no_page)
     today = datetime.datetime.now(tz=datetime.UTC).strftime("%Y-%m-%d %H:%M")
     lines = growth.lines() if is_kept else {}
     run = history.Run(today, commit(), machine("numpy", "scipy", "numba"), processor(), figures, lines)

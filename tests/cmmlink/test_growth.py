@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import inspection
 from cmmlink.devices import Connected
@@ -53,16 +54,16 @@ class Work(Counter[str]):
             self["rows fitted"] += (found.steps + 1) * len(fit.weights)
             return found
 
-        def lines(own: Any, chunk: bytes) -> list[str]:
-            self["bytes read"] += len(chunk)
-            return read(own, chunk)
+        def parse(text: bytes, *settings: Any) -> NDArray[np.float64]:
+            self["bytes read"] += len(text)
+            return read(text, *settings)
 
-        settle, read = PoseFit.settle, plain_rows._Lines._lines
+        settle, read = PoseFit.settle, plain_rows._parse
         for name in IN_PIECES:
             patch.setattr(importlib.import_module(name), "row_blocks", blocks)
         patch.setattr("inspection.scan_rows.judge_rows", judge)
         patch.setattr(PoseFit, "settle", settled)
-        patch.setattr(plain_rows._Lines, "_lines", lines)
+        patch.setattr(plain_rows, "_parse", parse)
 
     def count_call(self, _frame: object, event: str, _arg: object) -> None:
         """Count a call of a function, in Python or in C."""

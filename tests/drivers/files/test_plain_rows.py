@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from drivers.errors import PointFileError
 from drivers.files import column_choice, plain_rows, text_table
+from drivers.files.decimal_rows import decimal_rows
 from drivers.files.plain_rows import read_plain_rows
 from drivers.files.point_file import read_points
 from drivers.files.text_table import Columns, parse_columns, read_plain, read_text
@@ -34,7 +35,7 @@ def _short_beginning(monkeypatch: pytest.MonkeyPatch) -> None:
     """The beginning that is understood line by line ends after 150 to 280 of the rows."""
     monkeypatch.setattr(text_table, "_HEAD_BYTES", 4096)
     monkeypatch.setattr(text_table, "_ROWS_AT_ONCE", 50)
-    monkeypatch.setattr(plain_rows, "_ROWS_AT_ONCE", 100)
+    monkeypatch.setattr(plain_rows, "_CHUNK", 2000)
 
 
 def rows_of(seed: int, columns: int, whole: bool = False) -> list[list[str]]:
@@ -155,7 +156,8 @@ def test_an_array_is_not_held_beside_its_points(tmp_path: Path) -> None:
     assert peak < 24 * len(found) + 14e6 < 2 * 24 * len(found), "the points, and a piece of the array"
 
 
-def test_a_long_file_takes_no_more_memory_than_its_numbers() -> None:
+def test_a_long_file_takes_no_more_memory_than_its_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(plain_rows, "_CHUNK", 1 << 16)
     peaks, rows = [], (2_000, 20_000, 200_000)
     for count in rows:
         file = io.BytesIO(b"-12.345678,9.8765432\n" * count)
@@ -166,23 +168,28 @@ def test_a_long_file_takes_no_more_memory_than_its_numbers() -> None:
     assert peaks[2] < 0.5 * 16 * rows[2] + 2e6
 
 
-def test_lines_are_taken_as_often_as_asked_whatever_the_pieces_that_are_read(monkeypatch: pytest.MonkeyPatch) -> None:
-    """So many or all that are left, in order; a piece of the file is turned into lines once."""
-    monkeypatch.setattr(plain_rows, "_CHUNK", 64)
-    text = b"".join(b"%d,%d\r\n" % (i, i * i) for i in range(500))
-    lines, turned = plain_rows._Lines(io.BytesIO(text), ",", ".", 1), 0
-    own = lines._lines
+def test_plain_decimal_numbers_go_through_the_quick_way_alone_and_every_line_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A line with a power sends the piece that it lies in, and no other, through the careful way."""
+    read, careful = [], []
+    quick, numbers = decimal_rows, plain_rows._numbers
 
-    def count(chunk: bytes) -> list[str]:
-        nonlocal turned
-        turned += len(chunk)
-        return own(chunk)
+    def count_quick(text: bytes, delimiter: str | None) -> object:
+        read.append(text)
+        return quick(text, delimiter)
 
-    monkeypatch.setattr(lines, "_lines", count)
-    taken: list[str] = []
-    for size in (1, 7, 100, 3, 380, 50, 50):
-        rows = lines.take(size)
-        assert len(rows) == min(size, 500 - len(taken))
-        taken += rows
-    assert taken == text.decode().split()
-    assert turned == len(text)
+    def count_careful(lines: list[str], delimiter: str | None) -> object:
+        careful.append(len(lines))
+        return numbers(lines, delimiter)
+
+    monkeypatch.setattr(plain_rows, "decimal_rows", count_quick)
+    monkeypatch.setattr(plain_rows, "_numbers", count_careful)
+    lines = [b"%d.5,-%d" % (i, i * i) for i in range(2000)]
+    for odd, ways in ((b"1200.5,-1440000", 0), (b"1200.5,-1.44e6", 1)):
+        lines[1200] = odd
+        read.clear()
+        found = read_plain_rows(io.BytesIO(b"\r\n".join(lines)), ",", ".")
+        assert b"".join(read) == b"\n".join(lines) + b"\n"
+        assert len(read) > 10
+        assert len(careful) == ways
+        np.testing.assert_array_equal(found, [[i + 0.5, -i * i] for i in range(2000)])
+    assert careful[0] < 200
