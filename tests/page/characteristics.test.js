@@ -22,7 +22,7 @@ test("how the characteristics stand is said in numbers, and what is not listed i
   const out = { ...ROW, shape: "not-conform" }, unproven = { ...ROW, shape: "not-proven" };
   assert.equal(wordsOf([ROW, out, unproven], 0, false), "3, 1 NOT CONFORM, 1 LOOK OUT; values so far");
   assert.equal(wordsOf([ROW, out, unproven], 0, true), "3, 1 NOT CONFORM, 1 NOT PROVEN");
-  assert.equal(wordsOf([out], 4, true), "5, 1 NOT CONFORM; the 1 worst are listed, the others stand in result.json");
+  assert.equal(wordsOf([out], 4, true), "5, 1 NOT CONFORM; the worst is listed, the others stand in result.json");
 });
 
 test("a value stands with all that it depends on", () => {

@@ -2,6 +2,7 @@
 
 import { apart, byId, make, put, showSymbol, within } from "./dom.js";
 import { count } from "./numbers.js";
+import { dated, gettext, translate } from "./words.js";
 
 /** @import { AlarmRow, RunState } from "./protocol.js" */
 
@@ -19,7 +20,7 @@ export function showAlarms(alarms, kind) {
   line.dataset.severity = isEarlier ? "earlier" : first?.severity ?? "none";
   line.dataset.acknowledged = String(Boolean(first?.acknowledged));
   showSymbol(within(line, "svg"), first ? "lamp-fault" : "lamp-off");
-  put("alarm-text", words ? words + more : "No alarm");
+  put("alarm-text", words ? words + more : gettext("No alarm"));
   byId("alarm-text").title = words;
   byId("acknowledge").hidden = alarms.every((alarm) => alarm.acknowledged);
   byId("alarm-list-button").hidden = !alarms.length;
@@ -28,7 +29,7 @@ export function showAlarms(alarms, kind) {
 
 /** @param {AlarmRow} alarm */
 function itemOf(alarm) {
-  const marks = [alarm.active ? "still active" : "", alarm.acknowledged ? "acknowledged" : ""].filter(Boolean);
+  const marks = [alarm.active && gettext("still active"), alarm.acknowledged && gettext("acknowledged")].filter(Boolean);
   const item = make("li", [whose(alarm), alarmWords(alarm), ...marks].join("  \u00b7 "));
   item.dataset.severity = alarm.current ? alarm.severity : "earlier";
   item.dataset.acknowledged = String(alarm.acknowledged && !alarm.active);
@@ -39,11 +40,13 @@ function itemOf(alarm) {
  * Which run an alarm belongs to, and when it was raised.
  * @param {AlarmRow} alarm
  */
-export const whose = ({ run, since, current }) => [current ? "" : "earlier run", apart(run), since].filter(Boolean).join(" ");
+export function whose({ run, since, current }) {
+  return [current ? "" : gettext("earlier run"), apart(run), dated(since)].filter(Boolean).join(" ");
+}
 
 /** @param {AlarmRow} alarm */
 export function alarmWords({ what, count: times, detail }) {
-  return `${what}${times > 1 ? ` (${count(times)})` : ""}: ${detail}`;
+  return `${translate(what)}${times > 1 ? ` (${count(times)})` : ""}: ${translate(detail)}`;
 }
 
 export function toggleAlarmList() {

@@ -3,6 +3,7 @@
 import { apart } from "./dom.js";
 import { classOf, toleranceUse } from "./points.js";
 import { CODE_OF } from "./verdicts.js";
+import { dated, gettext, translate } from "./words.js";
 
 /** @import { Control, RunRow, RunState, SectionRow, StationState, SurfaceState } from "./protocol.js" */
 /** @import { LinkState } from "./link.js" */
@@ -51,8 +52,14 @@ const NO_CARD = {
   part: "", serial: "", names: [], word: "", shape: "none", final: false, of: "", why: "", reasons: [], notes: [], phase: "",
   badge: "", before: "", worst: null, simulated: false, run: null, record: "",
 };
-const PHASES = { preparing: "preparing", starting: "connecting", measuring: "so far", ending: "ending", finished: "" };
-const BADGES = { run: "", section: "SECTION", replay: "REPLAY of", recorded: "RECORDED" };
+const PHASES = {
+  preparing: gettext("preparing"), starting: gettext("connecting"), measuring: gettext("so far"), ending: gettext("ending"), finished: "",
+};
+/** @type {Readonly<Record<RunState["kind"], (began: string) => string>>} */
+const BADGES = {
+  run: () => "", section: () => gettext("SECTION"), replay: (began) => gettext("REPLAY of {began}", { began }),
+  recorded: (began) => gettext("RECORDED {began}", { began }),
+};
 
 /**
  * What stands at the right: it always belongs to what the view shows, and a run that is on stands there whatever is looked at.
@@ -74,7 +81,7 @@ export function cardOf({ run, isRecorded, station, view, chosen, surface }) {
 function cardOfRun(run) {
   const { part, serial_number: serial, plan, operator, began, notes, simulated, zone } = run;
   const { word, shape, final, of, why, reasons } = run.verdict;
-  const badge = run.kind === "replay" || run.kind === "recorded" ? `${BADGES[run.kind]} ${began}` : BADGES[run.kind];
+  const badge = BADGES[run.kind](dated(began));
   const worst = run.worst && {
     deviation: run.worst.deviation_mm, station: run.worst.station_mm, zone,
     kind: classOf(run.worst.deviation_mm, CODE_OF[run.worst.verdict], zone),
@@ -92,10 +99,11 @@ function cardOfRun(run) {
  * @returns {Card}
  */
 function cardOfNextPart(run, station) {
-  const choice = station?.choice, last = run && [apart(run.serial_number || run.part), run.verdict.word, run.began];
+  const choice = station?.choice;
+  const last = run && [apart(run.serial_number || run.part), translate(run.verdict.word), dated(run.began)].filter(Boolean);
   return {
     ...NO_CARD, ...readiness(station), part: choice?.part ?? "", serial: station?.serial_number ?? "",
-    names: [choice?.name, station?.operator], before: last ? `Before: ${last.filter(Boolean).join("  \u00b7  ")}` : "",
+    names: [choice?.name, station?.operator], before: last ? gettext("Before: {run}", { run: last.join("  \u00b7  ") }) : "",
   };
 }
 
@@ -106,8 +114,8 @@ function cardOfNextPart(run, station) {
 function cardOfRow(row) {
   const { part, serial_number: serial, section, word, shape, counted, began, run, simulated, state } = row;
   return {
-    ...NO_CARD, part, serial, names: [section, run], word, shape, final: counted, why: "as recorded; O opens the run",
-    badge: `RECORDED ${began}`, worst: worstOf(row), simulated,
+    ...NO_CARD, part, serial, names: [translate(section), run], word, shape, final: counted,
+    why: gettext("as recorded; O opens the run"), badge: BADGES.recorded(dated(began)), worst: worstOf(row), simulated,
     record: state === "running" || state === "damaged" ? "" : run,
   };
 }
@@ -117,12 +125,12 @@ function cardOfRow(row) {
  * @returns {Card}
  */
 function cardOfSurface({ plan, word, shape, state, message, notes, done, total, sections }) {
-  const progress = total ? `${done} of ${total} sections` : "choose a CT plan";
+  const progress = total ? gettext("{done} of {total} sections", { done, total }) : gettext("choose a CT plan");
   const why = state === "done" || state === "failed" ? message : progress;
   const worst = sections.map(worstOf).reduce((one, other) => (useOf(other) > useOf(one) ? other : one), null);
   return {
-    ...NO_CARD, part: plan || "No surface", names: ["CT surface"], word: word || "NO SURFACE", shape, final: state === "done",
-    why, notes, worst,
+    ...NO_CARD, part: plan || gettext("No surface"), names: [gettext("CT surface")], word: word || gettext("NO SURFACE"), shape,
+    final: state === "done", why, notes, worst,
   };
 }
 
@@ -146,6 +154,7 @@ function worstOf({ worst_mm: deviation, worst_station_mm: station, lower_mm, upp
  * @param {StationState | null} station
  */
 export function readiness(station) {
-  if (station?.can_start) return { word: "READY", why: "start when the part is in place" };
-  return { word: "NO PLAN", why: station?.choice ? `${station.choice.name} cannot be run` : "choose a plan" };
+  if (station?.can_start) return { word: gettext("READY"), why: gettext("start when the part is in place") };
+  const name = station?.choice?.name;
+  return { word: gettext("NO PLAN"), why: name ? gettext("{name} cannot be run", { name }) : gettext("choose a plan") };
 }

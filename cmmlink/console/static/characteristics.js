@@ -1,8 +1,9 @@
 // The table of characteristics: of the run that is on, that was opened, or of a section; the chosen one is shown on the drawings.
 
 import { byId, put } from "./dom.js";
-import { signed } from "./numbers.js";
+import { fixed, signed } from "./numbers.js";
 import { Table, cell, verdictCell } from "./table.js";
+import { gettext, ngettext, translate } from "./words.js";
 
 /** @import { CharacteristicList, CharacteristicRow } from "./protocol.js" */
 
@@ -37,7 +38,8 @@ export class Characteristics {
   }
 
   tell() {
-    const words = this.chosen ? partsOf(this.chosen).join("  \u00b7  ") : "arrows or the mouse choose one, and the drawings show it";
+    const hint = gettext("arrows or the mouse choose one, and the drawings show it");
+    const words = this.chosen ? partsOf(this.chosen).join("  \u00b7  ") : hint;
     put("characteristic-words", words);
     byId("characteristic-words").title = words; // a long one is cut
   }
@@ -51,9 +53,12 @@ export class Characteristics {
  */
 export function wordsOf(rows, more, isFinal) {
   const [out, unproven] = ["not-conform", "not-proven"].map((shape) => rows.filter((row) => row.shape === shape).length);
-  const words = [rows.length + more, out && `${out} NOT CONFORM`, unproven && `${unproven} ${isFinal ? "NOT PROVEN" : "LOOK OUT"}`];
-  const listed = more ? `; the ${rows.length} worst are listed, the others stand in result.json` : "";
-  return `${words.filter(Boolean).join(", ")}${listed}${isFinal ? "" : "; values so far"}`;
+  const open = isFinal
+    ? ngettext("{count} NOT PROVEN", "{count} NOT PROVEN", unproven) : ngettext("{count} LOOK OUT", "{count} LOOK OUT", unproven);
+  const counts = [rows.length + more, out && ngettext("{count} NOT CONFORM", "{count} NOT CONFORM", out), unproven && open];
+  const count = rows.length, listed = more && ngettext("the worst is listed, the others stand in result.json",
+    "the {count} worst are listed, the others stand in result.json", count);
+  return [counts.filter(Boolean).join(", "), listed, !isFinal && gettext("values so far")].filter(Boolean).join("; ");
 }
 
 /**
@@ -62,8 +67,11 @@ export function wordsOf(rows, more, isFinal) {
  */
 export function partsOf({ name, type, method, fit, filter, zone, region, rule, nominal, unit, why }) {
   const words = [
-    name, why, `${type} by ${method}`, nominal !== null && `nominal ${withUnit(nominal, unit)}`, zone && `zone ${zone}`, region,
-    fit !== "none" && `fit ${fit}`, filter === "none" ? "raw" : filter, rule,
+    name, translate(why), gettext("{type} by {method}", { type: translate(type), method: translate(method) }),
+    nominal !== null && gettext("nominal {value}", { value: withUnit(nominal, unit) }),
+    zone && gettext("zone {zone}", { zone: translate(zone) }), translate(region),
+    fit !== "none" && gettext("fit {fit}", { fit: translate(fit) }),
+    filter === "none" ? gettext("raw") : translate(filter), translate(rule),
   ];
   return words.filter((word) => word !== false && word !== "");
 }
@@ -73,9 +81,9 @@ function rowOf(row) {
   const { name, word, shape, value, unit, deviation, uncertainty, method } = row;
   const numbers = [
     value === null ? NONE : withUnit(value, unit), limitsOf(row), deviation === null ? NONE : signed(deviation),
-    uncertainty ? uncertainty.toFixed(4) : NONE,
+    uncertainty ? fixed(uncertainty, 4) : NONE,
   ];
-  const how = [method, ...[row.fit, row.filter].filter((way) => way !== "none")].join(", ");
+  const how = [method, ...[row.fit, row.filter].filter((way) => way !== "none")].map(translate).join(", ");
   const cells = [verdictCell(word, shape), cell(name), ...numbers.map((words) => cell(words, "number")), cell(how)];
   cells[1].title = name; // a long one is cut
   return cells;
@@ -85,7 +93,7 @@ function rowOf(row) {
  * @param {number} value
  * @param {string} unit
  */
-const withUnit = (value, unit) => `${value.toFixed(4)}${unit === "1" ? "" : ` ${unit}`}`;
+const withUnit = (value, unit) => `${fixed(value, 4)}${unit === "1" ? "" : ` ${unit}`}`;
 
 /**
  * What is allowed of the deviation.
@@ -97,4 +105,4 @@ export function limitsOf({ lower, upper }) {
 }
 
 /** @param {number} value */
-const limit = (value) => signed(value, 4).replace(/\.?0+$/, "");
+const limit = (value) => signed(value, 4, 0);

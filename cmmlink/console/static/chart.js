@@ -3,6 +3,7 @@
 import { signed } from "./numbers.js";
 import { middleOf } from "./points.js";
 import { INK, Sheet, cross, mark, ring } from "./sheet.js";
+import { gettext } from "./words.js";
 
 /** @import { RunRow } from "./protocol.js" */
 /** @import { Pen } from "./sheet.js" */
@@ -79,7 +80,7 @@ export class Chart {
     pen.fillStyle = INK.soft;
     pen.textAlign = "center";
     pen.textBaseline = "middle";
-    pen.fillText("no part was measured yet", this.sheet.width / 2, this.sheet.height / 2);
+    pen.fillText(gettext("no part was measured yet"), this.sheet.width / 2, this.sheet.height / 2);
   }
 
   /**
@@ -98,8 +99,8 @@ export class Chart {
     pen.textAlign = "right";
     pen.textBaseline = "middle";
     const apart = Math.max(0, this.sheet.text * 1.15 - (py(last.lower_mm) - py(last.upper_mm))) / 2; // however narrow the zone is drawn
-    pen.fillText(`upper ${signed(last.upper_mm, 3)}`, left - 6, py(last.upper_mm) - apart);
-    pen.fillText(`lower ${signed(last.lower_mm, 3)}`, left - 6, py(last.lower_mm) + apart);
+    pen.fillText(gettext("upper {limit}", { limit: signed(last.upper_mm, 3) }), left - 6, py(last.upper_mm) - apart);
+    pen.fillText(gettext("lower {limit}", { limit: signed(last.lower_mm, 3) }), left - 6, py(last.lower_mm) + apart);
     const places = Math.max(FEWEST, this.entries.length);
     this.drawLine(pen, [[left, py(0)], [px(places - 0.5), py(0)]], INK.faint);
   }

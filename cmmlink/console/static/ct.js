@@ -3,10 +3,11 @@
 import { Chart } from "./chart.js";
 import { buttonOf, byId, fillBar, put } from "./dom.js";
 import { List } from "./list.js";
-import { count, flooredShare } from "./numbers.js";
+import { count, fixed, flooredShare } from "./numbers.js";
 import { WORDS_OF_VERDICTS } from "./protocol.js";
 import { Table, cell, verdictCell, worstCells } from "./table.js";
 import { SHAPE_OF } from "./verdicts.js";
+import { gettext, translate } from "./words.js";
 
 /** @import { SurfaceState, SectionRow } from "./protocol.js" */
 
@@ -47,7 +48,7 @@ export class CtView {
     fillBar("ct-bar", ct.total ? ct.done / ct.total : STARTED);
     put("ct-words", progressWords(ct));
     byId("ct-message").dataset.state = ct.state;
-    put("ct-message", this.isBad ? `\u2715 ${ct.message}` : ct.message);
+    put("ct-message", this.isBad ? `\u2715 ${translate(ct.message)}` : translate(ct.message));
     buttonOf("open-section").disabled = !ct.sections.length;
     this.showSections(ct.sections);
   }
@@ -58,22 +59,23 @@ export class CtView {
     if (shown === this.shown) return;
     this.shown = shown;
     this.table.show(sections, Math.min(this.table.at, Math.max(sections.length - 1, 0)));
-    this.chart.show(sections.map((section) => ({ ...section, counted: true, label: section.height_mm.toFixed(1) })));
+    this.chart.show(sections.map((section) => ({ ...section, counted: true, label: fixed(section.height_mm, 1) })));
   }
 }
 
 /** @param {SurfaceState} ct */
 function progressWords({ state, done, total, remaining_s }) {
-  if (state === "reading") return "reading the surface \u2026";
-  if (state === "done") return `${done} of ${total}`;
-  if (state !== "inspecting") return "";
-  return `${done} of ${total}${remaining_s === null ? "" : `, about ${remaining_s} s left`}`;
+  if (state === "reading") return gettext("reading the surface \u2026");
+  const soFar = gettext("{done} of {total}", { done, total });
+  if (state === "done" || (state === "inspecting" && remaining_s === null)) return soFar;
+  return state === "inspecting" ? gettext("{done} of {total}, about {seconds} s left", { done, total, seconds: remaining_s ?? 0 }) : "";
 }
 
 /** @param {SectionRow} section */
 function rowOf(section) {
-  const numbers = [section.height_mm.toFixed(3), count(section.received)].map((words) => cell(words, "number"));
-  const coverage = cell(flooredShare(section.coverage), "number"), notes = cell(section.warnings.join("; "));
-  notes.title = section.warnings.join("\n");
+  const numbers = [fixed(section.height_mm, 3), count(section.received)].map((words) => cell(words, "number"));
+  const coverage = cell(flooredShare(section.coverage), "number"), warnings = section.warnings.map(translate);
+  const notes = cell(warnings.join("; "));
+  notes.title = warnings.join("\n");
   return [verdictCell(WORDS_OF_VERDICTS[section.verdict], SHAPE_OF[section.verdict]), ...numbers, ...worstCells(section), coverage, notes];
 }

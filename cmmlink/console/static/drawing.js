@@ -1,9 +1,10 @@
 // What the two drawings of a scan share: what they show, which layers are to be drawn anew, the point that is read out.
 
-import { digitsFor, signed } from "./numbers.js";
+import { digitsFor, fixed, signed } from "./numbers.js";
 import { NO_NOMINAL, Points } from "./points.js";
 import { INK, Sheet, label, ring } from "./sheet.js";
 import { wordOf } from "./verdicts.js";
+import { gettext, translate } from "./words.js";
 
 /** @import { CharacteristicRow, WorstPoint, ZoneLimits } from "./protocol.js" */
 /** @import { HeldPoint, Nominal, Scan } from "./points.js" */
@@ -252,6 +253,7 @@ function areEqual(one, other) {
  * @param {ZoneLimits} zone
  */
 function wordsOf(point, zone) {
-  const deviation = `${signed(point.deviation, digitsFor(zone))} mm  ${wordOf(point.verdict)}`;
-  return `${deviation}\nstation ${point.station.toFixed(2)} mm\nx ${point.x.toFixed(3)}  y ${point.y.toFixed(3)}`;
+  const deviation = `${signed(point.deviation, digitsFor(zone))} mm  ${translate(wordOf(point.verdict))}`;
+  const station = gettext("station {station} mm", { station: fixed(point.station, 2) });
+  return `${deviation}\n${station}\nx ${fixed(point.x, 3)}  y ${fixed(point.y, 3)}`;
 }

@@ -4,6 +4,7 @@ import { Chart } from "./chart.js";
 import { buttonOf, byId, put } from "./dom.js";
 import { count } from "./numbers.js";
 import { Table, cell, verdictCell, worstCells } from "./table.js";
+import { dated, gettext, ngettext, translate } from "./words.js";
 
 /** @import { RunRow } from "./protocol.js" */
 /** @typedef {"open" | "replay" | "export" | "report" | "compare"} Act */
@@ -50,14 +51,19 @@ export class History {
  */
 export function chartWords(runs) {
   const parts = runs.filter((run) => run.counted), bad = parts.filter((run) => run.verdict === "nonconform").length;
-  const early = runs.length - parts.length, beside = early ? `; \u00d7 ${early} aborted, interrupted or not measured, not counted` : "";
-  return `${parts.length} part${parts.length === 1 ? "" : "s"}, ${bad} NOT CONFORM${beside}; newest at the right`;
+  const early = runs.length - parts.length;
+  return [
+    ngettext("{count} part, {bad} NOT CONFORM", "{count} parts, {bad} NOT CONFORM", parts.length, { bad }),
+    early && ngettext("\u00d7 {count} aborted, interrupted or not measured, not counted",
+      "\u00d7 {count} aborted, interrupted or not measured, not counted", early),
+    gettext("newest at the right"),
+  ].filter(Boolean).join("; ");
 }
 
 /** @param {RunRow} run */
 function rowOf(run) {
-  const part = run.section ? `${run.part}, ${run.section}` : run.part;
-  const words = [part, run.serial_number, run.began, run.state];
-  const verdict = verdictCell(run.of ? `${run.word}: ${run.of}` : run.word, run.shape);
+  const part = run.section ? `${run.part}, ${translate(run.section)}` : run.part;
+  const words = [part, run.serial_number, dated(run.began), translate(run.state)];
+  const verdict = verdictCell(run.of ? `${translate(run.word)}: ${run.of}` : run.word, run.shape);
   return [verdict, ...words.map((word) => cell(word)), cell(count(run.received), "number"), ...worstCells(run)];
 }

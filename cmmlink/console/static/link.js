@@ -1,6 +1,7 @@
 // The socket to the station: code or token first, then messages both ways. It comes back by itself when the server does.
 
 import { WRONG_TOKEN } from "./protocol.js";
+import { gettext } from "./words.js";
 
 /** @import { Answer, Command, Message } from "./protocol.js" */
 /** @typedef {"connecting" | "live" | "stale" | "away" | "refused"} LinkState */
@@ -16,7 +17,7 @@ const FIRST_WAIT_MS = 400;
 const LONGEST_WAIT_MS = 3000;
 const STALE_AFTER_MS = 2000;
 
-export const OUT_OF_REACH = "the station cannot be reached";
+export const OUT_OF_REACH = gettext("the station cannot be reached");
 
 export class Link {
   /**

@@ -14,11 +14,14 @@ import { Scan } from "./points.js";
 import { Profile } from "./profile.js";
 import { Strip } from "./strip.js";
 import { Timing } from "./timing.js";
+import { gettext, translate, translateElements } from "./words.js";
 
 /** @import { AlarmRow, CharacteristicList, Command, Hello, Message, ShownRun } from "./protocol.js" */
 /** @import { Cursor } from "./drawing.js" */
 /** @import { LinkState, Outcome } from "./link.js" */
 /** @import { Heard } from "./card.js" */
+
+translateElements(document.documentElement);
 
 const VIEWS = ["live", "part", "history", "ct"];
 const MOST_MAGNIFICATION = 5000;
@@ -221,13 +224,14 @@ async function askToSee(command) {
 function say({ ok, message }) {
   saidAt = performance.now();
   byId("said").dataset.ok = String(ok);
-  put("said", `${ok ? "\u2713" : "\u2715"} ${message}`);
+  put("said", `${ok ? "\u2713" : "\u2715"} ${translate(message)}`);
 }
 
 /** Get an address for one more page, here or at another computer. */
 async function invite() {
   const { ok, message } = await link.ask({ do: "another page" });
-  say({ ok, message: ok ? `For one more page, within a minute: ${location.origin}/#${message}` : message });
+  const address = `${location.origin}/#${message}`;
+  say({ ok, message: ok ? gettext("For one more page, within a minute: {address}", { address }) : message });
 }
 
 async function start() {
@@ -244,7 +248,7 @@ async function start() {
  */
 function report(run) {
   const chosen = ["language", "paper"].map((name) => `${name}=${selectOf(`report-${name}`).value}`);
-  say({ ok: true, message: "making the report \u2026" });
+  say({ ok: true, message: gettext("making the report \u2026") });
   return download(`/report/${encodeURIComponent(run)}?${chosen.join("&")}`, `${run}.pdf`);
 }
 
@@ -255,8 +259,8 @@ function report(run) {
 function compare(run) {
   const first = toCompare === run ? "" : toCompare;
   toCompare = first ? "" : run;
-  if (!first) return say({ ok: true, message: `${run} is the first one: choose the other run and press C again` });
-  say({ ok: true, message: "drawing both runs \u2026" });
+  if (!first) return say({ ok: true, message: gettext("{run} is the first one: choose the other run and press C again", { run }) });
+  say({ ok: true, message: gettext("drawing both runs \u2026") });
   return download(`/compare/${encodeURIComponent(first)}/${encodeURIComponent(run)}`, `${first}-${run}.pdf`);
 }
 
@@ -276,9 +280,9 @@ async function download(address, name) {
     const answer = await fetch(address, { headers: { Authorization: `Bearer ${link.token}` } });
     if (!answer.ok) return say({ ok: false, message: await answer.text() });
     save(await answer.blob(), name);
-    say({ ok: true, message: `${name} saved` });
+    say({ ok: true, message: gettext("{name} saved", { name }) });
   } catch {
-    say({ ok: false, message: `${name} was not saved: ${OUT_OF_REACH}` });
+    say({ ok: false, message: gettext("{name} was not saved: {cause}", { name, cause: OUT_OF_REACH }) });
   }
 }
 

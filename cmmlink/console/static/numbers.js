@@ -1,19 +1,36 @@
-// How numbers are written on the page, and where the steps of an axis lie.
+// How numbers are written on the page, as its reader does, and where the steps of an axis lie.
+
+import { locale } from "./words.js";
 
 /** @import { ZoneLimits } from "./protocol.js" */
 
-const COUNT = new Intl.NumberFormat("en");
+const COUNT = new Intl.NumberFormat(locale);
+/** Decimals, by how many are shown. @type {Map<string, Intl.NumberFormat>} */
+const FIXED = new Map();
 
 /** @param {number} value */
 export const count = (value) => COUNT.format(value);
 
 /**
+ * A number with so many decimals, or with as many as it needs of them at most.
+ * @param {number} value
+ * @param {number} digits
+ */
+export function fixed(value, digits, fewest = digits) {
+  const key = `${fewest} ${digits}`;
+  const format = FIXED.get(key)
+    ?? new Intl.NumberFormat(locale, { minimumFractionDigits: fewest, maximumFractionDigits: digits, useGrouping: false });
+  FIXED.set(key, format);
+  return format.format(value).replace("-", "\u2212");
+}
+
+/**
  * A number with its sign; what is zero at the digits shown has none.
  * @param {number} value
  */
-export function signed(value, digits = 4) {
-  const words = Math.abs(value).toFixed(digits);
-  if (Number(words) === 0) return words;
+export function signed(value, digits = 4, fewest = digits) {
+  const words = fixed(Math.abs(value), digits, fewest);
+  if (Number(Math.abs(value).toFixed(digits)) === 0) return words;
   return (value > 0 ? "+" : "\u2212") + words;
 }
 
@@ -22,7 +39,7 @@ export function signed(value, digits = 4) {
  * @param {number} share from 0 to 1
  */
 export function flooredShare(share) {
-  return share > 1 - 1e-9 ? "100 %" : `${(Math.floor(1000 * share + 1e-9) / 10).toFixed(1)} %`;
+  return share > 1 - 1e-9 ? "100 %" : `${fixed(Math.floor(1000 * share + 1e-9) / 10, 1)} %`;
 }
 
 /**

@@ -2,9 +2,10 @@
 
 import { cardOf } from "./card.js";
 import { buttonOf, byId, fillBar, make, put, putInto, showSymbol, styleOf, within } from "./dom.js";
-import { count, digitsFor, flooredShare, signed } from "./numbers.js";
+import { count, digitsFor, fixed, flooredShare, signed } from "./numbers.js";
 import { toleranceUse } from "./points.js";
 import { POSE_MOVES } from "./protocol.js";
+import { dated, gettext, ngettext, translate } from "./words.js";
 
 /** @import { RunState } from "./protocol.js" */
 /** @import { Card, Heard } from "./card.js" */
@@ -12,22 +13,22 @@ import { POSE_MOVES } from "./protocol.js";
 /** @typedef {{ words: string, kind: "none" | "note" | "warning" | "fault", button: string, act: "live" | "take control" }} Banner */
 
 const NONE = "\u2013";
-const LONG_WORD = 9; // letters; a longer word is set smaller, so that it stays in its card
-const NEEDS_ADDRESS = "This page has no access. An address opens one page, once, within a minute: "
-  + "press Enter where the console runs, or Another page on a page that is open, and open the new address here.";
+const NEEDS_ADDRESS = gettext("This page has no access. An address opens one page, once, within a minute: "
+  + "press Enter where the console runs, or Another page on a page that is open, and open the new address here.");
 const SIGNS = { over: "\u25b2", under: "\u25bc", "not-proven": "\u25c6", in: "\u25cf", near: "\u25cf" };
 
 /** @type {Readonly<Record<RunState["link"], Lamp>>} */
 const LINK_LAMPS = {
-  connecting: ["lamp-wait", "connecting"], up: ["lamp-on", "up"], down: ["lamp-fault", "LOST"], closed: ["lamp-off", "closed"],
+  connecting: ["lamp-wait", gettext("connecting")], up: ["lamp-on", gettext("up")], down: ["lamp-fault", gettext("LOST")],
+  closed: ["lamp-off", gettext("closed")],
 };
 /** @type {Lamp} */
-const DARK = ["lamp-off", "none"];
+const DARK = ["lamp-off", gettext("none")];
 
 /** @param {Heard} heard */
 export function showRun(heard) {
   const card = cardOf(heard), { run } = card;
-  put("part", card.part || "No part");
+  put("part", card.part || gettext("No part"));
   put("serial-number", card.serial);
   byId("serial-number").title = card.serial; // a long one is cut
   put("plan-operator", card.names.filter(Boolean).join("  \u00b7  "));
@@ -38,7 +39,8 @@ export function showRun(heard) {
   showVerdict(card);
   byId("report").hidden = !card.record;
   showRemarks(card);
-  const rule = `${run?.zone.decision_rule ?? ""}${heard.hasBand ? "; shaded around the limits: the U of each station" : ""}`;
+  const band = heard.hasBand ? gettext("shaded around the limits: the U of each station") : "";
+  const rule = [translate(run?.zone.decision_rule ?? ""), band].filter(Boolean).join("; ");
   put("rule", rule);
   byId("rule").title = rule; // a long one is cut
   document.body.dataset.card = run ? cardKind(run) : "summary";
@@ -55,11 +57,12 @@ export function showRun(heard) {
 const cardKind = ({ kind }) => (kind === "replay" || kind === "recorded" ? "past" : "run");
 
 /** @param {Card} shown */
-function showVerdict({ word, shape, final, of, why, phase }) {
+function showVerdict({ word: told, shape, final, of, why: toldWhy, phase }) {
+  const word = translate(told), why = translate(toldWhy);
   const card = byId("verdict");
   document.body.dataset.verdict = shape;
   card.dataset.final = String(final);
-  card.dataset.long = String(word.split(" ").some((part) => part.length > LONG_WORD));
+  card.style.setProperty("--letters", String(Math.max(7, ...word.split(" ").map((part) => part.length)))); // a longer word is smaller
   showSymbol(within(card, ".shape"), `shape-${shape}`);
   put("verdict-word", word);
   byId("verdict-of").hidden = !of;
@@ -90,7 +93,7 @@ function showList(id, sentences) {
   part.hidden = !sentences.length;
   if (part.dataset.shown === shown) return;
   part.dataset.shown = shown;
-  list.replaceChildren(...sentences.map((sentence) => make("li", sentence)));
+  list.replaceChildren(...sentences.map((sentence) => make("li", translate(sentence))));
 }
 
 /** @param {Card} card */
@@ -98,9 +101,10 @@ function showWorst({ worst, run }) {
   byId("worst").dataset.kind = worst?.kind ?? "none";
   put("worst-shape", worst ? SIGNS[worst.kind] : "");
   put("worst-value", worst ? signed(worst.deviation, digitsFor(worst.zone)) : NONE);
-  const nowhere = run ? "no point judged" : "";
-  put("worst-where", worst ? `at station ${worst.station.toFixed(2)} mm` : nowhere);
-  put("worst-use", worst ? `${Math.round(100 * toleranceUse(worst.deviation, worst.zone))} % of the tolerance` : "");
+  const nowhere = run ? gettext("no point judged") : "";
+  put("worst-where", worst ? gettext("at station {station} mm", { station: fixed(worst.station, 2) }) : nowhere);
+  const share = worst ? Math.round(100 * toleranceUse(worst.deviation, worst.zone)) : 0;
+  put("worst-use", worst ? gettext("{share} % of the tolerance", { share }) : "");
 }
 
 /** @param {RunState | null} run */
@@ -117,9 +121,9 @@ function showRegistration(run) {
 export function moveWords(run) {
   if (!run) return NONE;
   const { state, other_poses: others } = run.registration;
-  if (others) return `final, but ${others} other pose${others > 1 ? "s fit" : " fits"} as well`;
-  if (state === "provisional") return run.phase === "finished" ? "not settled" : POSE_MOVES;
-  return state === "settled" ? "final" : NONE;
+  if (others) return ngettext("final, but {count} other pose fits as well", "final, but {count} other poses fit as well", others);
+  if (state === "provisional") return run.phase === "finished" ? gettext("not settled") : translate(POSE_MOVES);
+  return state === "settled" ? gettext("final") : NONE;
 }
 
 /**
@@ -144,7 +148,7 @@ function showNumbers(run) {
   byId("rejected").dataset.bad = String((run?.rejected ?? 0) > 0);
   byId("lost").dataset.bad = String((run?.lost ?? 0) !== 0);
   const reasons = Object.entries(run?.rejected_by_reason ?? {});
-  byId("rejected").title = reasons.map(([reason, points]) => `${count(points)} ${reason}`).join(", ");
+  byId("rejected").title = reasons.map(([reason, points]) => `${count(points)} ${translate(reason)}`).join(", ");
   put("rate", count(Math.round(run?.rate_per_s ?? 0)));
   put("buffer", `${run ? Math.round((100 * run.buffered) / run.buffer_capacity) : 0} %`);
   byId("buffer").title = run ? bufferWords(run) : "";
@@ -152,7 +156,9 @@ function showNumbers(run) {
 
 /** @param {RunState} run */
 function bufferWords({ buffered, buffer_capacity, buffer_peak, stalls }) {
-  return `${count(buffered)} of ${count(buffer_capacity)} points, at most ${count(buffer_peak)}; full ${count(stalls)} times`;
+  const values = { held: count(buffered), room: count(buffer_capacity), peak: count(buffer_peak), count: count(stalls) };
+  return ngettext("{held} of {room} points, at most {peak}; full {count} time",
+    "{held} of {room} points, at most {peak}; full {count} times", stalls, values);
 }
 
 /**
@@ -162,10 +168,10 @@ function bufferWords({ buffered, buffer_capacity, buffer_peak, stalls }) {
  */
 export function ageWords(run, nowMs) {
   if (!run?.verdict_at_ms) return NONE;
-  if (run.kind === "replay" || run.kind === "recorded") return run.began.slice(0, 19); // not of today
-  if (run.phase === "finished") return `at ${new Date(run.verdict_at_ms).toTimeString().slice(0, 8)}`;
+  if (run.kind === "replay" || run.kind === "recorded") return dated(run.began.slice(0, 19)); // not of today
+  if (run.phase === "finished") return gettext("at {time}", { time: new Date(run.verdict_at_ms).toTimeString().slice(0, 8) });
   const age = Math.max(0, nowMs - run.verdict_at_ms) / 1000;
-  return `${age < 10 ? age.toFixed(1) : Math.round(age)} s ago`;
+  return gettext("{age} s ago", { age: age < 10 ? fixed(age, 1) : Math.round(age) });
 }
 
 /** @param {Heard} heard */
@@ -174,7 +180,7 @@ export function showLamps(heard) {
   byId("simulated").hidden = !cardOf(heard).simulated;
   showLamp("lamp-link", run && link === "live" ? LINK_LAMPS[run.link] : DARK);
   showLamp("lamp-streaming", pointsLamp(run));
-  showLamp("lamp-faults", hasFault ? ["lamp-fault", "FAULT"] : DARK);
+  showLamp("lamp-faults", hasFault ? ["lamp-fault", gettext("FAULT")] : DARK);
 }
 
 /**
@@ -182,9 +188,9 @@ export function showLamps(heard) {
  * @returns {Lamp}
  */
 function pointsLamp(run) {
-  if (run?.streaming) return ["lamp-on", "coming"];
+  if (run?.streaming) return ["lamp-on", gettext("coming")];
   const isAwaited = run && run.phase !== "finished" && run.link !== "connecting";
-  return isAwaited ? ["lamp-wait", "none"] : DARK;
+  return isAwaited ? ["lamp-wait", gettext("none")] : DARK;
 }
 
 /**
@@ -240,19 +246,26 @@ export function bannersOf({ run, isRecorded, control, isRemote, link }) {
   /** @type {(words: string, kind: Banner["kind"], button?: string, act?: Banner["act"]) => Banner} */
   const banner = (words, kind, button = "", act = "live") => ({ words, kind, button, act });
   if (link === "refused") return [banner(NEEDS_ADDRESS, "fault")];
-  if (link === "connecting") return [banner("Connecting to the station \u2026", "note")];
+  if (link === "connecting") return [banner(gettext("Connecting to the station \u2026"), "note")];
   const banners = [];
-  if (link !== "live") banners.push(banner("STALE: the station does not answer. What you see is old. Trying again \u2026", "fault"));
+  if (link !== "live") {
+    banners.push(banner(gettext("STALE: the station does not answer. What you see is old. Trying again \u2026"), "fault"));
+  }
   if (run?.link === "down" && run.phase !== "finished") {
-    banners.push(banner("LINK LOST. The device cannot be reached; trying again \u2026", "fault"));
+    banners.push(banner(gettext("LINK LOST. The device cannot be reached; trying again \u2026"), "fault"));
   }
-  if (isRecorded) banners.push(banner(run?.number ?? "", "note", "Back to live"));
-  else if (run?.kind === "replay") banners.push(banner(run.remark || `Replaying the run of ${run.began}`, "note"));
-  else if (run?.remark) banners.push(banner(run.remark, "note"));
+  if (isRecorded) banners.push(banner(translate(run?.number ?? ""), "note", gettext("Back to live")));
+  else if (run?.kind === "replay") {
+    banners.push(banner(translate(run.remark) || gettext("Replaying the run of {began}", { began: dated(run.began) }), "note"));
+  } else if (run?.remark) banners.push(banner(translate(run.remark), "note"));
   if (control && !control.controls && link === "live") {
-    banners.push(banner(`Watching: ${control.taken ? "another" : "no"} page is in control.`, "note", "Take control", "take control"));
+    const words = control.taken ? gettext("Watching: another page is in control.") : gettext("Watching: no page is in control.");
+    banners.push(banner(words, "note", gettext("Take control"), "take control"));
   }
-  if (isRemote) banners.push(banner("This station is open to the network, unencrypted: whoever listens there can control it.", "warning"));
+  if (isRemote) {
+    const words = gettext("This station is open to the network, unencrypted: whoever listens there can control it.");
+    banners.push(banner(words, "warning"));
+  }
   return banners;
 }
 

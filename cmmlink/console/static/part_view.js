@@ -2,6 +2,9 @@
 
 import { buttonOf, byId, inputOf, make, put } from "./dom.js";
 import { List } from "./list.js";
+import { gettext, translate } from "./words.js";
+
+const NAMED = ["Part", "Device"]; // facts whose value is a name
 
 /** @import { ChosenPlan, Command, Device, StationState } from "./protocol.js" */
 /** @import { Outcome } from "./link.js" */
@@ -64,7 +67,7 @@ export class PartView {
     byId("address-label").hidden = !choice?.has_address;
     const { state, message } = station.test;
     byId("test-result").dataset.state = state;
-    put("test-result", state === "none" ? "" : TEST_SIGNS[state] + message);
+    put("test-result", state === "none" ? "" : TEST_SIGNS[state] + translate(message));
     buttonOf("test").disabled = running;
     buttonOf("start-part").disabled = !station.can_start;
     this.enterNext(station);
@@ -110,7 +113,9 @@ export class PartView {
     byId("check").dataset.state = state;
     put("check-word", words);
     const facts = choice?.facts ?? [];
-    byId("check-facts").replaceChildren(...facts.flatMap(([name, value]) => [make("dt", name), make("dd", value)]));
+    byId("check-facts").replaceChildren(...facts.flatMap(([name, value]) => [
+      make("dt", translate(name)), make("dd", NAMED.includes(name) ? value : translate(value)),
+    ]));
     this.showText(choice?.text ?? "", choice?.line ?? null);
   }
 
@@ -130,7 +135,7 @@ export class PartView {
 
 /** @param {ChosenPlan | null} choice */
 function checkOf(choice) {
-  if (!choice) return { state: "none", words: "No plan is chosen." };
-  if (choice.problem) return { state: "bad", words: `\u2715 Cannot be run: ${choice.problem}` };
-  return { state: "good", words: `\u2713 ${choice.name} can be run.` };
+  if (!choice) return { state: "none", words: gettext("No plan is chosen.") };
+  if (choice.problem) return { state: "bad", words: gettext("\u2715 Cannot be run: {problem}", { problem: translate(choice.problem) }) };
+  return { state: "good", words: gettext("\u2713 {name} can be run.", { name: choice.name }) };
 }

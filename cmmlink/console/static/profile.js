@@ -2,10 +2,11 @@
 
 import { CONFORM, DEVIATION, FOOT_X, FOOT_Y, NORMAL_X, NORMAL_Y, NONCONFORM, VERDICT } from "./protocol.js";
 import { Drawing } from "./drawing.js";
-import { digitsFor, niceLength, signed } from "./numbers.js";
+import { digitsFor, fixed, niceLength, signed } from "./numbers.js";
 import { CLASSES, classOf } from "./points.js";
 import { cut, drawPlaces, drawRegions, lanesOf, roomOf } from "./regions.js";
 import { INK, label, mark } from "./sheet.js";
+import { gettext } from "./words.js";
 
 /** @import { CharacteristicRow, WorstPoint } from "./protocol.js" */
 /** @import { HeldPoint, PointClass } from "./points.js" */
@@ -211,7 +212,7 @@ export class Profile extends Drawing {
     pen.fillStyle = INK.soft;
     pen.textAlign = "left";
     pen.textBaseline = "middle";
-    pen.fillText(`${Number(length.toPrecision(3))} mm`, right + 8, y - 3);
+    pen.fillText(`${fixed(Number(length.toPrecision(3)), 6, 0)} mm`, right + 8, y - 3);
   }
 
   /** @param {Pen} pen */
@@ -321,8 +322,8 @@ export class Profile extends Drawing {
     super.drawWorst(pen, worst, place);
     const ink = worst.verdict === "nonconform" ? INK[classOf(worst.deviation_mm, NONCONFORM, this.zone)] : INK.limit;
     const name = this.chosen ? `${cut(this.chosen.name)}\n` : "";
-    const words = `${name}${signed(worst.deviation_mm, digitsFor(this.zone))} mm at ${worst.station_mm.toFixed(2)} mm`;
-    label(pen, this.sheet, words, ...place, ink, true);
+    const values = { deviation: signed(worst.deviation_mm, digitsFor(this.zone)), station: fixed(worst.station_mm, 2) };
+    label(pen, this.sheet, name + gettext("{deviation} mm at {station} mm", values), ...place, ink, true);
   }
 
   /**

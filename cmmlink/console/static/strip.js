@@ -2,9 +2,10 @@
 
 import { CONFORM, DEVIATION, STATION, VERDICT } from "./protocol.js";
 import { Drawing } from "./drawing.js";
-import { niceStep, signed } from "./numbers.js";
+import { fixed, niceStep, signed } from "./numbers.js";
 import { classOf, middleOf } from "./points.js";
 import { INK, mark } from "./sheet.js";
+import { gettext } from "./words.js";
 
 /** @import { WorstPoint } from "./protocol.js" */
 /** @import { HeldPoint, PointClass } from "./points.js" */
@@ -137,9 +138,9 @@ export class Strip extends Drawing {
   labelLimits(pen, lower, upper) {
     const { zone, sheet } = this, line = sheet.text * 1.3, apart = Math.max(0, line - (lower - upper)) / 2;
     this.yLabel(pen, upper - apart, signed(zone.upper_mm, 3), INK.text);
-    this.yLabel(pen, upper - apart - line, "upper", INK.soft);
+    this.yLabel(pen, upper - apart - line, gettext("upper"), INK.soft);
     this.yLabel(pen, lower + apart, signed(zone.lower_mm, 3), INK.text);
-    this.yLabel(pen, lower + apart + line, "lower", INK.soft);
+    this.yLabel(pen, lower + apart + line, gettext("lower"), INK.soft);
   }
 
   /**
@@ -152,7 +153,7 @@ export class Strip extends Drawing {
     pen.fillStyle = INK["not-proven"];
     pen.textAlign = "right";
     pen.textBaseline = side > 0 ? "bottom" : "top";
-    pen.fillText(side > 0 ? "limit + U" : "limit \u2212 U", this.right - 4, this.py(deviation));
+    pen.fillText(side > 0 ? gettext("limit + U") : gettext("limit \u2212 U"), this.right - 4, this.py(deviation));
   }
 
   /**
@@ -202,7 +203,7 @@ export class Strip extends Drawing {
       pen.moveTo(x, this.bottom);
       pen.lineTo(x, this.bottom + 5);
       pen.stroke();
-      if (x < this.right - sheet.text * 2.2) pen.fillText(station.toFixed(digits), x, this.bottom + 8);
+      if (x < this.right - sheet.text * 2.2) pen.fillText(fixed(station, digits), x, this.bottom + 8);
     }
     pen.textAlign = "right";
     pen.fillText("mm", this.right, this.bottom + 8);

@@ -1,7 +1,8 @@
 // A table whose rows are chosen by arrows or mouse and opened by Enter or a double click.
 
 import { showSymbol, within } from "./dom.js";
-import { digitsFor, signed } from "./numbers.js";
+import { digitsFor, fixed, signed } from "./numbers.js";
+import { translate } from "./words.js";
 
 /** @import { RunRow } from "./protocol.js" */
 
@@ -101,7 +102,7 @@ export function verdictCell(word, shape) {
   element.dataset.verdict = shape;
   element.innerHTML = '<svg class="shape" aria-hidden="true"><use/></svg>';
   showSymbol(element, `shape-${shape}`);
-  element.append(word);
+  element.append(translate(word));
   return element;
 }
 
@@ -112,5 +113,5 @@ export function verdictCell(word, shape) {
 export function worstCells({ worst_mm, worst_station_mm, lower_mm, upper_mm }) {
   if (worst_mm === null || worst_station_mm === null) return [cell(""), cell("")];
   const digits = digitsFor({ lower_mm: lower_mm ?? 0, upper_mm: upper_mm ?? 0 });
-  return [cell(signed(worst_mm, digits), "number"), cell(worst_station_mm.toFixed(2), "number")];
+  return [cell(signed(worst_mm, digits), "number"), cell(fixed(worst_station_mm, 2), "number")];
 }
