@@ -1,5 +1,6 @@
 """The console brought to the operator: the command `console`, and a single run shown on the page."""
 
+import itertools
 import os
 import re
 import signal
@@ -22,10 +23,12 @@ from cmmlink.version import __version__
 from cmmlink.words import VERDICT_WORDS
 
 if TYPE_CHECKING:
+    from contextlib import AbstractContextManager
+
     from cmmlink.console.ct_import import Section
     from cmmlink.console.past_runs import PastRuns
     from cmmlink.console.server import ConsoleServer
-    from cmmlink.devices import Connect
+    from cmmlink.devices import Connect, Connected
     from cmmlink.plan import CtPlan, Plan
     from cmmlink.run import FinishedRun
     from cmmlink.stack import SectionOutcome
@@ -57,6 +60,7 @@ def serve_console(
     from cmmlink.console.launch import serve
     from cmmlink.console.listening import Access
     from cmmlink.console.station_setup import StationSetup
+    from cmmlink.demo import plan_file
     from cmmlink.devices import connect, serial_ports
 
     if not folder.is_dir():
@@ -64,7 +68,8 @@ def serve_console(
     past = _past_runs(records)
     scans, surfaces = (lambda: _plans_in(folder, surfaces=False)), (lambda: _plans_in(folder, surfaces=True))
     inspect = partial(inspect_surface, past.folder)
-    setup = StationSetup(scans, connect, serial_ports, past, time.monotonic, now, surfaces, inspect, _write_for(), folder)
+    open_device = or_demo(connect)
+    setup = StationSetup(scans, open_device, serial_ports, past, time.monotonic, now, surfaces, inspect, _write_for(), folder, plan_file())
     if key is not None and certificate is None:
         raise PlanError("--key belongs to a certificate; give that with --certificate")
     access = Access(host, port, certificate, key, unencrypted)
@@ -76,6 +81,23 @@ def serve_console(
         while not stop.wait(_LOOK_S):
             pass
     return 0
+
+
+def or_demo(connect: "Connect") -> "Connect":
+    """Connect the device of a plan; that of the demonstration's plan is simulated, and every part of it is another one."""
+    from cmmlink.demo import plan_file
+    from cmmlink.plan import load_plan
+
+    seeds, demo = itertools.count(1), load_plan(plan_file())
+
+    def connect_any(plan: "Plan") -> "AbstractContextManager[Connected]":
+        from cmmlink.from_plan import profile_of
+        from cmmlink.simulated import connect_demo_device
+
+        is_demo = (plan.device, plan.nominal) == (demo.device, demo.nominal)
+        return connect_demo_device(plan, profile_of(plan), next(seeds), None) if is_demo else connect(plan)
+
+    return connect_any
 
 
 def run_on_page(plan_file: Path, connect: "Connect", output: Output, serial_number: str | None = None, operator: str | None = None) -> int:

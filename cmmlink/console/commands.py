@@ -54,6 +54,7 @@ def action_of(command: Command, station: Station) -> Callable[[], str] | None:
         "end": station.end_scan,
         "abort": station.abort,
         "test": station.test_device,
+        "demo": station.run_demo,
     }
     match command:
         case Choose(plan):

@@ -51,6 +51,7 @@ def _constants() -> dict[str, Any]:
     columns = ("STATION", "DEVIATION", "FOOT_X", "FOOT_Y", "NORMAL_X", "NORMAL_Y", "VERDICT", "COLUMNS")
     return {
         "WRONG_TOKEN": protocol.WRONG_TOKEN,
+        "LARGEST_NOMINAL": protocol.LARGEST_NOMINAL,
         "HEADER_BYTES": protocol.HEADER_BYTES,
         "HEADER_AT": {name: header.fields[name][1] for name, _ in protocol.HEADER} if header.fields else {},
         "POINTS": protocol.POINTS,

@@ -11,23 +11,39 @@ import anyio.to_thread
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import PlainTextResponse, Response
 
-from cmmlink.console.protocol import PlanSaved, Understood, json_of
+from cmmlink.console.protocol import LARGEST_NOMINAL, PlanSaved, Understood, json_of
 from cmmlink.console.refused import Refused, words_of
+from cmmlink.console.station import Station
 
-LARGEST_NOMINAL = 32 << 20
 POST_S = 120.0  # as long as one may take, with reading a solid
 
 Work = Callable[[Mapping[str, str], bytes], Understood | PlanSaved]
 
 
 class Posts:
-    """Takes posts, one after the other. Belongs to the event loop, but for the work itself."""
+    """Takes posts for a station, one after the other. Belongs to the event loop, but for the work itself.
 
-    def __init__(self) -> None:
+    let_control : lets the page of a number control the station, or raises Refused
+    """
+
+    def __init__(self, station: Station, let_control: Callable[[str], None]) -> None:
+        self._station, self._let_control = station, let_control
         self._turn = asyncio.Semaphore(1)
 
-    async def answer(self, request: Request, work: Work) -> Response:
-        """The answer to a post whose token is right: what the work gives as JSON, or why it is refused."""
+    async def understand_nominal(self, request: Request) -> Response:
+        """What is understood of a nominal that is handed in."""
+        return await self._answer(request, self._station.understand_nominal)
+
+    async def save_plan(self, request: Request) -> Response:
+        """A new plan, from the page in control, which says its number."""
+        try:
+            self._let_control(request.query_params.get("page", ""))
+        except Refused as refusal:
+            return PlainTextResponse(str(refusal), 409)
+        return await self._answer(request, self._station.save_plan)
+
+    async def _answer(self, request: Request, work: Work) -> Response:
+        """What the work gives as JSON, or why it is refused."""
         async with self._turn:
             try:
                 content = await _content_of(request)

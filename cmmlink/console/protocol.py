@@ -18,6 +18,7 @@ from cmmlink.words import VERDICT_NAMES, VERDICT_WORDS, Shape, VerdictName
 
 WRONG_TOKEN = 4401  # the station closes a page's socket with this code when its token is wrong, or its address was used or is too old
 TOO_MANY_PAGES = 1013
+LARGEST_NOMINAL = 32 << 20  # bytes of a file that a page may hand in
 
 # A binary message begins with these fields, little-endian; then come columns, one after the other, `rows` values each.
 # points : bin u32; of the lowest, then of the highest point in the bin the seven columns of `cmmlink.extremes`, f32. The time is
@@ -117,6 +118,7 @@ class StationState:
     can_start: bool
     keeps_records: bool
     can_make_plans: bool
+    can_run_demo: bool
     type: Literal["station"] = "station"
 
 
@@ -362,7 +364,7 @@ class ImportSurface:
 class Plain:
     """A command that needs no more words. The answer to `another page` is the code of a one-time address."""
 
-    do: Literal["start", "end", "abort", "test", "take control", "live", "devices", "another page"]
+    do: Literal["start", "end", "abort", "test", "demo", "take control", "live", "devices", "another page"]
 
 
 Message = Admitted | Hello | Alive | Answer | Control | StationState | AlarmList | ShownRun | CharacteristicList | History | SurfaceState

@@ -1,25 +1,48 @@
-"""A recorded run on its way to a page, as an archive or a report in a temporary folder that is gone afterwards, however it ends."""
+"""Recorded runs on their way to a page, as an archive or a report in a temporary folder that is gone afterwards, however it ends."""
 
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import get_args
 
 import anyio.to_thread
+from starlette.requests import Request
 from starlette.responses import FileResponse, PlainTextResponse, Response
 from starlette.types import Receive, Scope, Send
 
 from cmmlink.console.refused import Refused, words_of
+from cmmlink.console.station import Station
+from cmmlink.plan import LanguageName, PaperName
 
+EXPORT_S = 3600.0
 _MOST = 4  # at a time
+_LOOKS = {"language": get_args(LanguageName), "paper": get_args(PaperName)}  # of a report, as far as a page chooses them
 
 
 class RunFiles:
-    """Makes files of runs for pages. Belongs to the event loop, but for the making itself."""
+    """Makes files of a station's runs for pages. Belongs to the event loop, but for the making itself."""
 
-    def __init__(self) -> None:
+    def __init__(self, station: Station) -> None:
+        self._station = station
         self._under_way = 0
 
-    async def answer(self, make: Callable[[Path], Path], media_type: str) -> Response:
+    async def export(self, request: Request) -> Response:
+        """One run as an archive."""
+        run = request.path_params["run"]
+        return await self._answer(lambda folder: self._station.export_run(run, folder), "application/zip")
+
+    async def report(self, request: Request) -> Response:
+        """The report of one run, in the language and on the paper that are asked for."""
+        run, asked = request.path_params["run"], request.query_params
+        settings = {name: asked[name] for name, allowed in _LOOKS.items() if asked.get(name) in allowed}
+        return await self._answer(lambda folder: self._station.report_run(run, folder, settings), "application/pdf")
+
+    async def compare(self, request: Request) -> Response:
+        """Two runs on one drawing."""
+        first, second = request.path_params["first"], request.path_params["second"]
+        return await self._answer(lambda folder: self._station.compare_runs(first, second, folder), "application/pdf")
+
+    async def _answer(self, make: Callable[[Path], Path], media_type: str) -> Response:
         """The answer to a page that asks for a file; `make` writes it into a folder."""
         if self._under_way >= _MOST:
             return PlainTextResponse("other runs are being exported; try again when they are done", 503)

@@ -13,11 +13,10 @@ import json
 import logging
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Awaitable, Callable, Iterator
 from dataclasses import asdict, replace
 from importlib import resources
-from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import anyio.to_thread
 import uvicorn
@@ -54,10 +53,9 @@ from cmmlink.console.protocol import (
     json_of,
 )
 from cmmlink.console.refused import Refused, without_folders, words_of
-from cmmlink.console.run_file import RunFiles
+from cmmlink.console.run_file import EXPORT_S, RunFiles
 from cmmlink.console.station import Station
 from cmmlink.console.unseen import Onlooker
-from cmmlink.plan import LanguageName, PaperName
 from cmmlink.run_state import RunState
 
 _log = logging.getLogger(__name__)
@@ -68,11 +66,9 @@ _LIST_PLANS_S = 1.0
 _LOOK_ON_S = 0.5
 _TOKEN_WITHIN_S = 5.0
 _MOST_PAGES = 16
-_EXPORT_S = 3600.0
 _MOST_COMMANDS = 200  # a page may send within a second
 _TOO_MANY_COMMANDS = 1008  # close code
 _BROKEN_DOWN = 1011  # close code: the page connects again and is sent everything
-_LOOKS = {"language": get_args(LanguageName), "paper": get_args(PaperName)}  # of a report, as far as a page chooses them
 _MEDIA = {
     "html": "text/html; charset=utf-8",
     "css": "text/css; charset=utf-8",
@@ -100,8 +96,6 @@ class ConsoleServer:
         self._socket, self.remote = listen_at(self._access)
         self.port: int = self._socket.getsockname()[1]
         self._pages: list[OpenPage] = []
-        self._files = RunFiles()
-        self._posts = Posts()
         self._controller: OpenPage | None = None
         self._seen = 0
         self._ever = threading.Event()
@@ -178,61 +172,38 @@ class ConsoleServer:
 
     def _application(self) -> ASGIApp:
         files = {path.name: (path.read_bytes(), _MEDIA[path.name.rpartition(".")[2]]) for path in _static_files()}
+        runs, posts = RunFiles(self.station), Posts(self.station, self._let_control)
         app = Starlette(
             routes=[
                 Route("/", lambda _: _file_response(files["index.html"])),
-                Route("/export/{run}", self._export),
-                Route("/report/{run}", self._report),
-                Route("/compare/{first}/{second}", self._compare),
-                Route("/nominal", self._understand_nominal, methods=["POST"]),
-                Route("/plan", self._save_plan, methods=["POST"]),
+                Route("/export/{run}", self._with_token(runs.export, EXPORT_S)),
+                Route("/report/{run}", self._with_token(runs.report, EXPORT_S)),
+                Route("/compare/{first}/{second}", self._with_token(runs.compare, EXPORT_S)),
+                Route("/nominal", self._with_token(posts.understand_nominal, POST_S), methods=["POST"]),
+                Route("/plan", self._with_token(posts.save_plan, POST_S), methods=["POST"]),
                 Route("/{name}", lambda request: _file_response(files.get(request.path_params["name"]))),
                 WebSocketRoute("/live", self._live),
             ]
         )
         return Guard(app, self._access.host.strip(), self.port, self.remote)
 
-    async def _export(self, request: Request) -> Response:
-        run = request.path_params["run"]
-        return await self._send_file(request, lambda folder: self.station.export_run(run, folder), "application/zip")
+    def _with_token(self, answer: Callable[[Request], Awaitable[Response]], longest_s: float) -> Callable[[Request], Awaitable[Response]]:
+        """Answer whoever shows the token, for at most so long."""
 
-    async def _report(self, request: Request) -> Response:
-        run, asked = request.path_params["run"], request.query_params
-        settings = {name: asked[name] for name, allowed in _LOOKS.items() if asked.get(name) in allowed}
-        return await self._send_file(request, lambda folder: self.station.report_run(run, folder, settings), "application/pdf")
+        async def answer_admitted(request: Request) -> Response:
+            if not self._keys.knows(request.headers.get("authorization", "").removeprefix("Bearer ")):
+                return PlainTextResponse("the token is wrong or missing", 401)
+            _visitor(request).admit(longest_s)
+            return await answer(request)
 
-    async def _compare(self, request: Request) -> Response:
-        first, second = request.path_params["first"], request.path_params["second"]
-        return await self._send_file(request, lambda folder: self.station.compare_runs(first, second, folder), "application/pdf")
+        return answer_admitted
 
-    async def _understand_nominal(self, request: Request) -> Response:
-        if not self._has_token(request):
-            return _no_token()
-        _visitor(request).admit(POST_S)
-        return await self._posts.answer(request, self.station.understand_nominal)
-
-    async def _save_plan(self, request: Request) -> Response:
-        """Save a new plan for the page in control, which says its number."""
-        if not self._has_token(request):
-            return _no_token()
-        page = next((page for page in self._pages if str(page.number) == request.query_params.get("page")), None)
-        try:
-            if page is None:
-                raise Refused("the page is not connected to the station")
-            self._take_control(page)
-        except Refused as refusal:
-            return PlainTextResponse(str(refusal), 409)
-        _visitor(request).admit(POST_S)
-        return await self._posts.answer(request, self.station.save_plan)
-
-    def _has_token(self, request: Request) -> bool:
-        return self._keys.knows(request.headers.get("authorization", "").removeprefix("Bearer "))
-
-    async def _send_file(self, request: Request, make: Callable[[Path], Path], media_type: str) -> Response:
-        if not self._has_token(request):
-            return _no_token()
-        _visitor(request).admit(_EXPORT_S)
-        return await self._files.answer(make, media_type)
+    def _let_control(self, number: str) -> None:
+        """Let the page of a number control the station, unless another one does. Raises Refused."""
+        page = next((page for page in self._pages if str(page.number) == number), None)
+        if page is None:
+            raise Refused("the page is not connected to the station")
+        self._take_control(page)
 
     async def _live(self, websocket: WebSocket) -> None:
         """One page, from its token to its end."""
@@ -388,10 +359,6 @@ def _static_files() -> list[Any]:
 
 def _file_response(file: tuple[bytes, str] | None) -> Response:
     return Response(file[0], media_type=file[1]) if file else PlainTextResponse("there is no such page", 404)
-
-
-def _no_token() -> Response:
-    return PlainTextResponse("the token is wrong or missing", 401)
 
 
 def _visitor(connection: HTTPConnection) -> Visitor:

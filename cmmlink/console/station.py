@@ -7,16 +7,16 @@ It knows no page and no device. Commands come in from any thread; each takes as 
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from cmmlink.console.alarms import Alarms
-from cmmlink.console.choice import CheckedPlan, Choice, check_choice
+from cmmlink.console.choice import CheckedPlan
 from cmmlink.console.ct_import import CtImport, InspectSurface
 from cmmlink.console.device_test import TESTING, listen_to_device
 from cmmlink.console.entry import Entry
 from cmmlink.console.job import Job, JobKind
-from cmmlink.console.plan_form import PlanForm, save_form, understand_nominal
+from cmmlink.console.plan_shelf import DEMO, Listed, PlanShelf
 from cmmlink.console.protocol import DeviceTest, History, PlanSaved, StationState, Understood
 from cmmlink.console.refused import Refused, answer_errors
 from cmmlink.console.run_job import measure, raise_alarms, sink_of
@@ -29,15 +29,6 @@ from cmmlink.run_view import RunContext, RunView
 from drivers import DeviceError
 
 _MOST_HISTORY = 500
-
-
-@dataclass(frozen=True, slots=True)
-class _Listed:
-    """Names of the plans that there are, and why they could not be listed."""
-
-    plans: tuple[str, ...] = ()
-    ct_plans: tuple[str, ...] = ()
-    problem: str = ""
 
 
 class Station:
@@ -57,7 +48,8 @@ class Station:
         self._job: Job | None = None
         self._view: RunView | None = None
         self._runs_begun = 0
-        self._listed = _Listed()
+        self._shelf = PlanShelf(setup)
+        self._listed = Listed()
         self._history = History(())
         self._state = self._newest_state()
         self.list_plans()
@@ -100,7 +92,7 @@ class Station:
     def choose(self, name: str) -> str:
         """Choose a plan and check it with everything it names, short of the device."""
         self._refuse_while_running("another plan can be chosen")
-        choice = self._check(name)
+        choice = self._shelf.check(name)
         with self._lock:
             self._refuse_while_running("another plan can be chosen")
             self._set_entry(self._entry.with_choice(choice))
@@ -110,12 +102,13 @@ class Station:
 
     def understand_nominal(self, answers: Mapping[str, str], content: bytes) -> Understood:
         """Read a nominal that a page hands in, for a new plan."""
-        return understand_nominal(PlanForm.of(answers), content, self._folder_of_plans())
+        self._refuse_while_running("a plan can be made")
+        return self._shelf.understand(answers, content)
 
     def save_plan(self, answers: Mapping[str, str], content: bytes) -> PlanSaved:
         """Save a new plan and the nominal that a page hands in, and choose it; or say what is wrong, and save nothing."""
-        folder = self._folder_of_plans()
-        saved = save_form(PlanForm.of(answers), content, folder, overwrite=answers.get("replace") == "yes")
+        self._refuse_while_running("a plan can be made")
+        saved = self._shelf.save(answers, content)
         self.list_plans()
         if saved.name and not saved.surface:
             self.choose(saved.name)
@@ -134,7 +127,7 @@ class Station:
             chosen = self._entry.choice
             if chosen is None:
                 raise Refused("choose a plan first")
-            choice = self._check(chosen.name)
+            choice = self._shelf.check(chosen.name)
             with self._lock:
                 self._set_entry(self._entry.with_choice(choice))
                 checked = self._entry.planned()
@@ -145,6 +138,14 @@ class Station:
             self.show(view)
             job.start(lambda: self._run(job, view, checked))
         return "started"
+
+    def run_demo(self) -> str:
+        """Measure a part of the demonstration with its simulated device, which needs no set-up."""
+        self._refuse_while_running("the demonstration can be run")
+        self._shelf.show_demo()
+        self.list_plans()
+        self.choose(DEMO)
+        return self.start()
 
     def replay(self, run: str) -> str:
         """Measure a recorded run again, from its recorded bytes."""
@@ -169,10 +170,9 @@ class Station:
     def import_ct(self, name: str) -> str:
         """Inspect the sections of a CT surface as its plan says."""
         with self._new_job("surface", "a surface can be inspected") as job:
-            with answer_errors():
-                file, inspect = self._setup.ct_plans().get(name), self._setup.inspect_surface
-            if file is None or inspect is None:
-                raise Refused(f"there is no CT plan {name!r} at this station")
+            file, inspect = self._shelf.surface_plan(name), self._setup.inspect_surface
+            if inspect is None:
+                raise Refused("this station inspects no surfaces")
             self.ct.begin(name)
             job.start(lambda: self._inspect(job, inspect, file))
         return f"inspecting {name}"
@@ -243,11 +243,7 @@ class Station:
 
     def list_plans(self) -> None:
         """Look which plans there are now. Reads folders, which may be far away: call it in a thread that may wait."""
-        try:
-            surfaces = self._setup.ct_plans() if self._setup.inspect_surface else {}
-            listed = _Listed(tuple(sorted(self._setup.plans())), tuple(sorted(surfaces)))
-        except OSError as error:
-            listed = _Listed(problem=str(error))
+        listed = self._shelf.listed()
         with self._lock:
             news = listed.problem if listed.problem != self._listed.problem else ""
             self._listed = listed
@@ -324,19 +320,6 @@ class Station:
             raise Refused("this station keeps no records")
         return self._setup.records
 
-    def _folder_of_plans(self) -> Path:
-        self._refuse_while_running("a plan can be made")
-        if self._setup.folder is None:
-            raise Refused("this station has no folder of plans: start it with cmmlink console FOLDER")
-        return self._setup.folder
-
-    def _check(self, name: str) -> Choice:
-        with answer_errors():
-            file = self._setup.plans().get(name)
-        if file is None:
-            raise Refused(f"there is no plan {name!r} at this station")
-        return check_choice(name, file)
-
     def _new_view(self, name: str, checked: CheckedPlan) -> RunView:
         with self._lock:
             self._runs_begun += 1
@@ -380,5 +363,6 @@ class Station:
             running=running,
             can_start=not running and choice is not None and choice.checked is not None,
             keeps_records=self._setup.records is not None,
-            can_make_plans=self._setup.folder is not None,
+            can_make_plans=self._shelf.can_make_plans,
+            can_run_demo=self._shelf.can_run_demo,
         )

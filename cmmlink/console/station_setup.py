@@ -54,6 +54,7 @@ class StationSetup:
     ct_plans, inspect_surface : plans of CT surfaces, and what inspects one; None where that is not possible
     write   : writes the results of a run where its plan wants them
     folder  : of the plans, where new ones are saved; None where the page makes none
+    demo    : the plan of the demonstration, whose simulated device `connect` opens as well; None where there is none
     """
 
     plans: Callable[[], Mapping[str, Path]]
@@ -66,3 +67,4 @@ class StationSetup:
     inspect_surface: InspectSurface | None = None
     write: Callable[[Plan, FinishedRun], None] = lambda *_: None
     folder: Path | None = None
+    demo: Path | None = None

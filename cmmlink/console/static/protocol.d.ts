@@ -1,6 +1,7 @@
 // Written by `python -m cmmlink.console.declarations`; change cmmlink/console/protocol.py, not this file.
 
 export const WRONG_TOKEN: 4401;
+export const LARGEST_NOMINAL: 33554432;
 export const HEADER_BYTES: 32;
 export const HEADER_AT: { readonly kind: 0; readonly generation: 4; readonly rows: 8; readonly flags: 12; readonly time_ms: 16; readonly number: 24 };
 export const POINTS: 1;
@@ -87,6 +88,7 @@ export interface StationState {
   readonly can_start: boolean;
   readonly keeps_records: boolean;
   readonly can_make_plans: boolean;
+  readonly can_run_demo: boolean;
   readonly type: "station";
 }
 
@@ -329,7 +331,7 @@ export interface ImportSurface {
 
 /** A command that needs no more words. The answer to `another page` is the code of a one-time address. */
 export interface Plain {
-  readonly do: "start" | "end" | "abort" | "test" | "take control" | "live" | "devices" | "another page";
+  readonly do: "start" | "end" | "abort" | "test" | "demo" | "take control" | "live" | "devices" | "another page";
 }
 
 /** A device that can be seen now. The answer to `devices` is a JSON list of them. */

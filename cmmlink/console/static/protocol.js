@@ -1,6 +1,7 @@
 // Written by `python -m cmmlink.console.declarations`; change cmmlink/console/protocol.py, not this file.
 
 export const WRONG_TOKEN = 4401;
+export const LARGEST_NOMINAL = 33554432;
 export const HEADER_BYTES = 32;
 export const HEADER_AT = {"kind": 0, "generation": 4, "rows": 8, "flags": 12, "time_ms": 16, "number": 24};
 export const POINTS = 1;

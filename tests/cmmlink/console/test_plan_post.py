@@ -11,7 +11,7 @@ from urllib.parse import urlencode
 import pytest
 from websockets.sync.client import ClientConnection
 
-from cmmlink.console.plan_post import LARGEST_NOMINAL
+from cmmlink.console.protocol import LARGEST_NOMINAL
 from cmmlink.console.server import ConsoleServer
 from cmmlink.console.station import Station
 
@@ -108,12 +108,10 @@ def test_a_huge_file_is_refused_before_it_is_read_whole(server: ConsoleServer, f
     assert list(folder.iterdir()) == []
 
 
-def test_station_without_a_folder_or_with_a_run_on_takes_none(server: ConsoleServer, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_station_takes_none_while_a_run_is_on(server: ConsoleServer, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with joined(server) as page:
         told = ANSWERS | {"page": number_of(page)}
         monkeypatch.setattr(Station, "running", property(lambda _: True))
         assert posted(server, "/plan", told) == (409, "a run is on; a plan can be made when it is over")
-        monkeypatch.undo()
-        monkeypatch.setattr(server.station, "_setup", replace(server.station._setup, folder=None))
         assert posted(server, "/nominal", told)[0] == 409
     assert list(folder.iterdir()) == []
