@@ -87,6 +87,14 @@ class VaryingZone:
         """The zone that is the same everywhere."""
         return cls(np.zeros(1), np.array([lower_mm]), np.array([upper_mm]), length_mm, closed)
 
+    @property
+    def has_steps(self) -> bool:
+        """Whether the limits jump anywhere."""
+        behind = self._pieces[-1:] + self._pieces[:-1] if self.closed else self._pieces[:-1]
+        ends = [(piece.lower_mm[1], piece.upper_mm[1]) for piece in behind]
+        starts = [(piece.lower_mm[0], piece.upper_mm[0]) for piece in self._pieces[0 if self.closed else 1 :]]
+        return ends != starts
+
     def limits(self, station_mm: ArrayLike) -> Limits:
         """Limits at stations (m,), the stricter where two zones meet. NaN at a station that is NaN."""
         s = np.asarray(station_mm, dtype=np.float64)
@@ -195,6 +203,8 @@ def _check(zone: VaryingZone) -> None:
         raise ValueError("every lower limit must be below its upper one, and all must be finite numbers")
     if not (np.diff(s) >= 0).all() or s[0] < 0 or s[-1] > zone.length_mm * (1 + _ROUNDING):
         raise ValueError(f"stations must rise from 0 to {zone.length_mm:g} mm at most, got {s[0]:g} .. {s[-1]:g}")
+    if len(s) > 2 and (at := s[2:][s[2:] - s[:-2] <= _ROUNDING * zone.length_mm]).size:
+        raise ValueError(f"a step has two sides, so that a station stands twice at most; {at[0]:g} mm stands more often")
     if zone.between not in ("linear", "smooth", "constant") or not zone.border_mm >= 0:
         raise ValueError(
             f"transitions are linear, smooth or constant, and a border is no narrower than 0; got {zone.between}, {zone.border_mm:g}"

@@ -57,7 +57,7 @@ class Basis:
         """Rows (k,) of the judged points in a region."""
         judged = self.result.verdicts != NOT_JUDGED
         if region is not None:
-            judged &= is_inside(self.result.station_mm, region)
+            judged &= is_inside(self.result.station_mm, region, self.nominal)
         return np.flatnonzero(judged)
 
     def drawn(self, rows: Rows) -> Rows:

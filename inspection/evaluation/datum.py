@@ -48,7 +48,7 @@ def uncertainty_at(datum: FoundDatum, asked: LineProfile, basis: Basis) -> float
     """
     nominal, region = basis.nominal, asked.region
     if basis.terms.uncertainty is None:
-        inside = np.ones(len(nominal), dtype=np.bool_) if region is None else is_inside(nominal.station_mm, region)
+        inside = np.ones(len(nominal), dtype=np.bool_) if region is None else is_inside(nominal.station_mm, region, nominal)
         if not inside.any():
             inside[:] = True
         at, outward = nominal.points_mm[inside], nominal.outward * nominal.normal[inside]
@@ -58,7 +58,7 @@ def uncertainty_at(datum: FoundDatum, asked: LineProfile, basis: Basis) -> float
     if region is None:
         return along.largest_mm
     ends = along.at([region.from_mm, region.to_mm])
-    return float(along.expanded_mm[is_inside(along.station_mm, region)].max(initial=float(ends.max())))
+    return float(along.expanded_mm[is_inside(along.station_mm, region, nominal)].max(initial=float(ends.max())))
 
 
 def fixed_place(stated: StatedUncertainty, datum: FoundDatum) -> Array:

@@ -32,6 +32,7 @@ _PLACED = 0.95  # share of the region whose points place it, where the plan asks
 _MOST_BOXES = 200_000  # of placements, before the search for one that passes is given up
 _LESS = 1e-3  # of a zone: by no more than this another placement may consume less than that of a limited fit
 _FEWEST_POINTS = 8  # of a region, after whose fit its uncertainty is asked
+_ONE_SIDE = "its limits have steps and border_mm is 0: a point beside a step is judged by its own side, as if its station were exact"
 _DECIDED = {"none": "at the pose of the run", "datum": "at the datum"}
 
 
@@ -163,7 +164,11 @@ def _result(
         gap_mm=measured.gap.length_mm,
         certificate=placed.certificate,
         datum=placed.datum,
-        notes=(*seen.notes, *([UNSTATED] if placed.datum is not None and not _u(asked) else [])),
+        notes=(
+            *seen.notes,
+            *([UNSTATED] if placed.datum is not None and not _u(asked) else []),
+            *([_ONE_SIDE] if asked.zone.has_steps and not asked.zone.border_mm else []),
+        ),
     )
 
 

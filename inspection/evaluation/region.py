@@ -14,6 +14,7 @@ from inspection.signed_deviations import deviations
 Array = NDArray[np.float64]
 FeatureName = Literal["LE", "TE", "UPPER", "LOWER"]
 
+_ROUNDING = 1e-12  # of the profile's length: stations nearer than this are one
 _ONE_SIDE = 0.499  # of the outline: what lies around an edge meets itself on the other side of the section
 
 
@@ -80,11 +81,17 @@ def region_between(nominal: NominalProfile, from_mm: float, to_mm: float) -> Reg
     return Region(from_mm, to_mm)
 
 
-def is_inside(station_mm: Array, region: Region) -> NDArray[np.bool_]:
-    """Which stations (m,) lie in a region, its ends included; NaN lies in none."""
-    if region.from_mm <= region.to_mm:
-        return np.asarray((station_mm >= region.from_mm) & (station_mm <= region.to_mm))
-    return np.asarray((station_mm >= region.from_mm) | (station_mm <= region.to_mm))
+def is_inside(station_mm: Array, region: Region, nominal: NominalProfile) -> NDArray[np.bool_]:
+    """Which stations (m,) lie in a region, its ends included; NaN lies in none. On a closed profile 0 and its length are one station.
+
+    What lies on the border of two regions is in both, so that the stricter of their zones holds there, also where round-off tells
+    the station of a corner, at which many points may have their foot, a little otherwise than that of the border.
+    """
+    length, slack = nominal.length_mm, _ROUNDING * nominal.length_mm
+    ahead, span = station_mm - region.from_mm + slack, region.to_mm - region.from_mm
+    if nominal.curve.closed:
+        ahead, span = np.mod(ahead, length), span % length or length
+    return np.asarray((ahead >= 0) & (ahead <= span + 2 * slack))
 
 
 def _region(features: Features, from_mm: float, to_mm: float) -> Region:

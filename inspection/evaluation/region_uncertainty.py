@@ -36,7 +36,7 @@ def uncertainty_of(asked: LineProfile, basis: Basis, few: Rows, placed: Placed) 
     found = _along(asked, basis, few, placed, known_before.stated)
     if asked.region is None or found.basis == "the best fit of the points":
         return found.largest_mm
-    inside = is_inside(found.station_mm, asked.region)
+    inside = is_inside(found.station_mm, asked.region, basis.nominal)
     ends = found.at([asked.region.from_mm, asked.region.to_mm])
     return float(found.expanded_mm[inside].max(initial=float(ends.max())))
 

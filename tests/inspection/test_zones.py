@@ -1,7 +1,11 @@
 """Zones that vary along the profile: transitions by closed forms, borders, seams, and what contradicts itself."""
 
+from typing import NamedTuple
+
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from inspection import Transition, VaryingZone
 
@@ -41,8 +45,59 @@ def test_where_two_zones_meet_the_stricter_limit_holds() -> None:
     assert zone("constant").limits([20, 40, 60, 80, 10]).upper_mm.tolist() == [0.04, 0.04, 0.04, 0.10, 0.10]
     wide = zone("constant", border_mm=0.5).limits([19.4, 19.6, 20.4, 59.4, 60.4, 60.6]).upper_mm
     assert wide.tolist() == [0.10, 0.04, 0.04, 0.04, 0.04, 0.10]
+    assert [zone(how).has_steps for how in ("constant", "linear", "smooth")] == [True, False, False]
+    assert meeting.has_steps
+    assert not VaryingZone.constant(-1.0, 1.0, 100.0, True).has_steps
     seam = VaryingZone(np.array([0.0, 100.0]), np.array([-1.0, -2.0]), np.array([1.0, 2.0]), 100.0, True)
     assert seam.limits([0, 100, 50]).upper_mm.tolist() == [1, 1, 1.5]
+
+
+class Steps(NamedTuple):
+    """Where the limits of a zone hold: stretches (n, 2), each with a lower and an upper limit of its own."""
+
+    ends: list[float]
+    lower: list[float]
+    upper: list[float]
+    closed: bool
+    border_mm: float
+
+    @property
+    def zone(self) -> VaryingZone:
+        s, low, high = np.array(self.ends), np.array(self.lower), np.array(self.upper)
+        return VaryingZone(s, low, high, 100.0, self.closed, "constant", self.border_mm)
+
+    def hold_at(self, s: float) -> tuple[float, float]:
+        """The limits that hold at a station, by asking each stretch whether it is there or within the border of its ends."""
+        low, high, near = -np.inf, np.inf, self.border_mm + 1e-10
+        for k, begin in enumerate(self.ends):
+            end = self.ends[k + 1] if k + 1 < len(self.ends) else 100.0 + self.ends[0] * self.closed
+            first = begin if self.closed or k else 0.0
+            if any(first - near <= turn <= end + near for turn in ((s - 100, s, s + 100) if self.closed else (s,))):
+                low, high = max(low, self.lower[k]), min(high, self.upper[k])
+        return low, high
+
+
+@st.composite
+def steps(draw: st.DrawFn) -> Steps:
+    ends = sorted(draw(st.sets(st.integers(0, 99), min_size=2, max_size=6)))
+    each = st.lists(st.integers(1, 90), min_size=len(ends), max_size=len(ends))
+    lower, upper = ([sign * value / 1000 for value in draw(each)] for sign in (-1, 1))
+    border_mm = draw(st.sampled_from([0.0, 0.3, 0.9]))
+    return Steps([float(end) for end in ends], lower, upper, draw(st.booleans()), border_mm)
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(steps(), st.data())
+def test_at_a_step_and_within_its_border_both_sides_hold_and_nowhere_else(drawn: Steps, data: st.DataObject) -> None:
+    """Points on a step, a hair beside it by round-off, just beside it, at the seam, and anywhere; however many there are, in any order."""
+    within, beyond = max(drawn.border_mm - 1e-6, 0.0), drawn.border_mm + 1e-6
+    beside = [0.0, -4e-12, 4e-12, -within, within, -beyond, beyond]
+    places = [end + off for end in drawn.ends for off in beside] + data.draw(st.lists(st.floats(0.0, 100.0), max_size=5)) + [0.0, 100.0]
+    places = [place % 100.0 if drawn.closed and place != 100.0 else min(max(place, 0.0), 100.0) for place in places]
+    order = data.draw(st.permutations(range(len(places))))
+    found = drawn.zone.limits(np.array(places)[order])
+    for k, at in enumerate(order):
+        assert (found.lower_mm[k], found.upper_mm[k]) == drawn.hold_at(places[at])
 
 
 def test_consumption_is_one_at_either_limit_and_zero_in_the_middle() -> None:
@@ -58,6 +113,8 @@ def test_zones_that_contradict_themselves_are_refused() -> None:
         VaryingZone(STATIONS, UPPER, LOWER, 100.0, True)
     with pytest.raises(ValueError, match=r"must rise from 0 to 50 mm at most, got 20 \.\. 60"):
         VaryingZone(STATIONS, LOWER, UPPER, 50.0, True)
+    with pytest.raises(ValueError, match="40 mm stands more often"):
+        VaryingZone(np.array([0.0, 40.0, 40.0, 40.0]), -np.ones(4), np.ones(4), 100.0, True)
     with pytest.raises(ValueError, match="one shape"):
         VaryingZone(STATIONS, LOWER[:1], UPPER, 100.0, True)
 

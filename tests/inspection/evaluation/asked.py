@@ -81,6 +81,8 @@ def every_type() -> tuple[Characteristic, ...]:
         LineProfile("edge", even(-LIMIT, LIMIT), region=features.edge("LE", 20.0), fit="minimum-zone"),
         LineProfile("over the seam", even(-LIMIT, LIMIT), region=Region(0.8 * length, 0.2 * length), fit="none"),
         LineProfile("varying", varying, fit="tolerance"),
+        LineProfile("stepped", stepped(), fit="none"),
+        LineProfile("stepped and fitted", stepped(0.4), region=Region(0.7 * length, 0.6 * length), fit="tolerance"),
         LineProfile("limited", even(-LIMIT, LIMIT), fit="best-fit", freedoms=freedoms, datum=DATUM),
         value("chord", "chord", "tangent", 0.15),
         value("angle", "chord-angle", "nose-tail", 0.2),
@@ -92,6 +94,13 @@ def every_type() -> tuple[Characteristic, ...]:
         value("displacement", "displacement", "best-fit", 0.1),
         value("twist of its own datum", "twist", "best-fit", 0.1, features=by_features()),
     )
+
+
+def stepped(border_mm: float = 0.0) -> VaryingZone:
+    """A zone with steps: at the corner, which is the seam, at the nose, and two on a flank with a narrow one between them."""
+    length = nominal().length_mm
+    at = np.array([0.0, 0.3 * length, 0.3 * length + 8.0, features_of(nominal()).nose])
+    return VaryingZone(at, np.array([-0.06, -0.05, -0.07, -0.06]), np.array([0.06, 0.05, 0.09, 0.08]), length, True, "constant", border_mm)
 
 
 def stations(count: int = COUNT) -> Array:

@@ -47,6 +47,7 @@ def test_every_type_conforms_on_a_good_part_and_the_part_with_them() -> None:
     assert result.verdict is Verdict.CONFORM
     assert result.reasons == ()
     assert [one.name for one in result.characteristics] == [one.name for one in every_type()]
+    assert [one.name for one in result.characteristics if any("border_mm is 0" in note for note in one.notes)] == ["stepped"]
 
 
 @EXAMPLES
@@ -111,7 +112,7 @@ def could_hide(asked: object, at_mm: float, half_mm: float) -> bool:
     length = nominal().length_mm
     if isinstance(asked, LineProfile) and asked.region is not None:
         places = np.mod(at_mm + np.linspace(-half_mm, half_mm, 201), length)
-        return bool(np.count_nonzero(is_inside(places, asked.region)) / 201 * 2 * half_mm > length / 100)
+        return bool(np.count_nonzero(is_inside(places, asked.region, nominal())) / 201 * 2 * half_mm > length / 100)
     return not (isinstance(asked, SectionCharacteristic) and asked.type in ("edge-radius", "edge-thickness"))
 
 

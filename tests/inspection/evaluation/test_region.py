@@ -67,8 +67,21 @@ def test_what_lies_around_an_edge_is_less_than_the_whole_section() -> None:
 
 
 def test_stations_lie_in_a_region_that_crosses_the_seam() -> None:
-    inside = is_inside(np.array([0.0, 4.9, 5.1, ROUND - 5.1, ROUND - 4.9, np.nan]), Region(ROUND - 5, 5.0))
+    inside = is_inside(np.array([0.0, 4.9, 5.1, ROUND - 5.1, ROUND - 4.9, np.nan]), Region(ROUND - 5, 5.0), CIRCLE)
     assert inside.tolist() == [True, True, False, False, True, False]
+
+
+@pytest.mark.parametrize("border", [0.0, 17.3, ROUND / 3, ROUND])
+@pytest.mark.parametrize("off", [0.0, -4e-12, 4e-12])
+def test_what_lies_on_the_border_of_two_regions_is_in_both_wherever_the_seam_is(border: float, off: float) -> None:
+    """Round-off tells the station of a corner a little otherwise than that of the border, and 0 is the length on a closed profile."""
+    at = np.array([border + off, border + off - ROUND, border + off + ROUND])
+    for before, behind in ((border, border), (border % ROUND, border % ROUND)):
+        assert is_inside(at, Region((border - 9) % ROUND, before), CIRCLE).all()
+        assert is_inside(at, Region(behind, (border + 11) % ROUND), CIRCLE).all()
+    beside = np.array([border - 1e-6, border + 1e-6])
+    assert is_inside(beside, Region((border - 9) % ROUND, border), CIRCLE).tolist() == [True, False]
+    assert is_inside(beside, Region(border, (border + 11) % ROUND), CIRCLE).tolist() == [False, True]
 
 
 def scan_without(low: float, high: float) -> Array:
