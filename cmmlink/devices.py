@@ -141,6 +141,10 @@ def _link(device: SerialDevice | ModbusDevice) -> ScanSource:
     return ModbusScanner(device.address, registers, settings, device_id=device.device_id, timeout_s=device.timeout_s)
 
 
+Parity = Literal["N", "E", "O"]
+PARITIES: tuple[Parity, ...] = ("N", "E", "O")
+
+
 @dataclass(frozen=True, slots=True)
 class ModbusPlace:
     """Where a Modbus device is asked for its registers: host:port, or the port of an RTU line with its speed and parity."""
@@ -148,7 +152,7 @@ class ModbusPlace:
     address: str
     device_id: int = 1
     baud_rate: int = 19_200
-    parity: Literal["N", "E", "O"] = "E"
+    parity: Parity = "E"
 
 
 def source_of_survey(place: ModbusPlace, survey: RegisterSurvey, pause_s: float) -> ScanSource:

@@ -3,6 +3,7 @@
 The map is one of the pattern `latest`: the device holds one point, and a new one takes its place.
 """
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -46,6 +47,19 @@ def place_from(text: str, field: str) -> FieldPlace:
     if not found or int(found[1]) > 65535:
         raise PlanError(f"{field}: '{text}': expected the first register and the type, like 41:float32")
     return FieldPlace(int(found[1]), found[2])
+
+
+def mm_per_unit_from(text: str) -> float:
+    """The factor to mm from an answer like 0.001; 1 where there is none. Raises PlanError."""
+    if not text.strip():
+        return 1.0
+    try:
+        factor = float(text)
+    except ValueError:
+        factor = math.nan
+    if not math.isfinite(factor) or factor == 0:
+        raise PlanError(f"mm per unit: '{text}': expected a number that is not 0, like 0.001")
+    return factor
 
 
 def map_text(answers: MapAnswers) -> str:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from drivers.codecs.dme_session import DME_UNSEEN, DmeJob
     from drivers.codecs.register_decoder import RegisterDecoder
     from drivers.codecs.register_map import RegisterMap, register_map
-    from drivers.codecs.register_survey import WORD_ORDERS, RegisterSurvey, Table, WordOrder, registers_of, stored_number
+    from drivers.codecs.register_survey import KINDS, TABLES, WORD_ORDERS, RegisterSurvey, Table, WordOrder, registers_of, stored_number
     from drivers.errors import CadError, DeviceError, DeviceRefused, LinkError, MeshError, PointFileError, ProtocolError
     from drivers.files.column_choice import AxisName
     from drivers.files.point_file import PointArraySource, PointFile, PointFileSource, convert_to_mm, points_in, points_of, read_points
@@ -55,7 +55,16 @@ else:
         "drivers.codecs.dme_session": ("DME_UNSEEN", "DmeJob"),
         "drivers.codecs.register_decoder": ("RegisterDecoder",),
         "drivers.codecs.register_map": ("RegisterMap", "register_map"),
-        "drivers.codecs.register_survey": ("WORD_ORDERS", "RegisterSurvey", "Table", "WordOrder", "registers_of", "stored_number"),
+        "drivers.codecs.register_survey": (
+            "KINDS",
+            "TABLES",
+            "WORD_ORDERS",
+            "RegisterSurvey",
+            "Table",
+            "WordOrder",
+            "registers_of",
+            "stored_number",
+        ),
         "drivers.errors": ("CadError", "DeviceError", "DeviceRefused", "LinkError", "MeshError", "PointFileError", "ProtocolError"),
         "drivers.files.column_choice": ("AxisName",),
         "drivers.files.point_file": (
@@ -103,6 +112,8 @@ else:
 __all__ = [
     "DME_UNSEEN",
     "HARMLESS_REASONS",
+    "KINDS",
+    "TABLES",
     "WORD_ORDERS",
     "Arrival",
     "AxisName",

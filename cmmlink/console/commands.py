@@ -5,11 +5,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields
 from typing import Any, NamedTuple, get_args, get_type_hints
 
-from cmmlink.console.protocol import Acknowledge, Choose, Command, Enter, ImportSurface, OfRun, Plain
+from cmmlink.console.protocol import Acknowledge, Choose, Command, Enter, ImportSurface, OfRun, Plain, json_of
 from cmmlink.console.refused import Refused
+from cmmlink.console.register_words import KeepMap, LookAtRegisters
 from cmmlink.console.station import Station
 
 _LONGEST_WORD = 40  # of a command's name in an answer
+_WORDS = {str: "text", int: "whole number", bool: "yes or no"}
 _RECORDS = {word: record for record in get_args(Command) for word in get_args(get_type_hints(record)["do"])}
 
 
@@ -63,6 +65,10 @@ def action_of(command: Command, station: Station) -> Callable[[], str] | None:
             return lambda: station.enter(serial_number, operator, address)
         case Acknowledge(alarm):
             return lambda: station.acknowledge(alarm)
+        case LookAtRegisters():
+            return lambda: station.look_at_registers(command)
+        case KeepMap():
+            return lambda: json_of(station.keep_map(command))
         case ImportSurface(plan):
             return lambda: station.import_ct(plan)
         case OfRun(run, "replay"):
@@ -77,4 +83,4 @@ def _checked_value(document: Mapping[str, Any], key: str, hint: Any) -> Any:
     allowed = get_args(hint) or (hint,)
     if type(value) in allowed:
         return value
-    raise Refused(f"the command needs a {'text' if str in allowed else 'whole number'} {key!r}")
+    raise Refused(f"the command needs a {_WORDS[allowed[0]]} {key!r}")

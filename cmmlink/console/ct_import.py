@@ -8,9 +8,11 @@ from pathlib import Path
 from cmmlink.console.protocol import SectionRow, SurfaceState
 from cmmlink.console.refused import without_folders
 from cmmlink.endings import Ended
+from cmmlink.errors import StoreError
 from cmmlink.events import RunStarted
 from cmmlink.run_view import RunContext
 from cmmlink.words import NOT_MEASURED, Headline, headline_of
+from drivers import DeviceError
 from inspection import Verdict
 
 _MOST_SHOWN = 1000
@@ -49,6 +51,22 @@ class CtImport:
     def state(self) -> SurfaceState:
         """How far it is, and the sections judged so far. Waits for nobody."""
         return self._state
+
+    def carry_out(self, inspect: InspectSurface, file: Path, stop: threading.Event, raise_alarm: Callable[[str, str], None]) -> None:
+        """Inspect a surface to its end, whatever that is.
+
+        raise_alarm : called with what failed and its details, where it is no fault of plan, surface or nominal
+        """
+        try:
+            self.end(*inspect(file, stop, self.expect, self.add))
+        except (DeviceError, ValueError, OSError) as error:  # plan, surface or nominal cannot be used
+            self.end(str(error).replace(str(file), file.name), failed=True)
+        except StoreError as error:
+            self.end(f"Record not kept: {error}", failed=True)
+            raise_alarm("Record not kept", str(error))
+        except Exception as error:
+            self.end(f"defect in the program ({type(error).__name__}): {error}", failed=True)
+            raise_alarm("Defect in the program", repr(error))
 
     def begin(self, plan: str) -> None:
         """Begin with another surface, which is read first."""

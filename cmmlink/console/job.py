@@ -13,7 +13,7 @@ from cmmlink.run import FinishedRun
 from cmmlink.run_view import RunView
 from drivers import ScanSource
 
-JobKind = Literal["run", "replay", "device test", "surface"]
+JobKind = Literal["run", "replay", "device test", "surface", "registers"]
 
 
 class Job:

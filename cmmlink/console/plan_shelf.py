@@ -8,6 +8,8 @@ from cmmlink.console.choice import Choice, check_choice
 from cmmlink.console.plan_form import PlanForm, save_form, understand_nominal
 from cmmlink.console.protocol import PlanSaved, Understood
 from cmmlink.console.refused import Refused, answer_errors
+from cmmlink.console.register_look import keep_map
+from cmmlink.console.register_words import KeepMap, MapSaved
 from cmmlink.console.station_setup import StationSetup
 
 DEMO = "demonstration"  # no plan of a folder has this name, for it does not end in .yaml
@@ -76,6 +78,10 @@ class PlanShelf:
     def save(self, answers: Mapping[str, str], content: bytes) -> PlanSaved:
         """Save a new plan and the nominal that a page hands in; or say what is wrong, and save nothing. Raises Refused."""
         return save_form(PlanForm.of(answers), content, self._folder(), overwrite=answers.get("replace") == "yes")
+
+    def keep_map(self, asked: KeepMap) -> MapSaved:
+        """Save a register map beside the plans, or say what is wrong. Raises Refused."""
+        return keep_map(asked, self._folder())
 
     def _folder(self) -> Path:
         if self._setup.folder is None:

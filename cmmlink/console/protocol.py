@@ -13,6 +13,7 @@ from dataclasses import dataclass, fields
 from typing import Any, Literal
 
 from cmmlink.characteristic_rows import CharacteristicRow
+from cmmlink.console.register_words import KeepMap, LookAtRegisters, MapSaved, RegisterTable
 from cmmlink.run_state import RunState
 from cmmlink.words import VERDICT_NAMES, VERDICT_WORDS, Shape, VerdictName
 
@@ -367,11 +368,24 @@ class Plain:
     do: Literal["start", "end", "abort", "test", "demo", "take control", "live", "devices", "another page"]
 
 
-Message = Admitted | Hello | Alive | Answer | Control | StationState | AlarmList | ShownRun | CharacteristicList | History | SurfaceState
-Command = Choose | Enter | Acknowledge | OfRun | OpenSection | ImportSurface | Plain
+Message = (
+    Admitted
+    | Hello
+    | Alive
+    | Answer
+    | Control
+    | StationState
+    | AlarmList
+    | ShownRun
+    | CharacteristicList
+    | History
+    | SurfaceState
+    | RegisterTable
+)
+Command = Choose | Enter | Acknowledge | OfRun | OpenSection | ImportSurface | LookAtRegisters | KeepMap | Plain
 
 
-def json_of(message: Message | Understood | PlanSaved) -> str:
+def json_of(message: Message | Understood | PlanSaved | MapSaved) -> str:
     """The message as it is sent."""
     return json.dumps(message, default=_values_by_name, separators=(",", ":"))
 

@@ -345,6 +345,7 @@ class ConsoleServer:
         yield CharacteristicList(most_shown(shown.rows), max(len(shown.rows) - MOST_ROWS, 0), shown.uncertainty, is_final)
         yield station.history
         yield station.ct.state
+        yield station.registers.state
 
 
 def _for_page(run: RunState) -> RunState:

@@ -19,6 +19,8 @@ from cmmlink.console.job import Job, JobKind
 from cmmlink.console.plan_shelf import DEMO, Listed, PlanShelf
 from cmmlink.console.protocol import DeviceTest, History, PlanSaved, StationState, Understood
 from cmmlink.console.refused import Refused, answer_errors
+from cmmlink.console.register_look import RegisterLook
+from cmmlink.console.register_words import KeepMap, LookAtRegisters, MapSaved
 from cmmlink.console.run_job import measure, raise_alarms, sink_of
 from cmmlink.console.station_setup import Records, StationSetup
 from cmmlink.devices import words_of
@@ -26,9 +28,9 @@ from cmmlink.errors import StoreError
 from cmmlink.events import RunStarted
 from cmmlink.plan import Plan
 from cmmlink.run_view import RunContext, RunView
-from drivers import DeviceError
 
 _MOST_HISTORY = 500
+_LOOK_ENDS_S = 3.0
 
 
 class Station:
@@ -43,6 +45,7 @@ class Station:
         self._setup = setup
         self.alarms = Alarms(setup.now)
         self.ct = CtImport(setup.clock)
+        self.registers = RegisterLook(setup.clock)
         self._lock = threading.RLock()
         self._entry = Entry()
         self._job: Job | None = None
@@ -166,6 +169,22 @@ class Station:
             self._set_entry(replace(self._entry, test=TESTING))
             job.start(lambda: self._test(job, plan))
         return "testing the device"
+
+    def look_at_registers(self, asked: LookAtRegisters) -> str:
+        """Read registers of a Modbus device over and over, until it is aborted."""
+        with self._new_job("registers", "registers can be looked at") as job:
+            look = self.registers.begin(asked)
+            job.start(lambda: look(job))
+        return f"reading the registers of {asked.address}"
+
+    def keep_map(self, asked: KeepMap) -> MapSaved:
+        """Save a register map beside the plans, or say what is wrong; a look at registers that goes on ends with it."""
+        job = self._job
+        if job is not None and job.kind == "registers" and not job.over:
+            job.abort()
+            job.wait(_LOOK_ENDS_S)
+        self._refuse_while_running("a map can be saved")
+        return self._shelf.keep_map(asked)
 
     def import_ct(self, name: str) -> str:
         """Inspect the sections of a CT surface as its plan says."""
@@ -297,23 +316,15 @@ class Station:
             self._set_entry(replace(self._entry, test=test))
 
     def _inspect(self, job: Job, inspect: InspectSurface, file: Path) -> None:
-        try:
-            self.ct.end(*inspect(file, job.stop, self.ct.expect, self.ct.add))
-        except (DeviceError, ValueError, OSError) as error:  # plan, surface or nominal cannot be used
-            self.ct.end(str(error).replace(str(file), file.name), failed=True)
-        except StoreError as error:
-            self.ct.end(f"Record not kept: {error}", failed=True)
-            self.alarms.raise_alarm("fault", "Record not kept", str(error))
-        except Exception as error:
-            self.ct.end(f"defect in the program ({type(error).__name__}): {error}", failed=True)
-            self.alarms.raise_alarm("fault", "Defect in the program", repr(error))
+        self.ct.carry_out(inspect, file, job.stop, lambda what, detail: self.alarms.raise_alarm("fault", what, detail))
         self._read_history()
 
     # What is chosen, entered and shown.
 
     def _refuse_while_running(self, what: str) -> None:
         if self.running:
-            raise Refused(f"a run is on; {what} when it is over")
+            busy = "registers are being read" if self._job is not None and self._job.kind == "registers" else "a run is on"
+            raise Refused(f"{busy}; {what} when it is over")
 
     def _records(self) -> Records:
         if self._setup.records is None:

@@ -16,6 +16,8 @@ from drivers.source import Arrival, Heartbeat, ScanClosed
 Table = Literal["holding", "input"]
 WordOrder = Literal["high-first", "low-first"]
 
+KINDS = tuple(NUMPY_TYPES)  # of numbers in registers
+TABLES: tuple[Table, ...] = ("holding", "input")
 WORD_ORDERS: tuple[WordOrder, ...] = ("high-first", "low-first")
 FUNCTIONS: Mapping[Table, int] = {"holding": 3, "input": 4}
 _OTHER: Mapping[Table, Table] = {"holding": "input", "input": "holding"}

@@ -291,6 +291,24 @@ export interface SurfaceState {
   readonly type: "ct";
 }
 
+/** One register: what it holds in hexadecimal, and the number that begins there in every column; all empty where there is none. */
+export interface RegisterRow {
+  readonly at: number;
+  readonly hex: string;
+  readonly values: readonly string[];
+}
+
+/** The registers that are read, or were read last. `columns` are type and word order, the latter empty for 16 bits. */
+export interface RegisterTable {
+  readonly state: "none" | "reading" | "over" | "failed";
+  readonly message: string;
+  readonly address: string;
+  readonly table: string;
+  readonly columns: readonly (readonly [string, string])[];
+  readonly rows: readonly RegisterRow[];
+  readonly type: "registers";
+}
+
 /** Choose a plan and have it checked. */
 export interface Choose {
   readonly plan: string;
@@ -327,6 +345,33 @@ export interface OpenSection {
 export interface ImportSurface {
   readonly plan: string;
   readonly do: "import";
+}
+
+/** Read registers of a Modbus device over and over, until it is aborted. */
+export interface LookAtRegisters {
+  readonly address: string;
+  readonly table: string;
+  readonly first: number;
+  readonly count: number;
+  readonly device_id: number;
+  readonly baud_rate: number;
+  readonly parity: string;
+  readonly do: "look at registers";
+}
+
+/** Save a register map beside the plans. The answer is a `MapSaved` as JSON. x, y, z, sequence : register and type, like 41:float32; empty where the device has none scale : mm per unit of coordinates that are whole numbers replace : a map of this name may be written over */
+export interface KeepMap {
+  readonly name: string;
+  readonly device: string;
+  readonly table: string;
+  readonly word_order: string;
+  readonly x: string;
+  readonly y: string;
+  readonly z: string;
+  readonly sequence: string;
+  readonly scale: string;
+  readonly replace: boolean;
+  readonly do: "keep map";
 }
 
 /** A command that needs no more words. The answer to `another page` is the code of a one-time address. */
@@ -373,6 +418,13 @@ export interface PlanSaved {
   readonly mistakes: readonly FormMistake[];
 }
 
-export type Message = Admitted | Hello | Alive | Answer | Control | StationState | AlarmList | ShownRun | CharacteristicList | History | SurfaceState;
+/** What came of a map: its name as a plan beside it calls it, else why there is none. `taken`: a map of this name is there. */
+export interface MapSaved {
+  readonly name: string;
+  readonly problem: string;
+  readonly taken: boolean;
+}
 
-export type Command = Choose | Enter | Acknowledge | OfRun | OpenSection | ImportSurface | Plain;
+export type Message = Admitted | Hello | Alive | Answer | Control | StationState | AlarmList | ShownRun | CharacteristicList | History | SurfaceState | RegisterTable;
+
+export type Command = Choose | Enter | Acknowledge | OfRun | OpenSection | ImportSurface | LookAtRegisters | KeepMap | Plain;
