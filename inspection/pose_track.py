@@ -1,7 +1,6 @@
 """The provisional pose of a scan that still runs: sought on the points so far, then refined with every further block."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +20,6 @@ from inspection.verdict import NOT_JUDGED
 Array = NDArray[np.float64]
 
 _CLEARLY_BETTER = 0.5  # of the next best pose's rms
-_CORRELATION = 0.125  # share of the length over which form error is taken as one independent value: two to four waves around
 _PRIOR_SHARE = 1 / 6  # of the zone's width: standard deviation of the form error expected where nothing is measured yet
 _PLACES = 16  # every so many samples of the nominal are asked how far a deviation there may still move
 
@@ -33,15 +31,15 @@ class PoseTrack:
         nominal = terms.nominal
         self.registration = registration
         self._terms, self._start, self._centre = terms, self.pose, registration.centre_mm
-        self._expected_form_mm = _PRIOR_SHARE * (terms.zone.upper_mm - terms.zone.lower_mm)
         self._places, self._normals = nominal.points_mm[::_PLACES].copy(), nominal.outward * nominal.normal[::_PLACES]
         self._stations = nominal.station_mm[::_PLACES].copy()
         reach = float(np.hypot(*(self._places - self._centre).T).max())
-        self._sums = GrowingSums(self._centre, reach, nominal.length_mm)
+        expected_form_mm = _PRIOR_SHARE * (terms.zone.upper_mm - terms.zone.lower_mm)
+        self._sums = GrowingSums(self._centre, reach, nominal.length_mm, expected_form_mm, terms.target_mm)
         for block in points.blocks():  # copied, because arrays that cannot be written to are another type to the compiler
             d = deviations(self.pose.apply(block), nominal, tip_radius_mm=terms.tip_radius_mm)
             part = np.where(d.beyond_end, np.int8(NOT_JUDGED), np.int8(0))
-            self._sums.add(d.foot_mm.copy(), d.normal.copy(), d.deviation_mm - terms.target_mm, d.station_mm.copy(), part, follows=True)
+            self._sums.add(d.foot_mm.copy(), d.normal.copy(), d.deviation_mm.copy(), d.station_mm.copy(), part, follows=True)
         self._ends, self._tangents = _open_ends(nominal)
         self._reserve_mm: float | None = None  # asked for more often than it changes, which is once a block
 
@@ -53,12 +51,9 @@ class PoseTrack:
     def refine(self, rows: ScanRows, first: int, stop: int) -> None:
         """Take in a block of rows judged at this track's pose."""
         block, places = slice(first, stop), slice(first - rows.base, stop - rows.base)
-        off = rows.deviation[block] - self._terms.target_mm
-        self._sums.add(rows.foot[places], rows.normal[places], off, rows.station[block], rows.verdicts[block])
-        self._sums.move()
-        x, y, angle = self._sums.motion.tolist()
-        pose = turned_about(self._start, self._centre, angle, x, y)
-        self.registration = replace(self.registration, nominal_from_section=pose)
+        self._sums.add(rows.foot[places], rows.normal[places], rows.deviation[block], rows.station[block], rows.verdicts[block])
+        x, y, angle = self._sums.move()
+        self.registration = self.registration.at(turned_about(self._start, self._centre, angle, x, y))
         self._reserve_mm = None
 
     def refit(self, points: Cloud) -> "PoseTrack":
@@ -72,37 +67,23 @@ class PoseTrack:
     def reserve_mm(self) -> float:
         """How far the last pose is expected to move a deviation that was measured: what provisional verdicts leave room for.
 
-        One standard deviation by the model of `_scatter`, the largest over what was measured so far. This is an expectation, no
+        One standard deviation by the model of `GrowingSums`, the largest over what was measured so far. This is an expectation, no
         bound: form that is still to come can move the pose farther than all form so far. For a minimum zone it is infinite, since
         one point still to come moves that as far as the point stands out.
         """
         if self._terms.fit == "minimum-zone":
             return math.inf
         if self._reserve_mm is None:
-            self._reserve_mm = self._sums.spread_mm(self._places, self._normals, self._scatter(), self._stations)
+            self._reserve_mm = self._sums.spread_mm(self._places, self._normals, self._stations)
         return self._reserve_mm
 
     def is_clear(self, largest_mm: float) -> bool:
         """Whether the pose is expected to move no deviation anywhere on the profile by more than that (95 %)."""
-        return 2.0 * self._sums.spread_mm(self._places, self._normals, self._scatter()) < largest_mm
+        return 2.0 * self._sums.spread_mm(self._places, self._normals) < largest_mm
 
     def slide_mm(self) -> float:
         """How far the pose is expected to slide along an open profile at its ends (95 %), 0 for a closed one; no bound either."""
-        return 2.0 * self._sums.spread_mm(self._ends, self._tangents, self._scatter()) if len(self._ends) else 0.0
-
-    def _scatter(self) -> float:
-        """The variance (mm^2) of independent errors that would leave the pose as uncertain as noise and form do.
-
-        What changes from point to point is noise, independent at every point. The rest is form error, one value for every eighth
-        of the length: a scan of a few such patches is trusted no more than its patches, less those that the pose itself used up.
-        Where nothing is measured yet, form error of a sixth of the zone's width is expected.
-        """
-        sums = self._sums
-        covered, noise = sums.covered, sums.noise
-        patches = max(covered / _CORRELATION, 1.0)
-        form = max(sums.mean_square - noise, 0.0) * patches / max(patches - 3.0, 0.5)
-        form = max(form, self._expected_form_mm**2 * (1 - covered))
-        return noise + form * sums.count / patches
+        return 2.0 * self._sums.spread_mm(self._ends, self._tangents) if len(self._ends) else 0.0
 
 
 def seek_pose(points: Cloud, terms: Terms) -> PoseTrack | None:

@@ -41,6 +41,10 @@ class Registration:
         for array in (self.covariance, self.centre_mm, self.outliers):
             array.setflags(write=False)
 
+    def at(self, pose: RigidTransform) -> "Registration":
+        """The same at another pose."""
+        return Registration(pose, self.rms_mm, self.iterations, self.converged, self.covariance, self.centre_mm, self.rivals, self.outliers)
+
     def __repr__(self) -> str:
         pose, settled = self.nominal_from_section, "converged" if self.converged else "not converged"
         moved = "({:.4f}, {:.4f})".format(*pose.translation_mm)

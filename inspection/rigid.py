@@ -80,7 +80,7 @@ def _after(rotation_rad: float, x_mm: float, y_mm: float, first: RigidTransform)
     """The motion that makes `first`, then a rotation about the origin, then a shift."""
     angle = rotation_rad + first.rotation_rad
     x, y = _turn(first.translation_mm, rotation_rad)
-    return RigidTransform(float(np.arctan2(np.sin(angle), np.cos(angle))), np.array([x + x_mm, y + y_mm]))
+    return RigidTransform(float(np.arctan2(math.sin(angle), math.cos(angle))), np.array([x + x_mm, y + y_mm]))
 
 
 def rotation_about(centre_mm: Array, angle_rad: float, shift_mm: Array) -> RigidTransform:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from inspection.cloud import Cloud, row_blocks
 from inspection.judged_rows import JudgedRows
-from inspection.kernels import JUDGED_AS, NONE_TAKEN, TALLY, Columns, Judgement, Places, Room, Taken, judge_few_rows, judge_rows, take_in
+from inspection.kernels import JUDGED_AS, NONE_TAKEN, TALLY, Columns, FewRows, Judgement, Places, Room, Taken, judge_rows, take_in
 from inspection.rigid import RigidTransform
 from inspection.section import XY_PLANE, SectionPlane
 from inspection.signed_deviations import feet_on
@@ -66,6 +66,7 @@ class ScanRows:
         self._tally = np.zeros(TALLY, dtype=np.int64)
         self.settled_at: RigidTransform | None = None
         self.times_anew = 0
+        self._few: tuple[FewRows, Terms] | None = None  # where the arrays are in memory, until others take their place
         self._judged_to = 0  # rows that were judged once
         self._end = 0  # rows taken in, whether they count yet or not
 
@@ -85,7 +86,7 @@ class ScanRows:
             first = self._make_room(len(points_mm), plane)
             self._judged_to = self._end
             taken = (points_mm, plane.packed, off_section_max_mm)
-            self._judge_few(first, self._end, self._places, self.base, pose, terms, reserve_mm, taken)
+            self._judge_few(first, self._end, pose, terms, reserve_mm, taken)
         self.count = self._end
 
     def _make_room(self, more: int, plane: SectionPlane) -> int:
@@ -112,6 +113,7 @@ class ScanRows:
     def settle(self, pose: RigidTransform, terms: Terms, reserve_mm: float = 0.0, stop: int | None = None) -> None:
         """Fill in all rows, or those before `stop`, as they are with the points at this pose. No places are kept."""
         if not len(self.station):
+            self._few = None
             self.station, self.deviation = (self.room((len(self.verdicts),), np.float64) for _ in range(2))
         self.settled_at = pose if stop is None else None
         self.times_anew += 1
@@ -204,41 +206,34 @@ class ScanRows:
         return self.actual, self.foot, self.normal
 
     def _judge(self, first: int, stop: int, places: Places, base: int, pose: RigidTransform, terms: Terms, reserve_mm: float = 0.0) -> None:
-        if stop - first <= BLOCK and terms.method != "inversion":
-            self._judge_few(first, stop, places, base, pose, terms, reserve_mm)
+        if stop - first <= BLOCK and base == self.base and places[0] is self.actual and terms.method != "inversion":
+            self._judge_few(first, stop, pose, terms, reserve_mm)
         else:
             project = partial(feet_on, nominal=terms.nominal, method=terms.method)
             rows = (self.points, self._columns, places, base, first, stop, _numbers_of(pose))
             judge_rows(*rows, project, _with_reserve(terms.judgement, reserve_mm))
 
-    def _judge_few(
-        self,
-        first: int,
-        stop: int,
-        places: Places,
-        base: int,
-        pose: RigidTransform,
-        terms: Terms,
-        reserve_mm: float,
-        taken: Taken = NONE_TAKEN,
-    ) -> None:
-        rows = (self.points, self._columns, places, base, first, stop, _numbers_of(pose))
-        nominal, method = terms.nominal, terms.method
-        judgement = _with_reserve(terms.judgement, reserve_mm)
-        judge_few_rows(*rows, nominal.grid, nominal.table_for(method), method, judgement, taken)
+    def _judge_few(self, first: int, stop: int, pose: RigidTransform, terms: Terms, reserve_mm: float, taken: Taken = NONE_TAKEN) -> None:
+        if self._few is None or self._few[1] is not terms:
+            few = FewRows(self.points, self._columns, terms.nominal.grid, terms.nominal.table_for(terms.method), terms.method)
+            few.keep_places(self._places)
+            self._few = few, terms
+        self._few[0].judge(self.base, first, stop, _numbers_of(pose), _with_reserve(terms.judgement, reserve_mm), taken)
 
     def _keep_places(self, base: int, held: int) -> None:
         """Hold the places of the rows from `base` on: of those up to `held` as they are known, of the others as not judged yet."""
         if base == held > self.base and self._end - base <= len(self.actual) == BLOCK:  # what is taken in is entered as not judged
             self.base = base
             return
-        known = [array[base - self.base : held - self.base] for array in self._places] if base >= self.base else []
         if base == self.base and self._end - base <= len(self.actual):
             return
+        known = [array[base - self.base : held - self.base] for array in self._places] if base >= self.base else []
         self.actual, self.foot, self.normal = _places(max(self._end - base, BLOCK))
         for array, before in zip(self._places, known, strict=False):
             array[: len(before)] = before
         self.base = base
+        if self._few is not None:
+            self._few[0].keep_places(self._places)
 
     def _reserve(self, capacity: int) -> None:
         """Make room for so many rows, in larger columns where there is none."""
@@ -251,6 +246,7 @@ class ScanRows:
 
     def _resize(self, capacity: int) -> None:
         """Hold the columns in arrays of so many rows, one after the other."""
+        self._few = None
         for name in ("points", "height", "station", "deviation", "verdicts", "rejection"):
             old = getattr(self, name)
             if 0 < len(old) != capacity:

@@ -15,13 +15,14 @@ if TYPE_CHECKING:
     from inspection.kernels.compile_notice import while_compiling
     from inspection.kernels.compiling import compiled_code_folder
     from inspection.kernels.feet import Feet, Marks, Room
+    from inspection.kernels.few_rows import NONE_TAKEN, FewRows, Taken
     from inspection.kernels.growing import GrowingSums
     from inspection.kernels.layout import AT_ONCE, SAMPLE_METHODS
     from inspection.kernels.on_samples import SampleTables
     from inspection.kernels.outliers import OutlierLimit
     from inspection.kernels.pose import NONE_LEFT_OUT, PoseEstimate, PoseFit
     from inspection.kernels.projection import Turned, project, project_on_samples, project_outward
-    from inspection.kernels.rows import JUDGED_AS, NONE_TAKEN, TALLY, Columns, Judgement, Places, Taken, judge_few_rows, judge_rows, take_in
+    from inspection.kernels.rows import JUDGED_AS, TALLY, Columns, Judgement, Places, judge_rows, take_in
     from inspection.kernels.side_by_side import fit_compiled_beside, is_fit_compiled
     from inspection.kernels.splines import spline_derivatives
     from inspection.kernels.thinning import strides
@@ -34,24 +35,14 @@ else:
         "inspection.kernels.compile_notice": ("while_compiling",),
         "inspection.kernels.compiling": ("compiled_code_folder",),
         "inspection.kernels.feet": ("Feet", "Marks", "Room"),
+        "inspection.kernels.few_rows": ("NONE_TAKEN", "FewRows", "Taken"),
         "inspection.kernels.growing": ("GrowingSums",),
         "inspection.kernels.layout": ("AT_ONCE", "SAMPLE_METHODS"),
         "inspection.kernels.on_samples": ("SampleTables",),
         "inspection.kernels.outliers": ("OutlierLimit",),
         "inspection.kernels.pose": ("NONE_LEFT_OUT", "PoseEstimate", "PoseFit"),
         "inspection.kernels.projection": ("Turned", "project", "project_on_samples", "project_outward"),
-        "inspection.kernels.rows": (
-            "JUDGED_AS",
-            "NONE_TAKEN",
-            "TALLY",
-            "Columns",
-            "Judgement",
-            "Places",
-            "Taken",
-            "judge_few_rows",
-            "judge_rows",
-            "take_in",
-        ),
+        "inspection.kernels.rows": ("JUDGED_AS", "TALLY", "Columns", "Judgement", "Places", "judge_rows", "take_in"),
         "inspection.kernels.side_by_side": ("fit_compiled_beside", "is_fit_compiled"),
         "inspection.kernels.splines": ("spline_derivatives",),
         "inspection.kernels.thinning": ("strides",),
@@ -71,6 +62,7 @@ __all__ = [
     "Columns",
     "CurveTables",
     "Feet",
+    "FewRows",
     "GrowingSums",
     "GrownTree",
     "Judgement",
@@ -87,7 +79,6 @@ __all__ = [
     "compiled_code_folder",
     "fit_compiled_beside",
     "is_fit_compiled",
-    "judge_few_rows",
     "judge_rows",
     "project",
     "project_on_samples",

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inspection.kernels.blocks import CurveTables
 from inspection.kernels.compiling import brief_kernel, kernel
 from inspection.kernels.feet import Feet
 from inspection.kernels.layout import (
@@ -21,23 +20,16 @@ from inspection.kernels.layout import (
     OPEN_END,
     PLANE_NORMAL,
     PLANE_ORIGIN,
-    PLANE_WIDTH,
     PLANE_X_AXIS,
     PLANE_Y_AXIS,
     UNCERTAIN,
 )
-from inspection.kernels.on_samples import SampleTables, project_by, projection_of
-from inspection.kernels.pose_sums import new_feet
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int8]
 Columns = tuple[Array, Array, Codes, Codes, NDArray[np.int64], Array]  # plain tuples: a named one takes numba a microsecond a call
 Places = tuple[Array, Array, Array]
 Judgement = tuple[float, float, float, float, float]
-Taken = tuple[Array, Array, float]
-
-NONE_TAKEN: Taken = (np.empty((0, 2)), np.zeros(PLANE_WIDTH), np.inf)
-NONE_TAKEN[1].setflags(write=False)  # as the plane of a section is
 
 JUDGED_AS = 8  # place in the tally of the verdict 0; before it come the rejections
 TALLY = JUDGED_AS + NONCONFORM + 1
@@ -64,45 +56,7 @@ def judge_rows(
     judgement : 1.0 where left of the curve is out of material, else -1.0; tip radius, lower and upper limit, uncertainty in mm
     """
     feet = project(place_rows(section_mm, columns[3], first, stop, pose))
-    _judge(
-        feet.foot_mm, feet.distance_mm, feet.gradient, feet.curvature, feet.station_mm, feet.vertex, judgement, first, base, columns, places
-    )
-
-
-def judge_few_rows(
-    section_mm: Array,
-    columns: Columns,
-    places: Places,
-    base: int,
-    first: int,
-    stop: int,
-    pose: tuple[float, float, float, float],
-    grid: CurveTables,
-    table: SampleTables | None,
-    method: str,
-    judgement: Judgement,
-    taken: Taken = NONE_TAKEN,
-) -> None:
-    """The same as `judge_rows`, by one compiled call in this thread: for a batch of a live scan more calls take longer than its points.
-
-    grid, table, method : the curve, and the samples where the method looks at those only
-    taken               : what is to be entered as these rows before, see `take_in`: points, plane, and how far off they may be
-    """
-    curve = (projection_of(table, method), grid.reals, grid.integers)
-    _judge_few(section_mm, columns, places, base, first, stop, pose, curve, judgement, taken)
-
-
-@brief_kernel
-def _judge_few(
-    section: Any, columns: Any, places: Any, base: int, first: int, stop: int, pose: Any, curve: Any, judgement: Any, taken: Any
-) -> None:
-    points, plane, off_section_max = taken
-    _take_in(points, plane, off_section_max, section, columns, places, base, first)
-    projection, reals, integers = curve
-    moved, feet = np.empty((stop - first, 2)), new_feet(stop - first)
-    _place(section, columns[3], first, pose, moved)
-    project_by(projection, moved.reshape(-1), reals, integers, feet)
-    _judge(
+    enter_feet(
         feet.foot_mm, feet.distance_mm, feet.gradient, feet.curvature, feet.station_mm, feet.vertex, judgement, first, base, columns, places
     )
 
@@ -115,11 +69,12 @@ def take_in(
     plane : (12,) origin, x axis, y axis and normal of the section in machine coordinates
     columns, places, base : see judge_rows
     """
-    _take_in(points_mm, plane, off_section_max_mm, section_mm, columns, places, base, at)
+    enter_points(points_mm, plane, off_section_max_mm, section_mm, columns, places, base, at)
 
 
 @brief_kernel
-def _take_in(points: Any, plane: Any, off_section_max: float, section: Any, columns: Any, places: Any, base: int, at: int) -> None:
+def enter_points(points: Any, plane: Any, off_section_max: float, section: Any, columns: Any, places: Any, base: int, at: int) -> None:
+    """Enter points in another kernel, see `take_in`."""
     flat = points.shape[1] == 2
     stations, deviations, verdicts, rejection, tally, heights = columns
     for i in range(len(points)):
@@ -147,12 +102,13 @@ def _take_in(points: Any, plane: Any, off_section_max: float, section: Any, colu
 def place_rows(section_mm: Array, rejection: Codes, first: int, stop: int, pose: tuple[float, float, float, float]) -> Array:
     """Rows first .. stop - 1 in nominal coordinates; NaN where a row cannot be used."""
     moved = np.empty((stop - first, 2))
-    _place(section_mm, rejection, first, pose, moved)
+    place_some(section_mm, rejection, first, pose, moved)
     return moved
 
 
 @kernel
-def _place(section: Any, rejection: Any, first: int, pose: Any, moved: Any) -> None:
+def place_some(section: Any, rejection: Any, first: int, pose: Any, moved: Any) -> None:
+    """Enter as many rows as `moved` has in nominal coordinates, see `place_rows`."""
     c, s, tx, ty = pose
     for i in range(len(moved)):
         row = first + i
@@ -165,7 +121,7 @@ def _place(section: Any, rejection: Any, first: int, pose: Any, moved: Any) -> N
 
 
 @kernel
-def _judge(
+def enter_feet(
     foot: Any,
     distance: Any,
     gradient: Any,
@@ -178,6 +134,7 @@ def _judge(
     columns: Any,
     places: Any,
 ) -> None:
+    """Enter what rows are found to be by the feet of their points, see `judge_rows`."""
     outward, tip, lower, upper, uncertainty = judgement
     stations, deviations, verdicts, rejection, tally, _ = columns
     actual, feet, normals = places

@@ -16,7 +16,7 @@ from inspection import (
     Verdict,
     deviations,
 )
-from inspection.kernels import rows
+from inspection.kernels import few_rows, rows
 from tests.inspection import profiles
 from tests.inspection.profiles import Array, curve_of, nominal_of
 from tests.inspection.scans import ZONE, inspect_in_batches, surface
@@ -164,7 +164,7 @@ def test_live_deviations_use_the_chosen_method() -> None:
 
 def compiled() -> list[int]:
     """For how many kinds of arguments the loops that every batch goes through are compiled."""
-    return [len(attrgetter("signatures")(loop)) for loop in (rows._judge_few, rows._take_in)]
+    return [len(attrgetter("signatures")(loop)) for loop in (few_rows._judge_few, rows.enter_points)]
 
 
 def test_arrays_of_any_make_are_taken_in_by_the_loops_that_are_compiled_already() -> None:

@@ -1,11 +1,13 @@
 """Rows of a scan: what is taken in, what is kept when they grow, and that judging touches nothing else."""
 
+from typing import Any
 from unittest.mock import patch
 
 import numpy as np
 import pytest
 
 from inspection import NOT_JUDGED, Rejection, RigidTransform, SectionPlane, ToleranceZone, Verdict
+from inspection.kernels import FewRows
 from inspection.methods import Method
 from inspection.scan_rows import ScanRows
 from inspection.terms import Terms
@@ -151,3 +153,18 @@ def test_points_taken_in_and_judged_at_once_are_as_those_judged_afterwards(metho
     assert once.rejected_by_reason == twice.rejected_by_reason
     assert once.judged == twice.judged > 180
     assert (once.count, once.times_anew) == (twice.count, twice.times_anew) == (300, 0)
+
+
+def test_the_places_of_arrays_are_packed_when_the_arrays_change_and_not_for_every_batch() -> None:
+    rows, points, packed = ScanRows(100), scan_of(1000), list[int]()
+
+    def counted(section_mm: Array, *others: Any) -> FewRows:
+        packed.append(len(section_mm))
+        return FewRows(section_mm, *others)
+
+    asked = terms()
+    with patch("inspection.scan_rows.FewRows", counted):
+        for first in range(0, 1000, 8):
+            rows.take_in_judged(points[first : first + 8], PLANE, np.inf, RigidTransform.identity(), asked, 0.0)
+    assert packed == [100, 150, 225, 337, 505, 757, 1135]
+    assert rows.judged == 1000

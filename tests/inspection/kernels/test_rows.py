@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import ArrayLike, NDArray
 
 from inspection import Method, Rejection, SectionPlane, ToleranceZone
-from inspection.kernels import JUDGED_AS, TALLY, Columns, Feet, Judgement, judge_few_rows, judge_rows, take_in
+from inspection.kernels import JUDGED_AS, TALLY, Columns, Feet, FewRows, Judgement, judge_rows, take_in
 from inspection.signed_deviations import feet_on
 from inspection.verdict import NOT_JUDGED
 from tests.inspection.profiles import Array, nominal_of
@@ -109,9 +109,13 @@ def test_few_rows_are_judged_as_many_are(method: Method) -> None:
     pose, limits = (np.cos(0.01), np.sin(0.01), 0.1, -0.2), (nominal.outward, 0.25, -0.5, 0.4, 0.01)
     together, in_threes = ((columns_of(rejection.copy()), (np.zeros((64, 2)), np.zeros((64, 2)), np.zeros((64, 2)))) for _ in range(2))
     judge_rows(section, *together, 0, 0, 64, pose, lambda moved: feet_on(moved, nominal, method), limits)
+    few = FewRows(section, in_threes[0], nominal.grid, nominal.table_for(method), method)
+    few.keep_places(in_threes[1])
     for first in range(0, 64, 3):
-        stop = min(first + 3, 64)
-        judge_few_rows(section, *in_threes, 0, first, stop, pose, nominal.grid, nominal.table_for(method), method, limits)
+        few.judge(0, first, min(first + 3, 64), pose, limits)
+    for first, stop in ((62, 65), (-1, 2), (5, 4)):
+        with pytest.raises(IndexError):
+            few.judge(0, first, stop, pose, limits)
     wanted: list[NDArray[Any]] = [*together[0], *together[1]]
     found: list[NDArray[Any]] = [*in_threes[0], *in_threes[1]]
     for one, other in zip(wanted, found, strict=True):
