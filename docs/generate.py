@@ -96,6 +96,8 @@ points:
     y: {at: 3, type: float32}
 ```
 
+`cmmlink registers`, or *New Modbus device* on [the page](console.md), shows what the registers hold, and writes such a map.
+
 If numbers of two registers come out absurd, add `word_order: low-first`. Coordinates that are not named are 0. Every scale is finite and
 not 0, and `true` and `false` are not numbers here.
 """

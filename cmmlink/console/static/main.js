@@ -12,6 +12,7 @@ import { ageWords, showBanners, showButtons, showLamps, showRun } from "./panels
 import { PartView } from "./part_view.js";
 import { Scan } from "./points.js";
 import { Profile } from "./profile.js";
+import { RegistersView } from "./registers.js";
 import { Strip } from "./strip.js";
 import { Timing } from "./timing.js";
 import { gettext, translate, translateElements } from "./words.js";
@@ -23,11 +24,11 @@ import { gettext, translate, translateElements } from "./words.js";
 
 translateElements(document.documentElement);
 
-const VIEWS = ["live", "part", "history", "ct"];
+const VIEWS = ["live", "part", "history", "ct", "registers"];
 const MOST_MAGNIFICATION = 5000;
 const SLIDER_STEPS = 1000;
 const SAID_MS = 8000; // so long the answer to a command stays
-const SILENT = ["enter", "devices"]; // commands whose success is not worth a word
+const SILENT = ["enter", "devices", "keep map"]; // commands whose success is not worth a word
 
 /** @type {Heard} */
 const heard = {
@@ -65,6 +66,8 @@ const characteristics = new Characteristics(showChosen);
 let told = { rows: [], more: 0, uncertainty: [], final: false, type: "characteristics" };
 const ctView = new CtView((plan) => ask({ do: "import", plan }), (section) => askToSee({ do: "section", section }));
 
+const registersView = new RegistersView(ask);
+
 // What the station says.
 
 /** @param {Message} message */
@@ -77,6 +80,7 @@ function onMessage(message) {
   else if (message.type === "alarms") [alarms, heard.hasFault] = [message.alarms, message.fault];
   else if (message.type === "history") history.show(message.runs);
   else if (message.type === "ct") ctView.show((heard.surface = message));
+  else if (message.type === "registers") registersView.show(message);
   else if (message.type === "alive") clock = { nowMs: message.now_ms, at: performance.now() };
   rewrite();
 }
@@ -185,6 +189,7 @@ function paintWords() {
   showAlarms(alarms, heard.run?.kind ?? "run");
   if (heard.station) {
     partView.show(heard.station);
+    byId("new-device").hidden = !heard.station.can_make_plans;
     ctView.showPlans(heard.station.ct_plans, heard.station.running);
   }
   showBanners(heard, (act) => ask({ do: act }));
