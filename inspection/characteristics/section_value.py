@@ -27,6 +27,8 @@ class SectionValue:
     window       : (name, number with its unit in the name) for everything that the method was told
     residual_mm  : largest distance of what was fitted from the section; None where nothing was fitted
     notes        : what the method had to assume, such as how the ends of a camber line were continued
+    other        : what the value would be if the smaller of two were the larger, as of a camber line that bulges to both sides; NaN
+                   where there is but one
     """
 
     name: str
@@ -38,6 +40,7 @@ class SectionValue:
     window: tuple[tuple[str, float], ...] = ()
     residual_mm: float | None = None
     notes: tuple[str, ...] = ()
+    other: float = float("nan")
 
     def __post_init__(self) -> None:
         if self.places_mm.shape != (len(self.place_names), 2):

@@ -19,7 +19,6 @@ from inspection.characteristics.characteristic import (
     SectionCharacteristic,
     SectionKind,
     consumption_of,
-    verdict_of,
 )
 from inspection.characteristics.chord import ChordAngleMethod, ChordMethod, chord, chord_angle
 from inspection.characteristics.edge_radius import EdgeRadiusMethod, edge_radius
@@ -36,6 +35,7 @@ from inspection.evaluation.basis import Basis, filter_deviations
 from inspection.evaluation.datum import UNSTATED, datum_of, fixed_place
 from inspection.evaluation.region import features_of, region_around
 from inspection.evaluation.value_uncertainty import LINEARISED, OF_POSE, uncertainty_of_placing, uncertainty_of_value
+from inspection.evaluation.value_verdict import judge_deviation
 from inspection.filters import ProfileFilter
 from inspection.first_use import OnFirstUse
 from inspection.freedoms import Freedoms
@@ -223,7 +223,7 @@ def judge_value(asked: SectionCharacteristic, basis: Basis, outlines: ActualOutl
     deviation = angle_within_half_a_turn(deviation) if nominal.unit == "deg" else deviation
     measured = _measured(asked, basis, value, actual)
     drawing = 0.0 if actual is None else _doubt_of_drawing(asked, basis, outlines, value)
-    points, why = _judge(asked, value, deviation, drawing, measured, basis, actual)
+    points, why = judge_deviation(asked, value, deviation, drawing, measured, basis, actual)
     conclusion = basis.conclude(points, why, measured, basis.result.judged)
     places = tuple((name, float(x), float(y)) for name, (x, y) in zip(value.place_names, value.places_mm.tolist(), strict=True))
     return replace(
@@ -278,8 +278,11 @@ def _doubt_of_drawing(asked: SectionCharacteristic, basis: Basis, outlines: Actu
         other, _ = _find(asked, basis, outlines, edges_as_wholes=True)
     except InspectionError:
         return math.inf
-    off = other.value - value.value
-    return _OF_DRAWING * abs(angle_within_half_a_turn(off) if value.unit == "deg" else off)
+    pairs = [(value.value, other.value), (value.other, other.other)]
+    if value.value * other.value < 0 and math.isfinite(value.other):  # of two sides that are nearly as large, either may be the larger
+        pairs = [(value.value, other.other), (value.other, other.value)]
+    off = [there - here for here, there in pairs if not math.isnan(here)]
+    return _OF_DRAWING * max(abs(angle_within_half_a_turn(one) if value.unit == "deg" else one) for one in off)
 
 
 def _words_of_drawing(doubt: float, unit: str) -> tuple[str, ...]:
@@ -345,40 +348,6 @@ def _measured(asked: SectionCharacteristic, basis: Basis, value: SectionValue, a
     regions = region_around(features_of(basis.nominal, asked.section), asked.edge, stations, _TIP_KNOTS * actual.knots_mm)
     found = [basis.measured(region) for region in regions]
     return Measured(min(one.coverage for one in found), max((one.gap for one in found), key=lambda gap: gap.length_mm))
-
-
-def _judge(
-    asked: SectionCharacteristic,
-    value: SectionValue,
-    deviation: float,
-    drawing: float,
-    measured: Measured,
-    basis: Basis,
-    actual: ActualSection | None,
-) -> tuple[Verdict, Reason | None]:
-    """The verdict on a value, and its reason; nothing is proven of one that stands on what was not measured, or is drawn too roughly."""
-    unseen = actual.unseen_place(value) if actual is not None else None
-    if unseen is not None:
-        return Verdict.UNCERTAIN, Reason("unseen", f"It was found where nothing was measured ({unseen}); measure that stretch.")
-    guard, unit = basis.guard(asked.uncertainty), value.unit if value.unit != "1" else ""
-    verdict = verdict_of(deviation, asked.lower, asked.upper, guard)
-    is_doubted = verdict_of(deviation, asked.lower, asked.upper, guard + drawing) is not verdict
-    if verdict is Verdict.CONFORM and not is_doubted:
-        return verdict, None
-    limits = f"{_limit(asked.lower)} .. {_limit(asked.upper)} {unit}".rstrip()
-    told = f"{value.value:.6g} {unit}, {deviation:+.4g} from the nominal {asked.nominal_value:.6g}; {limits} are allowed"
-    if verdict is Verdict.UNCERTAIN:
-        return verdict, Reason("within-uncertainty", f"It is {told}: nearer to a limit than U = {asked.uncertainty:g} {unit}.")
-    if is_doubted:
-        words = f"It is {told}: nearer to a limit than the {drawing:.2g} {unit} by which the section that was drawn may mislead".rstrip()
-        return Verdict.UNCERTAIN, Reason("within-uncertainty", f"{words}; measure its edges more densely.")
-    if measured.gap.length_mm > basis.terms.limits.gap_max_mm * (1 + 1e-9):
-        return Verdict.UNCERTAIN, Reason("unseen", f"It is {told}; a part of what it depends on was not measured.")
-    return verdict, Reason("out-of-tolerance", f"It is {told}.")
-
-
-def _limit(limit: float) -> str:
-    return f"{limit:+g}" if math.isfinite(limit) else "no limit"
 
 
 def _method_words(value: SectionValue) -> str:

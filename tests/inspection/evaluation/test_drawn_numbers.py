@@ -28,6 +28,7 @@ from inspection import (
 )
 from inspection.characteristics.inscribed import continue_to_edges, inscribe_circles
 from inspection.characteristics.outline import Edge
+from tests.inspection import profiles
 from tests.inspection.profiles import Array, even_in_arc_length, left_normal
 
 POINTS = 1500
@@ -143,3 +144,25 @@ def test_a_smooth_flank_has_a_settled_minimum_zone_however_densely_it_was_measur
     assert found.verdict is Verdict.CONFORM
     assert isinstance(found.certificate, ZoneCertificate)
     assert len(found.certificate.multipliers) == 4
+
+
+def test_a_camber_line_that_bulges_as_far_to_both_sides_is_judged_by_both_and_not_by_which_of_them_is_larger_by_a_hair() -> None:
+    """A symmetric section with two waves of 0.01 mm: its camber is +0.01 or -0.01 mm, and where both are allowed that is no doubt."""
+    profile = discretize(profiles.naca("0012"), samples=2000)
+    u = even_in_arc_length(profile.curve, 800)
+    off = 0.01 * np.sin(4 * np.pi * profile.curve.station_mm(u) / profile.length_mm + 0.4)
+    points = profile.curve.point(u) + off[:, None] * profile.outward * left_normal(profile.curve, u)
+    outline = Outline(find_airfoil(profile))
+    asked = [
+        with_nominal(SectionCharacteristic(f"{lower} .. {upper}", "camber", "inscribed", lower, upper), lambda: outline)
+        for lower, upper in ((-0.02, 0.02), (-0.002, 0.05), (-0.05, 0.002), (-0.001, 0.001))
+    ]
+    live = LiveInspection(profile, WIDE, provisional=False, characteristics=asked)
+    live.add(points)
+    both, up, down, none = live.finish(True).characteristics
+    assert abs(both.value) == pytest.approx(0.01, abs=2e-3)
+    assert both.verdict is Verdict.CONFORM
+    assert {up.verdict, down.verdict} <= {Verdict.UNCERTAIN, Verdict.NONCONFORM}
+    assert Verdict.UNCERTAIN in {up.verdict, down.verdict}
+    assert none.verdict is Verdict.NONCONFORM
+    assert any("to the other" in one.reasons[0].words for one in (up, down))
