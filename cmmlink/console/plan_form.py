@@ -49,7 +49,7 @@ _LONGEST_ANSWER = 300
 _LONGEST_PLAN = 200_000
 _MOST_NAMESAKES = 100
 _MOST_CURVES, _MOST_FILES = 50, 50
-_DRAWN = 600
+_DRAWN, _MEASURED = 600, 2001  # points along the curve
 _UNUSABLE = (PlanError, InspectionError, PointFileError, ValueError, ArithmeticError)
 _FIELD_OF: Mapping[str, FieldName] = {
     "part": "part", "tolerance": "tolerance", "device": "source", "mesh": "source", "sections": "source", "probe": "radius",
@@ -138,6 +138,7 @@ def understand_nominal(form: PlanForm, content: bytes, folder: Path) -> Understo
         except _UNUSABLE as error:
             return Understood(problem=_words_of(error, path), mistakes=tuple(form.mistakes))
     points = file.curve.point(np.linspace(*file.curve.domain, _DRAWN))
+    size = np.ptp(file.curve.point(np.linspace(*file.curve.domain, _MEASURED)), axis=0)
     stem = _stem_of(form.nominal)
     return Understood(
         mistakes=tuple(form.mistakes),
@@ -146,7 +147,7 @@ def understand_nominal(form: PlanForm, content: bytes, folder: Path) -> Understo
         closed=file.curve.closed,
         turns_left=material_of(file) == "left",
         length_mm=file.curve.length_mm,
-        size_mm=(float(np.ptp(points[:, 0])), float(np.ptp(points[:, 1]))),
+        size_mm=(float(size[0]), float(size[1])),
         unit_known="unit" not in asked and "chord" not in asked,
         source_format=file.source_format,
         notes=tuple(map(without_folders, file.notes)),

@@ -6,6 +6,7 @@ import { gettext } from "./words.js";
 /** @import { Answer, Command, Message } from "./protocol.js" */
 /** @typedef {"connecting" | "live" | "stale" | "away" | "refused"} LinkState */
 /** @typedef {Pick<Answer, "ok" | "message">} Outcome of a command */
+/** @typedef {{ ok: true, given: unknown } | { ok: false, message: string }} Posted what came of a post */
 /**
  * @typedef {object} Handlers
  * @property {(message: Message) => void} onMessage
@@ -106,6 +107,23 @@ export class Link {
       this.waiting.set(number, resolve);
       this.socket.send(JSON.stringify({ number, ...command }));
     });
+  }
+
+  /**
+   * Hand a file in, with answers beside it.
+   * @param {string} path
+   * @param {Record<string, string>} answers
+   * @param {Blob} content
+   * @returns {Promise<Posted>}
+   */
+  async post(path, answers, content) {
+    const headers = { Authorization: `Bearer ${this.token}` };
+    try {
+      const answer = await fetch(`${path}?${new URLSearchParams(answers)}`, { method: "POST", headers, body: content });
+      return answer.ok ? { ok: true, given: await answer.json() } : { ok: false, message: await answer.text() };
+    } catch {
+      return { ok: false, message: OUT_OF_REACH };
+    }
   }
 
   /** @param {Answer} answer */

@@ -4,10 +4,12 @@ import { showAlarms, toggleAlarmList } from "./alarms.js";
 import { cardOf } from "./card.js";
 import { Characteristics } from "./characteristics.js";
 import { CtView } from "./ct.js";
-import { buttonOf, byId, inputOf, put, selectOf } from "./dom.js";
+import { buttonOf, byId, inputOf, put } from "./dom.js";
+import { Downloads } from "./downloads.js";
 import { listen } from "./gestures.js";
 import { History } from "./history.js";
-import { Link, OUT_OF_REACH } from "./link.js";
+import { Link } from "./link.js";
+import { NewPlan, isDialogOpen } from "./new_plan.js";
 import { ageWords, showBanners, showButtons, showLamps, showRun } from "./panels.js";
 import { PartView } from "./part_view.js";
 import { Scan } from "./points.js";
@@ -17,7 +19,7 @@ import { Strip } from "./strip.js";
 import { Timing } from "./timing.js";
 import { gettext, translate, translateElements } from "./words.js";
 
-/** @import { AlarmRow, CharacteristicList, Command, Hello, Message, ShownRun } from "./protocol.js" */
+/** @import { AlarmRow, CharacteristicList, Command, Hello, Message, PlanSaved, ShownRun } from "./protocol.js" */
 /** @import { Cursor } from "./drawing.js" */
 /** @import { LinkState, Outcome } from "./link.js" */
 /** @import { Heard } from "./card.js" */
@@ -40,12 +42,12 @@ let clock = { nowMs: 0, at: 0 }; // the station's time of day, and when it was h
 /** @type {readonly AlarmRow[]} */
 let alarms = [];
 let version = "";
+let page = 0; // the number that the station has given this page
 /** @type {Cursor | null} */
 let cursor = null;
 let isPainting = false;
 let outdated = { drawings: true, words: true };
 let saidAt = 0;
-let toCompare = ""; // the run that was chosen first
 
 const scan = new Scan();
 const timing = new Timing();
@@ -53,13 +55,15 @@ const profile = new Profile(byId("profile"), redraw);
 const strip = new Strip(byId("strip"), redraw);
 const drawings = [profile, strip];
 const link = new Link(location.hash.slice(1), { onMessage, onBinary, onLink });
+const downloads = new Downloads(() => link.token, say);
 const partView = new PartView(ask, start);
+new NewPlan((path, answers, content) => link.post(path, { ...answers, page: String(page) }, content), showSaved);
 const history = new History({
   open: (run) => askToSee({ do: "open", run }),
   replay: (run) => askToSee({ do: "replay", run }),
-  export: (run) => download(`/export/${encodeURIComponent(run)}`, `${run}.zip`),
-  report,
-  compare,
+  export: (run) => downloads.export(run),
+  report: (run) => downloads.report(run),
+  compare: (run) => downloads.compare(run),
 }, rewrite);
 const characteristics = new Characteristics(showChosen);
 /** @type {CharacteristicList} */
@@ -92,6 +96,7 @@ function onMessage(message) {
 function greet(hello) {
   if (version && version !== hello.version) location.reload();
   version = hello.version;
+  page = hello.page;
   heard.isRemote = hello.remote && location.protocol !== "https:";
   heard.run = heard.station = heard.control = cursor = null;
   scan.clear();
@@ -247,60 +252,10 @@ async function start() {
   await ask({ do: "start" });
 }
 
-/**
- * Save the report of a recorded run, which the station makes now, in the language and on the paper that are chosen.
- * @param {string} run
- */
-function report(run) {
-  const chosen = ["language", "paper"].map((name) => `${name}=${selectOf(`report-${name}`).value}`);
-  say({ ok: true, message: gettext("making the report \u2026") });
-  return download(`/report/${encodeURIComponent(run)}?${chosen.join("&")}`, `${run}.pdf`);
-}
-
-/**
- * Take a run as the first one to compare, or draw the one that was taken before and this one.
- * @param {string} run
- */
-function compare(run) {
-  const first = toCompare === run ? "" : toCompare;
-  toCompare = first ? "" : run;
-  if (!first) return say({ ok: true, message: gettext("{run} is the first one: choose the other run and press C again", { run }) });
-  say({ ok: true, message: gettext("drawing both runs \u2026") });
-  return download(`/compare/${encodeURIComponent(first)}/${encodeURIComponent(run)}`, `${first}-${run}.pdf`);
-}
-
 /** Save the report of the run whose verdict stands at the right. */
 function reportShown() {
   const { record } = cardOf(heard);
-  if (record) report(record);
-}
-
-/**
- * Save a file of the station.
- * @param {string} address
- * @param {string} name
- */
-async function download(address, name) {
-  try {
-    const answer = await fetch(address, { headers: { Authorization: `Bearer ${link.token}` } });
-    if (!answer.ok) return say({ ok: false, message: await answer.text() });
-    save(await answer.blob(), name);
-    say({ ok: true, message: gettext("{name} saved", { name }) });
-  } catch {
-    say({ ok: false, message: gettext("{name} was not saved: {cause}", { name, cause: OUT_OF_REACH }) });
-  }
-}
-
-/**
- * @param {Blob} content
- * @param {string} name
- */
-function save(content, name) {
-  const address = URL.createObjectURL(content), anchor = document.createElement("a");
-  anchor.href = address;
-  anchor.download = name;
-  anchor.click();
-  URL.revokeObjectURL(address);
+  if (record) downloads.report(record);
 }
 
 /** @param {string} view */
@@ -314,6 +269,17 @@ function go(view) {
 
 /** @returns {NodeListOf<HTMLElement>} */
 const viewButtons = () => document.querySelectorAll("[data-go]");
+
+/**
+ * A new plan was saved: that of a scan is the chosen one.
+ * @param {PlanSaved} saved
+ */
+function showSaved({ name, surface }) {
+  say({ ok: true, message: gettext("{name} is saved.", { name }) });
+  if (surface) return go("ct");
+  go("part");
+  partView.awaitEntry(name);
+}
 
 function nextPart() {
   go("part");
@@ -362,6 +328,7 @@ const KEYS = {
 
 /** @param {KeyboardEvent} event */
 function pressKey(event) {
+  if (isDialogOpen()) return;
   const key = event.key.toLowerCase(), acts = KEYS[key];
   const isTyping = event.target instanceof Element && event.target.matches("input:not([type=range]), textarea, select");
   const isForPage = !isTyping && !event.ctrlKey && !event.metaKey && !event.altKey;
@@ -374,6 +341,7 @@ document.addEventListener("keydown", pressKey);
 for (const button of viewButtons()) button.addEventListener("click", () => go(button.dataset.go ?? ""));
 buttonOf("another-page").addEventListener("click", invite);
 buttonOf("start").addEventListener("click", start);
+buttonOf("run-demo").addEventListener("click", () => ask({ do: "demo" }));
 buttonOf("report-shown").addEventListener("click", reportShown);
 buttonOf("end").addEventListener("click", () => ask({ do: "end" }));
 buttonOf("abort").addEventListener("click", () => ask({ do: "abort" }));

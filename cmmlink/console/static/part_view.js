@@ -20,6 +20,8 @@ export class PartView {
     this.ask = ask;
     this.list = new List(byId("plans"), (name) => this.choose(name));
     this.shownChoice = "";
+    /** @type {StationState | null} */
+    this.station = null;
     /** The plan whose serial number is to be entered next, once the station has told it. */
     this.entering = "";
     byId("entry").addEventListener("submit", (event) => {
@@ -52,13 +54,24 @@ export class PartView {
   /** @param {string} name */
   async choose(name) {
     const answer = await this.ask({ do: "choose", plan: name });
-    if (answer.ok) this.entering = name;
+    if (answer.ok) this.awaitEntry(name);
+  }
+
+  /** The serial number of a plan is entered next, once the station has told that the plan is chosen. @param {string} plan */
+  awaitEntry(plan) {
+    this.entering = plan;
+    if (this.station) this.enterNext(this.station);
   }
 
   /** @param {StationState} station */
   show(station) {
-    const { choice, running } = station;
-    byId("no-plans").hidden = station.plans.length > 0;
+    const { choice, running } = station, isEmpty = !station.plans.length && !station.ct_plans.length;
+    this.station = station;
+    byId("view-part").dataset.empty = String(isEmpty);
+    byId("no-plans").hidden = !isEmpty;
+    for (const id of ["open-new-plan", "first-plan"]) buttonOf(id).hidden = !station.can_make_plans;
+    buttonOf("open-new-plan").disabled = running;
+    buttonOf("run-demo").hidden = !station.can_run_demo;
     this.list.show(station.plans, choice?.name ?? "", Boolean(choice?.problem));
     this.showChoice(choice);
     this.showEntry("serial", station.serial_number, running);

@@ -13,6 +13,7 @@ from cmmlink.console.listening import Access
 from cmmlink.console.server import ConsoleServer
 from cmmlink.console.station import Station
 from cmmlink.console.station_setup import Records
+from cmmlink.demo import plan_file
 from cmmlink.from_plan import profile_of
 from cmmlink.plan.scan import load_plan
 from inspection import NominalProfile, rehearse
@@ -97,11 +98,15 @@ def make_bench(browser: Browser, tmp_path: Path) -> Iterator[MakeBench]:
         access: Access | None = None,
         surfaces: Mapping[str, Path] | None = None,
         inspect: InspectSurface | None = None,
+        folder: Path | None = None,
     ) -> Bench:
         files = {name: write_plan(tmp_path, name) for name in plans}
         device = Device()
         known = surfaces or {}
-        station = Station(replace(setup_of(files, device.connect, records), ct_plans=lambda: known, inspect_surface=inspect))
+        setup = replace(setup_of(files, device.connect, records), ct_plans=lambda: known, inspect_surface=inspect)
+        if folder is not None:
+            setup = replace(setup, plans=lambda: {path.name: path for path in folder.glob("*.yaml")}, folder=folder, demo=plan_file())
+        station = Station(setup)
         server = ConsoleServer(station, "test", access, token=TOKEN)
         server.start()
         made.append(Bench(station, server, device, profile_of(load_plan(files[plans[0]])), browser))
