@@ -52,6 +52,18 @@ def local_words(moment: datetime) -> str:
     return f"{local:%Y-%m-%d %H:%M:%S} {local:%z}"
 
 
+def judgement_words(judged: Mapping[str, Any]) -> str:
+    """A judgement of a recorded run that was made later: when, by whom, what came of it, what was changed, and why."""
+    changes = ", ".join(f"{change['key']} {change['recorded']} -> {change['replayed']}" for change in judged["changed"])
+    verdict = headline_of(Verdict[judged["verdict"].upper()]).words if judged["verdict"] else "no verdict"
+    return f"{local_words(datetime.fromisoformat(judged['when']))} by {judged['who']}: {verdict}; {changes}; {judged['why']}"
+
+
+def repetition_words(serial_number: str, run: str) -> str:
+    """What is said of a part that was measured before, as a question and beside its verdict."""
+    return f"the serial number {serial_number} of this part was measured before: run {run}"
+
+
 def section_words(place: Mapping[str, Any] | None) -> str:
     """Which section of a surface a recorded run is, from its place in the stack; empty where it is none."""
     return "" if place is None else f"section {place['section']} of {place['sections']} at {place['height_mm']:.3f} mm"

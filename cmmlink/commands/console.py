@@ -120,7 +120,7 @@ def run_on_page(plan_file: Path, connect: "Connect", output: Output, serial_numb
         try:
             station.choose(plan_file.name)
             station.enter(serial_number, operator)
-            station.start()
+            station.start(again=True)  # where it was measured before, that was asked for here
         except Refused as refusal:
             raise PlanError(str(refusal)) from None
         job = station.job

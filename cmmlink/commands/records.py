@@ -15,7 +15,7 @@ from cmmlink.commands.output import now, print_json, terminal
 from cmmlink.commands.progress import progress
 from cmmlink.errors import PlanError
 from cmmlink.version import RESULT_SCHEMA
-from cmmlink.words import headline_of, local_words, printable, section_words, utc_words
+from cmmlink.words import headline_of, judgement_words, local_words, printable, section_words, utc_words
 from inspection import Method, Verdict
 
 if TYPE_CHECKING:
@@ -95,9 +95,7 @@ def show(name: RunName, records: Records = None, as_json: Json = False) -> int:
     if (origin := found["origin"]) is not None:
         _say(f"{'origin':<14} merged {_local(origin['merged'])} from {origin['file']}, its chain there {origin['chain_sha256']}")
     for judged in found["derived"]:
-        changes = ", ".join(f"{change['key']} {change['recorded']} -> {change['replayed']}" for change in judged["changed"])
-        verdict = headline_of(Verdict[judged["verdict"].upper()]).words if judged["verdict"] else "no verdict"
-        _say(f"{'judged again':<14} {_local(judged['when'])} by {judged['who']}: {verdict}; {changes}; {judged['why']}")
+        _say(f"{'judged again':<14} {judgement_words(judged)}")
     for event in found["events"]:
         told = ", ".join(f"{name} {value}" for name, value in event.items() if name not in ("event", "time_s", "after_points"))
         _say(f"  {event['time_s'] - found['clock_s']:9.3f} s  after {event['after_points']} points: {event['event']} {told}")

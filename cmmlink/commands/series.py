@@ -9,7 +9,7 @@ import typer
 
 from cmmlink.commands.output import now
 from cmmlink.errors import PlanError
-from cmmlink.words import printable
+from cmmlink.words import printable, repetition_words
 
 if TYPE_CHECKING:
     from cmmlink.plan import Plan
@@ -38,7 +38,7 @@ class NextPart:
         before = earlier_run(records, plan.part.name, serial_number, now) if serial_number else None
         if before is None:
             return part, ()
-        told = f"the serial number {serial_number} of this part was measured before: run {before}"
+        told = repetition_words(serial_number, before)
         if can_ask and not typer.confirm(f"{printable(told)}. Measure it again?", err=True):
             raise PlanError(f"{told}; it was not measured again")
         return part, (told,)

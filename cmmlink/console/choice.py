@@ -18,10 +18,11 @@ _MOST_PLAN_BYTES = 50_000  # of its text are shown
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CheckedPlan:
-    """A plan that can be run, and its nominal."""
+    """A plan that can be run, and its nominal. `notes` are what is known of the part, beside what the device's notes say."""
 
     plan: Plan
     profile: NominalProfile
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

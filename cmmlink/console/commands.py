@@ -53,6 +53,7 @@ def action_of(command: Command, station: Station) -> Callable[[], str] | None:
     """What a command of the page in control asks of the station; None for what any page may ask of the server."""
     actions: Mapping[str, Callable[[], str]] = {
         "start": station.start,
+        "start again": lambda: station.start(again=True),
         "end": station.end_scan,
         "abort": station.abort,
         "test": station.test_device,

@@ -15,6 +15,7 @@ _LONGEST_NAME = 120
 class Entry:
     """The chosen plan, the last test of its device, and what belongs to the next part.
 
+    question : what has to be confirmed before the part is measured; empty where nothing has
     typed : names of what the operator typed for the next part; no plan replaces it, whenever its check comes back
     """
 
@@ -23,12 +24,13 @@ class Entry:
     address: str = ""
     choice: Choice | None = None
     test: DeviceTest = UNTESTED
+    question: str = ""
     typed: frozenset[str] = frozenset()
 
     def with_choice(self, choice: Choice) -> "Entry":
         """The entry with a plan chosen; another plan than before brings an address of its own, and a serial number if none was typed."""
         if self.choice is not None and self.choice.name == choice.name:
-            return replace(self, choice=choice)
+            return replace(self, choice=choice, question="")
         plan = choice.checked.plan if choice.checked else None
         address = str(getattr(plan.device, "address", "")) if plan else ""
         planned = (plan.part.serial_number or "") if plan else ""
@@ -38,13 +40,14 @@ class Entry:
 
     def for_next_part(self) -> "Entry":
         """The entry once its part was measured: the serial number is counted up, and waits to be typed over."""
-        return replace(self, serial_number=next_serial_number(self.serial_number), typed=self.typed - {"serial_number"})
+        return replace(self, serial_number=next_serial_number(self.serial_number), question="", typed=self.typed - {"serial_number"})
 
     def with_values(self, serial_number: str | None, operator: str | None, address: str | None) -> "Entry":
         """The entry with new values; None leaves one as it is. Raises Refused."""
         typed = {"serial_number"} if serial_number is not None and serial_number.strip() != self.serial_number else set()
         return replace(
             self,
+            question="" if typed else self.question,
             typed=self.typed | typed,
             serial_number=self.serial_number if serial_number is None else _printable(serial_number, "serial number"),
             operator=self.operator if operator is None else _printable(operator, "operator"),

@@ -4,7 +4,7 @@ import shutil
 import tempfile
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from functools import partial
 from pathlib import Path
@@ -20,6 +20,8 @@ from cmmlink.plan import Device, Plan
 from cmmlink.record import (
     Replay,
     Store,
+    derived_of,
+    earlier_run,
     end_missing,
     find_run,
     list_runs,
@@ -35,7 +37,7 @@ from cmmlink.record import export_run as export_files
 from cmmlink.result_json import result_json
 from cmmlink.run_state import RunKind
 from cmmlink.run_view import RunContext
-from cmmlink.words import headline_of, local_words, section_words
+from cmmlink.words import headline_of, judgement_words, local_words, section_words
 from drivers import Decoder
 from inspection import JudgedRows, NominalProfile, Verdict
 
@@ -75,11 +77,17 @@ class PastRuns:
     def runs(self) -> Sequence[RunRow]:
         """All runs, newest first. Raises StoreError."""
         entries = list_runs(self.folder, self.now)[::-1][:_MOST_LISTED]
+        if not entries:
+            return []
         unknown = [entry for entry in entries if _key(entry) not in self._known]
-        if unknown:
-            with open_to_read(self.folder, self.now) as store:
-                self._known.update((_key(entry), _row_of(entry, _result_of(store, entry["run"]))) for entry in unknown)
-        return [self._known[_key(entry)] for entry in entries]
+        with open_to_read(self.folder, self.now) as store:
+            self._known.update((_key(entry), _row_of(entry, _result_of(store, entry["run"]))) for entry in unknown)
+            judged = [_judgements_of(store, entry["run"]) for entry in entries]  # at any time there may be one more
+        return [replace(self._known[_key(entry)], judged=words) for entry, words in zip(entries, judged, strict=True)]
+
+    def measured_before(self, part: str, serial_number: str) -> str | None:
+        """The newest run of a part with this serial number, None where there is none. Raises StoreError."""
+        return earlier_run(self.folder, part, serial_number, self.now)
 
     def open_run(self, run: str) -> OpenedRun:
         """Give one run as it was recorded. Raises StoreError, RunError."""
@@ -149,6 +157,14 @@ def _result_of(store: Store, run: str) -> dict[str, Any]:
         return recorded_result(store, run)
     except StoreError:
         return {}
+
+
+def _judgements_of(store: Store, run: str) -> tuple[str, ...]:
+    """What was judged of a run later, in words; nothing where that cannot be read."""
+    try:
+        return tuple(map(judgement_words, derived_of(store, run)))
+    except StoreError:
+        return ()
 
 
 def _row_of(entry: dict[str, Any], result: dict[str, Any]) -> RunRow:

@@ -106,7 +106,7 @@ class DeviceTest:
 
 @dataclass(frozen=True, slots=True)
 class StationState:
-    """What the operator has chosen and entered, and what may be done next."""
+    """What the operator has chosen and entered, and what may be done next. `question` waits for `start again`; empty: none."""
 
     plans: tuple[str, ...]
     ct_plans: tuple[str, ...]
@@ -115,6 +115,7 @@ class StationState:
     operator: str
     address: str
     test: DeviceTest
+    question: str
     running: bool
     can_start: bool
     keeps_records: bool
@@ -181,6 +182,7 @@ class CharacteristicList:
 class RunRow:
     """One line of the station's history. `worst_mm` is the deviation farthest from the middle of the zone.
 
+    judged      : every judgement of it that was made later, in words, oldest first
     section     : which section of a surface it is, in words; empty for a run of a device
     word, shape : the verdict, or how early the run ended, and its sign; `counted`: the scan came to its end with a verdict
     of          : of several characteristics, which gave a verdict that is not conform, by name; else empty
@@ -203,6 +205,7 @@ class RunRow:
     worst_station_mm: float | None
     lower_mm: float | None
     upper_mm: float | None
+    judged: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -365,7 +368,7 @@ class ImportSurface:
 class Plain:
     """A command that needs no more words. The answer to `another page` is the code of a one-time address."""
 
-    do: Literal["start", "end", "abort", "test", "demo", "take control", "live", "devices", "another page"]
+    do: Literal["start", "start again", "end", "abort", "test", "demo", "take control", "live", "devices", "another page"]
 
 
 Message = (

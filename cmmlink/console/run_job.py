@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Callable
+from dataclasses import replace
 
 from cmmlink.console.alarms import Alarms
 from cmmlink.console.choice import CheckedPlan
@@ -42,10 +43,11 @@ def measure(job: Job, view: RunView, checked: CheckedPlan, setup: StationSetup, 
     plan, records = checked.plan, setup.records
     with setup.connect(plan) as connected:
         job.attach(connected.source, moves=connected.moves)
+        known = tuple(note for note in checked.notes if note not in connected.notes)
         finished = job.finished = carry_out(
             plan,
             checked.profile,
-            connected,
+            replace(connected, notes=(*known, *connected.notes)),
             records=None if records is None else records.folder,
             clock=setup.clock,
             now=setup.now,

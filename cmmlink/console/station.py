@@ -28,6 +28,7 @@ from cmmlink.errors import StoreError
 from cmmlink.events import RunStarted
 from cmmlink.plan import Plan
 from cmmlink.run_view import RunContext, RunView
+from cmmlink.words import repetition_words
 
 _MOST_HISTORY = 500
 _LOOK_ENDS_S = 3.0
@@ -124,8 +125,8 @@ class Station:
             self._set_entry(self._entry.with_values(serial_number, operator, address))
         return "entered"
 
-    def start(self) -> str:
-        """Start a run of the chosen plan, which is checked once more."""
+    def start(self, *, again: bool = False) -> str:
+        """Start a run of the chosen plan, which is checked once more; `again`: also where the part was measured before."""
         with self._new_job("run", "the next one can be started") as job:
             chosen = self._entry.choice
             if chosen is None:
@@ -134,6 +135,7 @@ class Station:
             with self._lock:
                 self._set_entry(self._entry.with_choice(choice))
                 checked = self._entry.planned()
+            checked = self._knowing_the_part(checked, again=again)
             view = self._new_view(choice.name, checked)
             if job.stop.is_set():
                 raise Refused("the run was aborted before it began")
@@ -331,6 +333,22 @@ class Station:
             raise Refused("this station keeps no records")
         return self._setup.records
 
+    def _knowing_the_part(self, checked: CheckedPlan, *, again: bool) -> CheckedPlan:
+        """The plan with a note where its part was measured before, which is refused unless it is to be measured again."""
+        part = checked.plan.part
+        if self._setup.records is None or not part.serial_number:
+            return checked
+        with answer_errors():
+            run = self._setup.records.measured_before(part.name, part.serial_number)
+        if run is None:
+            return checked
+        told = repetition_words(part.serial_number, run)
+        if not again:
+            with self._lock:
+                self._set_entry(replace(self._entry, question=told))
+            raise Refused(told)
+        return replace(checked, notes=(told,))
+
     def _new_view(self, name: str, checked: CheckedPlan) -> RunView:
         with self._lock:
             self._runs_begun += 1
@@ -371,6 +389,7 @@ class Station:
             operator=entry.operator,
             address=entry.address,
             test=entry.test,
+            question=entry.question,
             running=running,
             can_start=not running and choice is not None and choice.checked is not None,
             keeps_records=self._setup.records is not None,

@@ -26,6 +26,9 @@ class Records(Protocol):
     def runs(self) -> Sequence[RunRow]:
         """All runs, newest first."""
 
+    def measured_before(self, part: str, serial_number: str) -> str | None:
+        """Give the newest run of a part with this serial number, None where there is none."""
+
     def open_run(self, run: str) -> OpenedRun:
         """Give one run as it was recorded."""
 

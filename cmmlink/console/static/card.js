@@ -23,6 +23,7 @@ import { dated, gettext, translate } from "./words.js";
  * @property {string} why
  * @property {readonly string[]} reasons every further one
  * @property {readonly string[]} notes
+ * @property {readonly string[]} judged every judgement of a recorded run that was made later
  * @property {string} phase
  * @property {string} badge
  * @property {string} before
@@ -49,7 +50,7 @@ import { dated, gettext, translate } from "./words.js";
 
 /** @type {Card} */
 const NO_CARD = {
-  part: "", serial: "", names: [], word: "", shape: "none", final: false, of: "", why: "", reasons: [], notes: [], phase: "",
+  part: "", serial: "", names: [], word: "", shape: "none", final: false, of: "", why: "", reasons: [], notes: [], judged: [], phase: "",
   badge: "", before: "", worst: null, simulated: false, run: null, record: "",
 };
 const PHASES = {
@@ -71,14 +72,16 @@ export function cardOf({ run, isRecorded, station, view, chosen, surface }) {
   if (!isOn && view === "part") return cardOfNextPart(run, station);
   if (!isOn && view === "history" && chosen) return cardOfRow(chosen);
   if (!isOn && view === "ct" && surface) return cardOfSurface(surface);
-  return run ? cardOfRun(run) : cardOfNextPart(null, station);
+  const judged = isRecorded && chosen && chosen.run === run?.run ? chosen.judged : [];
+  return run ? cardOfRun(run, judged) : cardOfNextPart(null, station);
 }
 
 /**
  * @param {RunState} run
+ * @param {readonly string[]} judged
  * @returns {Card}
  */
-function cardOfRun(run) {
+function cardOfRun(run, judged) {
   const { part, serial_number: serial, plan, operator, began, notes, simulated, zone } = run;
   const { word, shape, final, of, why, reasons } = run.verdict;
   const badge = BADGES[run.kind](dated(began));
@@ -87,7 +90,7 @@ function cardOfRun(run) {
     kind: classOf(run.worst.deviation_mm, CODE_OF[run.worst.verdict], zone),
   };
   return {
-    part, serial, names: [plan, operator], word, shape, final, of, why, reasons, notes, phase: final ? "" : PHASES[run.phase],
+    part, serial, names: [plan, operator], word, shape, final, of, why, reasons, notes, judged, phase: final ? "" : PHASES[run.phase],
     badge, before: "", worst, simulated, run, record: run.run,
   };
 }
@@ -112,10 +115,10 @@ function cardOfNextPart(run, station) {
  * @returns {Card}
  */
 function cardOfRow(row) {
-  const { part, serial_number: serial, section, word, shape, counted, began, run, simulated, state } = row;
+  const { part, serial_number: serial, section, word, shape, counted, began, run, simulated, state, judged } = row;
   return {
     ...NO_CARD, part, serial, names: [translate(section), run], word, shape, final: counted,
-    why: gettext("as recorded; O opens the run"), badge: BADGES.recorded(dated(began)), worst: worstOf(row), simulated,
+    why: gettext("as recorded; O opens the run"), badge: BADGES.recorded(dated(began)), worst: worstOf(row), simulated, judged,
     record: state === "running" || state === "damaged" ? "" : run,
   };
 }

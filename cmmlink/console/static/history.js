@@ -63,7 +63,10 @@ export function chartWords(runs) {
 /** @param {RunRow} run */
 function rowOf(run) {
   const part = run.section ? `${run.part}, ${translate(run.section)}` : run.part;
-  const words = [part, run.serial_number, dated(run.began), translate(run.state)];
+  const words = [part, run.serial_number, dated(run.began), stateOf(run)];
   const verdict = verdictCell(run.of ? `${translate(run.word)}: ${run.of}` : run.word, run.shape);
   return [verdict, ...words.map((word) => cell(word)), cell(count(run.received), "number"), ...worstCells(run)];
 }
+
+/** @param {RunRow} run */
+const stateOf = ({ state, judged }) => (judged.length ? gettext("{state}, judged again", { state: translate(state) }) : translate(state));

@@ -10,7 +10,8 @@ import { dated, gettext, ngettext, translate } from "./words.js";
 /** @import { RunState } from "./protocol.js" */
 /** @import { Card, Heard } from "./card.js" */
 /** @typedef {[symbol: string, word: string]} Lamp */
-/** @typedef {{ words: string, kind: "none" | "note" | "warning" | "fault", button: string, act: "live" | "take control" }} Banner */
+/** @typedef {"live" | "take control" | "start again"} BannerAct */
+/** @typedef {{ words: string, kind: "none" | "note" | "warning" | "fault", button: string, act: BannerAct }} Banner */
 
 const NONE = "\u2013";
 const NEEDS_ADDRESS = gettext("This page has no access. An address opens one page, once, within a minute: "
@@ -75,11 +76,12 @@ function showVerdict({ word: told, shape, final, of, why: toldWhy, phase }) {
 }
 
 /**
- * Every further reason of the verdict, and all that was assumed about nominal and points.
+ * What was judged later, every further reason of the verdict, and all that was assumed about nominal and points.
  * @param {Card} card
  */
-function showRemarks({ reasons, notes }) {
-  byId("remarks").hidden = !reasons.length && !notes.length;
+function showRemarks({ reasons, notes, judged }) {
+  byId("remarks").hidden = !reasons.length && !notes.length && !judged.length;
+  showList("judgements", judged);
   showList("reasons", reasons);
   showList("notes", notes);
 }
@@ -242,7 +244,7 @@ function bannerElement({ words, kind, button, act }, onPress) {
  * @param {Heard} heard
  * @returns {Banner[]}
  */
-export function bannersOf({ run, isRecorded, control, isRemote, link }) {
+export function bannersOf({ run, isRecorded, station, control, isRemote, link }) {
   /** @type {(words: string, kind: Banner["kind"], button?: string, act?: Banner["act"]) => Banner} */
   const banner = (words, kind, button = "", act = "live") => ({ words, kind, button, act });
   if (link === "refused") return [banner(NEEDS_ADDRESS, "fault")];
@@ -254,6 +256,7 @@ export function bannersOf({ run, isRecorded, control, isRemote, link }) {
   if (run?.link === "down" && run.phase !== "finished") {
     banners.push(banner(gettext("LINK LOST. The device cannot be reached; trying again \u2026"), "fault"));
   }
+  banners.push(...questionsOf(station, control));
   if (isRecorded) banners.push(banner(translate(run?.number ?? ""), "note", gettext("Back to live")));
   else if (run?.kind === "replay") {
     banners.push(banner(translate(run.remark) || gettext("Replaying the run of {began}", { began: dated(run.began) }), "note"));
@@ -267,6 +270,18 @@ export function bannersOf({ run, isRecorded, control, isRemote, link }) {
     banners.push(banner(words, "warning"));
   }
   return banners;
+}
+
+/**
+ * What the page in control is asked before a part is measured.
+ * @param {Heard["station"]} station
+ * @param {Heard["control"]} control
+ * @returns {Banner[]}
+ */
+function questionsOf(station, control) {
+  if (!station?.question || !control?.controls) return [];
+  const words = gettext("Measure this part again? {question}. Else enter another serial number.", { question: translate(station.question) });
+  return [{ words, kind: "warning", button: gettext("Measure again"), act: "start again" }];
 }
 
 /** @param {Heard} heard */

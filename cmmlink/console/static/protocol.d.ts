@@ -75,7 +75,7 @@ export interface DeviceTest {
   readonly message: string;
 }
 
-/** What the operator has chosen and entered, and what may be done next. */
+/** What the operator has chosen and entered, and what may be done next. `question` waits for `start again`; empty: none. */
 export interface StationState {
   readonly plans: readonly string[];
   readonly ct_plans: readonly string[];
@@ -84,6 +84,7 @@ export interface StationState {
   readonly operator: string;
   readonly address: string;
   readonly test: DeviceTest;
+  readonly question: string;
   readonly running: boolean;
   readonly can_start: boolean;
   readonly keeps_records: boolean;
@@ -236,7 +237,7 @@ export interface CharacteristicList {
   readonly type: "characteristics";
 }
 
-/** One line of the station's history. `worst_mm` is the deviation farthest from the middle of the zone. section : which section of a surface it is, in words; empty for a run of a device word, shape : the verdict, or how early the run ended, and its sign; `counted`: the scan came to its end with a verdict of : of several characteristics, which gave a verdict that is not conform, by name; else empty */
+/** One line of the station's history. `worst_mm` is the deviation farthest from the middle of the zone. judged : every judgement of it that was made later, in words, oldest first section : which section of a surface it is, in words; empty for a run of a device word, shape : the verdict, or how early the run ended, and its sign; `counted`: the scan came to its end with a verdict of : of several characteristics, which gave a verdict that is not conform, by name; else empty */
 export interface RunRow {
   readonly run: string;
   readonly began: string;
@@ -255,6 +256,7 @@ export interface RunRow {
   readonly worst_station_mm: number | null;
   readonly lower_mm: number | null;
   readonly upper_mm: number | null;
+  readonly judged: readonly string[];
 }
 
 /** The runs on record, newest first. */
@@ -376,7 +378,7 @@ export interface KeepMap {
 
 /** A command that needs no more words. The answer to `another page` is the code of a one-time address. */
 export interface Plain {
-  readonly do: "start" | "end" | "abort" | "test" | "demo" | "take control" | "live" | "devices" | "another page";
+  readonly do: "start" | "start again" | "end" | "abort" | "test" | "demo" | "take control" | "live" | "devices" | "another page";
 }
 
 /** A device that can be seen now. The answer to `devices` is a JSON list of them. */

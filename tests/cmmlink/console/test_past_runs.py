@@ -9,7 +9,17 @@ import pytest
 from cmmlink.console.past_runs import PastRuns
 from cmmlink.errors import RunError, StoreError
 from cmmlink.events import RunFinished
-from cmmlink.record import Draft, Record, Store
+from cmmlink.record import (
+    Draft,
+    Record,
+    Store,
+    find_run,
+    keep_judgement,
+    open_to_read,
+    open_to_record,
+    recorded_run,
+    replay_run,
+)
 from cmmlink.words import local_words
 from tests.cmmlink.command import cmmlink
 from tests.cmmlink.oval_part import oval_points, write_nominal, write_points
@@ -88,3 +98,19 @@ def test_a_line_of_the_history_names_the_characteristic_that_failed(tmp_path: Pa
     )
     assert cmmlink("run", tmp_path / "plan.yaml", "--json").code == 1
     assert [(row.word, row.of) for row in past.runs()] == [("NOT CONFORM", "tight")]
+
+
+def test_what_was_judged_later_stands_beside_its_run_and_no_other(past: PastRuns) -> None:
+    for _ in range(2):
+        record(past.folder, Script(*scan_arrivals()))
+    assert [row.judged for row in past.runs()] == [(), ()]
+    with open_to_read(past.folder, today) as store:
+        recorded = recorded_run(store, find_run(store, "1"))
+        again = replay_run(store, recorded, no_decoder, settings={"tolerance.upper_mm": "0.5"})
+    for who, why in (("Eve", "concession 4711"), ("Ada", "drawing changed")):
+        with open_to_record(past.folder, today) as store:
+            keep_judgement(store, recorded, again, who=who, why=why, now=today())
+    newest, first = past.runs()
+    assert newest.judged == ()
+    assert [told.partition(" by ")[2].partition(":")[0] for told in first.judged] == ["Eve", "Ada"]
+    assert first.judged[1].endswith("tolerance.upper_mm 0.05 -> 0.5; drawing changed")

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import re
 import threading
 import zipfile
 from collections.abc import Mapping
@@ -262,3 +263,25 @@ def test_folder_of_plans_that_cannot_be_read_is_an_alarm_once(bench: Bench, tmp_
     problem.clear()
     station.list_plans()
     assert station.state.plans == ("blade.yaml",)
+
+
+def test_a_part_that_was_measured_before_is_asked_for_once_and_said_beside_its_verdict(bench: Bench) -> None:
+    bench.run()
+    first = bench.station.history.runs[0].run
+    bench.device.renew()
+    bench.station.enter(serial_number="B-0041")
+    told = f"the serial number B-0041 of this part was measured before: run {first}"
+    with pytest.raises(Refused, match=re.escape(told)):
+        bench.station.start()
+    assert (bench.station.state.question, bench.station.running) == (told, False)
+    bench.station.enter(serial_number="B-0042")
+    assert bench.station.state.question == "", "of another part it is not asked"
+    bench.station.enter(serial_number="B-0041")
+    with pytest.raises(Refused, match="measured before"):
+        bench.station.start()
+    bench.station.start(again=True)
+    assert bench.station.state.question == ""
+    bench.station.abort()
+    assert bench.station.wait(60.0)
+    assert bench.station.view is not None
+    assert told in bench.station.view.state().notes
