@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 _UNDULATIONS = 50  # on the whole profile: the shortest form that a part is taken to have, as roundness filters have it
+_ON_A_GAP = 33  # places on a gap where the curve is asked how far it stands off the line
 _GAPS_A_WAVE = 2  # a gap of half a wave still has a point on every crest and in every hollow
 
 
@@ -129,12 +130,17 @@ def _gaps_in_order(station_mm: Array, nominal: NominalProfile, room: Room) -> It
 
 
 def _off_the_line_mm(first_mm: float, length_mm: float, nominal: NominalProfile) -> float:
-    """How far the nominal from a station on, over a length, stands off the straight line between its two ends."""
-    ahead = np.mod(nominal.station_mm - first_mm, nominal.length_mm) if nominal.curve.closed else nominal.station_mm - first_mm
-    inside = np.flatnonzero((ahead >= 0) & (ahead <= length_mm))
-    if len(inside) < 3:
-        return 0.0
-    arc = nominal.points_mm[inside[np.argsort(ahead[inside], kind="stable")]]
+    """How far the nominal from a station on, over a length, stands off the straight line between its two ends.
+
+    The curve is asked at places of its own: a short gap around an edge may hold none of the nominal's samples, and hides something.
+    """
+    whole, closed = nominal.length_mm, nominal.curve.closed
+    ahead = np.mod(nominal.station_mm - first_mm, whole) if closed else nominal.station_mm - first_mm
+    on_way = np.concatenate([np.linspace(0.0, length_mm, _ON_A_GAP), ahead[(ahead > 0) & (ahead < length_mm)]])
+    station = first_mm + np.sort(on_way, kind="stable")
+    station = np.mod(station, whole) if closed else np.clip(station, 0.0, whole)
+    known = np.append(nominal.station_mm, whole), np.append(nominal.parameter, nominal.curve.domain[1])
+    arc = nominal.curve.point(np.interp(station, *known))
     chord, arms = arc[-1] - arc[0], arc - arc[0]
     span = float(np.hypot(*chord))
     if span <= 1e-9 * length_mm:

@@ -60,13 +60,14 @@ class ZoneCertificate:
 
     @property
     def words(self) -> str:
-        """The certificate in three lines, as a report prints it."""
+        """The certificate in three lines, as a report prints it; points have their index in deviations.csv."""
         half, turned = self.zone_mm / 2, np.degrees(self.nominal_from_section.rotation_rad)
         x, y = self.nominal_from_section.translation_mm.tolist()
         each = zip(self.active.tolist(), self.active_place_mm, self.active_deviation_mm, self.multipliers, strict=True)
-        held = " | ".join(f"{row + 1} ({at[0]:.6f}, {at[1]:.6f}) {e:+.9f} multiplier {share:.6f}" for row, at, e, share in each)
+        held = " | ".join(f"{row} ({at[0]:.6f}, {at[1]:.6f}) {e:+.9f} multiplier {share:.6f}" for row, at, e, share in each)
         last = (
-            f"proof: no rigid motion brings {len(self.witnesses)} of the measured points within {half - self.gap_mm:.9f} mm of it "
+            f"proof: no rigid motion brings {len(self.witnesses)} of the measured points within {half - self.gap_mm:.9f} mm of "
+            f"{'the nominal' if not self.middle_mm else 'the middle of the zone'} "
             f"(gap {1e3 * self.gap_mm:g} um); {self.boxes:,} boxes of motions looked at, the finest {self.finest_mm:.1e} mm"
             if self.proven
             else f"no proof over every placement: the search ended after {self.boxes:,} boxes of motions"
@@ -75,7 +76,7 @@ class ZoneCertificate:
             last = f"proof: half of it is no wider than the gap of the proof, {1e3 * self.gap_mm:g} um, so that none is smaller by that"
         return (
             f"minimum zone {self.zone_mm:.6f} mm (half {half:.9f}) about {self.middle_mm:g} mm, "
-            f"turned {turned:.9f} deg, moved ({x:.9f}, {y:.9f}) mm\nheld by points {held}\n{last}"
+            f"turned {turned:.9f} deg, moved ({x:.9f}, {y:.9f}) mm\nheld by points (index) {held}\n{last}"
         )
 
 
@@ -127,11 +128,11 @@ class ConsumptionCertificate:
 
     @property
     def words(self) -> str:
-        """The certificate in three lines, as a report prints it."""
+        """The certificate in three lines, as a report prints it; points have their index in deviations.csv."""
         pose = self.fit.nominal_from_section
         x, y = pose.translation_mm.tolist()
         each = zip(self.fit.active.tolist(), self.active_place_mm, self.fit.active_station_mm, self.fit.multipliers, strict=True)
-        held = " | ".join(f"{row + 1} ({at[0]:.6f}, {at[1]:.6f}) station {s:.6f} multiplier {share:.6f}" for row, at, s, share in each)
+        held = " | ".join(f"{row} ({at[0]:.6f}, {at[1]:.6f}) station {s:.6f} multiplier {share:.6f}" for row, at, s, share in each)
         last = (
             f"proof: no rigid motion brings {len(self.witnesses)} of the measured points into {self.bound:.9f} of the zone; "
             f"{self.boxes:,} boxes of motions looked at, the finest {self.finest_mm:.1e} mm"
@@ -140,5 +141,5 @@ class ConsumptionCertificate:
         )
         return (
             f"least consumption {self.fit.consumption:.9f} of the zone, turned {np.degrees(pose.rotation_rad):.9f} deg, "
-            f"moved ({x:.9f}, {y:.9f}) mm\nheld by points {held}\n{last}"
+            f"moved ({x:.9f}, {y:.9f}) mm\nheld by points (index) {held}\n{last}"
         )

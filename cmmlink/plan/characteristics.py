@@ -28,6 +28,7 @@ from inspection import (
 _ISO = re.compile(r"(?P<width>\d*\.?\d+)\s*(?P<unequal>UZ\s*(?P<offset>[+-]?\d*\.?\d+)?)?", re.ASCII)
 _ASME = re.compile(r"(?P<width>\d*\.?\d+)\s*\(?U\)?\s*(?P<outward>\d*\.?\d+)", re.ASCII)
 
+_DIGITS = 12  # of a limit in mm, by which no binary fraction shows
 LOWER = "the lower limit of the deviation from the nominal; null: no limit"
 UPPER = "the upper limit of the deviation from the nominal; null: no limit"
 U = "the expanded uncertainty U (95 %), in the unit of the value, as in ISO 14253-1"
@@ -139,7 +140,7 @@ class ProfileZone(Settings):
             assert self.upper_mm is not None
             return self.lower_mm, self.upper_mm
         upper = self.outward_mm if self.outward_mm is not None else self.width_mm / 2 + (self.offset_mm or 0.0)
-        return (upper - self.width_mm,), (upper,)
+        return (round(upper - self.width_mm, _DIGITS),), (round(upper, _DIGITS),)  # 0.04 - 0.06 is -0.019999999999999997
 
 
 class Freed(Settings):

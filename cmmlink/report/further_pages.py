@@ -108,7 +108,7 @@ def how_found(one: Mapping[str, Any], say: Speech) -> Iterator[str]:
         yield say("worst at station {station} mm", station=say.number(worst["station_mm"], ".2f"))
     if one["verdict"] != "conform":
         yield from (say.sentence(reason["words"]) for reason in one["reasons"][:2])
-    yield from one["notes"][:2]
+    yield from one["notes"]
 
 
 def stretches_part(report: ReportInput, content: PictureContent | None, say: Speech, width: float) -> list[Flowable]:

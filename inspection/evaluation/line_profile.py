@@ -92,7 +92,7 @@ def judge_whole(asked: WholeProfile, basis: Basis) -> CharacteristicResult:
         reasons=result.reasons,
         worst=place,
         fit=result.fit if basis.terms.known_pose is None else "datum" if basis.terms.datum is not None else "none",
-        weights=result.weights,
+        weights="none" if result.fit == "minimum-zone" else result.weights,
         region_words="whole profile",
         zone_words=zone_words(zone.lower_mm, zone.upper_mm),
         pose=result.registration.nominal_from_section,

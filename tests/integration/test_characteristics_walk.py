@@ -187,9 +187,79 @@ def test_the_line_profiles_are_found_again(walk: Walk) -> None:
         return np.interp(s, at, [-0.04, -0.06, -0.04, -0.03, -0.04]), np.interp(s, at, [0.04, 0.04, 0.05, 0.03, 0.04])
 
     assert walk.found("varying")["consumption"] == pytest.approx(smallest_largest(polygon, actual, limits)[0], abs=2e-5)
-    flank = off[walk.in_region("flank")]
+    flank = off[walk.in_region("flank")] + 0.01  # 0.05 of the zone's 0.12 lie out of material, so that its middle is 0.01 inside
     assert walk.found("flank")["value"] == pytest.approx(2 * np.abs(flank).max(), abs=2e-6)
+    assert walk.found("flank")["zone"] == "0.12 UZ -0.01; 0.12 (U) 0.05"
+    assert (walk.found("flank")["lower"], walk.found("flank")["upper"]) == (-0.07, 0.05)
     assert walk.found("location")["value"] == pytest.approx(2 * np.abs(polygon.distances(walk.at_datum)[0]).max(), abs=2e-6)
+
+
+LIMITS = {"contour": (-0.05, 0.05), "LE form": (-0.02, 0.04), "flank": (-0.07, 0.05), "location": (-0.09, 0.09)}
+
+
+@pytest.mark.parametrize("name", [*LIMITS, "varying"])
+def test_every_number_of_a_line_profile_is_that_of_its_points_at_its_pose(walk: Walk, name: str) -> None:
+    """The points as they were measured, brought to the pose that stands in the result: worst point, value, limits and share of the zone."""
+    found, pose = walk.found(name), walk.found(name)["pose"]
+    places = turned(np.load(walk.folder / "points.npy"), pose["rotation_deg"]) + np.array(pose["translation_mm"])
+    e, _, s = walk.polygon.distances(places)
+    at = [0, 60, 120, 180, walk.polygon.length]
+    low = np.interp(s, at, [-0.04, -0.06, -0.04, -0.03, -0.04]) if name == "varying" else np.full(len(s), LIMITS[name][0])
+    high = np.interp(s, at, [0.04, 0.04, 0.05, 0.03, 0.04]) if name == "varying" else np.full(len(s), LIMITS[name][1])
+    inside = walk.in_region(name) if found["region"] else np.ones(len(s), dtype=bool)
+    share = np.where(inside, np.abs(2 * e - low - high) / (high - low), -1.0)
+    k = int(np.argmin(np.hypot(*(places - [found["worst"]["x_mm"], found["worst"]["y_mm"]]).T)))
+    assert share[k] == pytest.approx(share.max(), abs=1e-5)  # of points that hold a zone, any may be told
+    assert found["consumption"] == pytest.approx(share.max(), abs=5e-5)  # of a zone of 0.06 mm that is 1.5 um
+    told = [found[key] for key in ("deviation", "lower", "upper", "value")]
+    width = 2 * np.abs(e - (low + high) / 2)[inside].max()
+    assert told == pytest.approx([e[k], low[k], high[k], width], abs=2e-6)
+    worst = [found["worst"][key] for key in ("deviation_mm", "station_mm", "x_mm", "y_mm")]
+    assert worst == pytest.approx([e[k], s[k], *places[k]], abs=2e-5)
+    assert found["verdict"] == ("conform" if share.max() <= 1 else "nonconform")
+    stations = np.sort(s)
+    longest = max(np.diff(stations).max(), stations[0] + walk.polygon.length - stations[-1])
+    assert found["largest_gap_mm"] <= longest + 1e-4
+    assert found["coverage"] == pytest.approx(1.0)
+
+
+def test_what_the_longest_gap_could_hide_is_how_far_the_curve_stands_off_it(walk: Walk) -> None:
+    """The gap is at the nose, shorter than the samples of the nominal are apart, and hides a flat all the same."""
+    gap, polygon = walk.facts["largest_gap"], walk.polygon
+    stations = np.sort(walk.rows["station_mm"])
+    k = int(np.diff(stations).argmax())
+    assert [gap["from_mm"], gap["to_mm"]] == pytest.approx(stations[k : k + 2].tolist(), abs=2e-6)
+    arc = polygon.points[(polygon.station >= gap["from_mm"]) & (polygon.station <= gap["to_mm"])]
+    across = (arc[-1] - arc[0]) / np.hypot(*(arc[-1] - arc[0]))
+    off = np.abs((arc - arc[0]) @ np.array([-across[1], across[0]])).max()
+    assert off > 1e-3
+    assert gap["could_hide_mm"] == pytest.approx(off, rel=0.1)
+
+
+@pytest.mark.parametrize("name", ["contour", "varying"])
+def test_the_points_of_a_certificate_are_those_of_the_csv_and_balance(walk: Walk, name: str) -> None:
+    """No small motion lowers all of them: the rates of what each consumes, by differences, cancel with its multipliers."""
+    proof, measured = walk.found(name)["certificate"], np.load(walk.folder / "points.npy")
+    active = measured[[point["index"] for point in proof["active"]]]
+    assert [(point["x_mm"], point["y_mm"]) for point in proof["active"]] == [tuple(place) for place in active.tolist()]
+    assert f"held by points (index) {proof['active'][0]['index']} (" in proof["words"]
+    places = turned(active, proof["pose"]["rotation_deg"]) + np.array(proof["pose"]["translation_mm"])
+    at = [0, 60, 120, 180, walk.polygon.length]
+
+    def consumed(motion: Array) -> Array:
+        e, _, s = walk.polygon.distances(moved(places, motion))
+        if name == "contour":
+            return e
+        low, high = np.interp(s, at, [-0.04, -0.06, -0.04, -0.03, -0.04]), np.interp(s, at, [0.04, 0.04, 0.05, 0.03, 0.04])
+        return np.asarray((2 * e - low - high) / (high - low))
+
+    here, share = consumed(np.zeros(3)), np.array([point["multiplier"] for point in proof["active"]])
+    assert np.abs(here) == pytest.approx(proof["consumption"] or proof["zone_mm"] / 2, abs=2e-6)
+    assert share.sum() == pytest.approx(1.0)
+    assert (share > 0).all()
+    rates = [(consumed(step) - consumed(-step)) / 2e-3 for step in 1e-3 * np.eye(3)]
+    left = [float((share * np.sign(here)) @ rate) / np.abs(rate).max() for rate in rates]
+    assert left == pytest.approx([0, 0, 0], abs=2e-3)
 
 
 def test_the_form_of_a_region_is_found_again_by_least_squares_of_its_own(walk: Walk) -> None:
@@ -201,7 +271,7 @@ def test_the_form_of_a_region_is_found_again_by_least_squares_of_its_own(walk: W
     found = walk.found("LE form")
     assert found["value"] == pytest.approx(2 * np.abs(e - 0.01).max(), abs=1e-4)
     assert found["zone"] == "0.06 UZ +0.01; 0.06 (U) 0.04"
-    assert (found["lower"], found["upper"]) == (pytest.approx(-0.02), pytest.approx(0.04))
+    assert (found["lower"], found["upper"]) == (-0.02, 0.04)
 
 
 def test_a_filtered_profile_is_found_again_by_sums_of_its_own(walk: Walk) -> None:
