@@ -17,9 +17,14 @@ def zone_document(result: Mapping[str, Any], profile: NominalProfile) -> dict[st
     ]
     if not zones:
         return None
+    return {"nominal": nominal_document(profile), "zones": zones}
+
+
+def nominal_document(profile: NominalProfile) -> dict[str, Any]:
+    """The curve of a nominal as JSON holds it, exactly, and the side of it on which the material lies."""
     curve = profile.curve
     weights = curve.weights if curve.weights is not None else [1.0] * len(curve.control_points_mm)
-    nominal = {
+    return {
         "degree": curve.degree,
         "knots": [float(knot) for knot in curve.knots],
         "control_points_mm": [[float(x), float(y)] for x, y in curve.control_points_mm],
@@ -27,4 +32,3 @@ def zone_document(result: Mapping[str, Any], profile: NominalProfile) -> dict[st
         "closed": curve.closed,
         "material": profile.material,
     }
-    return {"nominal": nominal, "zones": zones}

@@ -10,12 +10,13 @@ import numpy as np
 from cmmlink.deviations_csv import write_deviations
 from cmmlink.errors import PlanError
 from cmmlink.record.bodies import unpack_judged
+from cmmlink.record.chain import GENESIS
 from cmmlink.record.reader import arrivals_of, describe, event_document, points_of, reads_of, recorded_run
 from cmmlink.record.replay import recorded_plan, recorded_profile
 from cmmlink.record.shapes import plain_name
 from cmmlink.record.store import Store
 from cmmlink.result_files import NewFiles, new_files
-from cmmlink.zone_file import zone_document
+from cmmlink.zone_file import nominal_document, zone_document
 
 POINT_COLUMNS = {
     "sequence": "the device's own counter of the point, unwrapped",
@@ -30,13 +31,24 @@ WIRE_COLUMNS = {
     "bytes": "how many they are",
 }
 
+CHAIN_COLUMNS = {
+    "number": "the place of the record in the station's chain",
+    "kind": "what it holds, like plan, points or result",
+    "time_s": "when it was written, in seconds since 1970 UTC",
+    "count": "how many reads, points or events it holds; 1 for a document",
+    "bytes": "how long its body is; the bodies lie one behind the other in records.bin",
+    "previous_sha256": "the hash of the record before it",
+    "sha256": "its own hash, over all that and its body",
+}
+
 
 def export_run(store: Store, run: str, folder: Path) -> list[Path]:
     """Write a run to a folder. Returns the files written; raises PlanError when the folder cannot be written.
 
     run.json: all but the points; events.json; points.csv and points.npy (m, 5): sequence, time_s, x, y, z in mm;
     wire.bin, the bytes as they arrived, and wire.csv, when; plan.yaml; the nominal's file; of a run with a result
-    deviations.csv and result.json, and zone.json where it has a certificate.
+    deviations.csv and result.json, and zone.json where it has a certificate. nominal.json is the curve that was made of the nominal's
+    file; records.bin, the records as they are hashed, and chain.csv, their hashes, are what somebody else recomputes the chain from.
     """
     try:
         with new_files(folder) as files:
@@ -44,6 +56,7 @@ def export_run(store: Store, run: str, folder: Path) -> list[Path]:
             _points(store, run, files)
             _wire(store, run, files)
             _result(store, run, files)
+            _chain(store, run, files)
         return [folder / name for name in files.names]
     except OSError as error:
         raise PlanError(f"{folder}: the run cannot be written there ({error.strerror}); choose another folder with --out") from None
@@ -87,13 +100,28 @@ def _result(store: Store, run: str, files: NewFiles) -> None:
     if recorded.result is None or recorded.end is None:
         return
     ending = str(recorded.end["state"])
+    profile = recorded_profile(recorded_plan(recorded), recorded)
+    _json(files("nominal.json"), nominal_document(profile))
     blocks = (unpack_judged(record.body) for record in store.records(run, "deviations"))
     write_deviations(blocks, files("deviations.csv"), ending)
     if any(one["certificate"] for one in recorded.result.get("characteristics", ())):
-        zones = zone_document(recorded.result, recorded_profile(recorded_plan(recorded), recorded))
+        zones = zone_document(recorded.result, profile)
         if zones is not None:
             _json(files("zone.json"), zones)
     _json(files("result.json"), recorded.result | ({} if ending == "complete" else {"ending": ending}))
+
+
+def _chain(store: Store, run: str, files: NewFiles) -> None:
+    bodies_path, table_path = files.together("records.bin", "chain.csv")
+    with bodies_path.open("wb") as bodies, table_path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(CHAIN_COLUMNS)
+        for record in store.records(run):
+            before = store.record_at(record.number - 1)
+            previous = before.sha256 if before is not None else GENESIS
+            bodies.write(record.body)
+            place = (record.number, record.kind, repr(record.time_s), record.count, len(record.body))
+            writer.writerow((*place, previous.hex(), record.sha256.hex()))
 
 
 def _json(path: Path, document: Any) -> None:
