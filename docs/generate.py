@@ -174,6 +174,7 @@ TABLES: tuple[tuple[str, Mapping[str, str]], ...] = (
     ("Points in them: a line for every received point", tables.POINT_COLUMNS),
     ("`points.csv` and `points.npy` of `export`: a line for every point", export.POINT_COLUMNS),
     ("`wire.csv` of `export`: a line for every read", export.WIRE_COLUMNS),
+    ("`chain.csv` of `export`: a line for every record", export.CHAIN_COLUMNS),
 )
 
 

@@ -2,13 +2,14 @@
 
 import csv
 import json
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cmmlink.deviations_csv import write_deviations
-from cmmlink.errors import PlanError
+from cmmlink.errors import PlanError, StoreError
 from cmmlink.record.bodies import unpack_judged
 from cmmlink.record.chain import GENESIS
 from cmmlink.record.reader import arrivals_of, describe, event_document, points_of, reads_of, recorded_run
@@ -100,11 +101,11 @@ def _result(store: Store, run: str, files: NewFiles) -> None:
     if recorded.result is None or recorded.end is None:
         return
     ending = str(recorded.end["state"])
-    profile = recorded_profile(recorded_plan(recorded), recorded)
-    _json(files("nominal.json"), nominal_document(profile))
     blocks = (unpack_judged(record.body) for record in store.records(run, "deviations"))
     write_deviations(blocks, files("deviations.csv"), ending)
-    if any(one["certificate"] for one in recorded.result.get("characteristics", ())):
+    with suppress(PlanError, StoreError):  # of what cannot be read there is no curve; the rest of the evidence is written all the same
+        profile = recorded_profile(recorded_plan(recorded), recorded)
+        _json(files("nominal.json"), nominal_document(profile))
         zones = zone_document(recorded.result, profile)
         if zones is not None:
             _json(files("zone.json"), zones)
@@ -119,6 +120,8 @@ def _chain(store: Store, run: str, files: NewFiles) -> None:
         for record in store.records(run):
             before = store.record_at(record.number - 1)
             previous = before.sha256 if before is not None else GENESIS
+            if not (isinstance(previous, bytes) and isinstance(record.sha256, bytes)):  # a column may hold anything once a file was altered
+                raise StoreError(f"record {record.number} has no hash: it was altered. Run cmmlink verify, which names what was")
             bodies.write(record.body)
             place = (record.number, record.kind, repr(record.time_s), record.count, len(record.body))
             writer.writerow((*place, previous.hex(), record.sha256.hex()))

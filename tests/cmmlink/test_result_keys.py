@@ -13,7 +13,7 @@ from pydantic import BaseModel
 from cmmlink import comparison_keys, inspection_keys, record_keys, result_keys
 from cmmlink.deviations_csv import COLUMNS
 from cmmlink.plan.reference import groups_of
-from cmmlink.record.export import POINT_COLUMNS, WIRE_COLUMNS
+from cmmlink.record.export import CHAIN_COLUMNS, POINT_COLUMNS, WIRE_COLUMNS
 from cmmlink.report.stack_folder import CONTOUR_COLUMNS, SECTION_COLUMNS
 from cmmlink.result_keys import (
     Exported,
@@ -103,7 +103,8 @@ def test_records(folder: Path) -> None:
     written = printed(Exported, "export", first, "--out", folder / "exported", *records)["files"]
     assert Path(printed(Reported, "report", first, "-o", folder / "a.pdf", *records)["file"]).read_bytes().startswith(b"%PDF")
     tables = {Path(name).name: header_of(Path(name)) for name in written if name.endswith(".csv") and "nominal" not in name}
-    assert tables == {"points.csv": list(POINT_COLUMNS), "wire.csv": list(WIRE_COLUMNS), "deviations.csv": list(COLUMNS)}
+    columns = {"points.csv": POINT_COLUMNS, "wire.csv": WIRE_COLUMNS, "chain.csv": CHAIN_COLUMNS, "deviations.csv": COLUMNS}
+    assert tables == {name: list(keys) for name, keys in columns.items()}
     Shown.model_validate_json((folder / "exported" / "run.json").read_bytes())
     Inspected.model_validate_json((folder / "exported" / "result.json").read_bytes())
 

@@ -1,0 +1,270 @@
+"""The verifier of docs/verify: it derives sound runs anew, and finds every alteration, with the chain computed anew or not."""
+
+import csv
+import hashlib
+import json
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from docs.verify import verify
+from tests.cmmlink.command import cmmlink
+
+GENESIS = "00" * 32
+
+
+@dataclass
+class Evidence:
+    """An exported run whose records can be altered, and hashed anew as somebody would who knows how."""
+
+    folder: Path
+    rows: list[dict[str, str]] = field(default_factory=list)
+    bodies: list[bytes] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        data, offset = (self.folder / "records.bin").read_bytes(), 0
+        with (self.folder / "chain.csv").open(newline="") as file:
+            self.rows = list(csv.DictReader(file))
+        for row in self.rows:
+            self.bodies.append(data[offset : offset + int(row["bytes"])])
+            offset += int(row["bytes"])
+
+    @property
+    def head(self) -> str:
+        return next(row["sha256"] for row in self.rows if row["kind"] == "end")
+
+    def body(self, kind: str) -> bytes:
+        return next(body for row, body in zip(self.rows, self.bodies, strict=True) if row["kind"] == kind)
+
+    def replace(self, kind: str, body: bytes) -> None:
+        """Exchange the first body of a kind, and compute the whole chain anew."""
+        at = next(k for k, row in enumerate(self.rows) if row["kind"] == kind)
+        self.bodies[at] = body
+        run, previous = json.loads(self.body("run"))["run"], self.rows[0]["previous_sha256"]
+        for row, one in zip(self.rows, self.bodies, strict=True):
+            row["bytes"], row["previous_sha256"] = str(len(one)), previous
+            head = f"{row['number']}\n{run}\n{row['kind']}\n{row['time_s']}\n{row['count']}\n{len(one)}\n".encode()
+            previous = row["sha256"] = hashlib.sha256(bytes.fromhex(previous) + head + one).hexdigest()
+        self.write()
+
+    def write(self) -> None:
+        (self.folder / "records.bin").write_bytes(b"".join(self.bodies))
+        with (self.folder / "chain.csv").open("w", newline="") as file:
+            writer = csv.DictWriter(file, list(self.rows[0]))
+            writer.writeheader()
+            writer.writerows(self.rows)
+
+    def set_result(self, **values: Any) -> None:
+        """Write another result, into the records and into the file that people read."""
+        result = json.loads(self.body("result")) | values
+        self.replace("result", json.dumps(result).encode())
+        (self.folder / "result.json").write_text(json.dumps(result))
+
+    def set_plan(self, old: str, new: str) -> None:
+        text = self.body("plan").decode()
+        assert old in text
+        self.replace("plan", text.replace(old, new).encode())
+        (self.folder / "plan.yaml").write_text(text.replace(old, new), newline="")
+
+    def move(self, kind: str, place: int, change: float) -> None:
+        """Add to one number of a body of doubles."""
+        body = bytearray(self.body(kind))
+        body[8 * place : 8 * place + 8] = (np.frombuffer(body, "<f8", 1, 8 * place) + change).tobytes()
+        self.replace(kind, bytes(body))
+
+
+def run_and_export(folder: Path, points: str, tolerance_mm: float, more: str = "") -> Evidence:
+    assert cmmlink("example", folder / "example").code == 0
+    example = folder / "example"
+    lines = (example / points).read_text().splitlines()
+    (example / "few.csv").write_text("\n".join(lines[:1] + lines[1::5]) + "\n")
+    (example / "few.yaml").write_text(
+        f"part: {{name: blade}}\nnominal: {{file: blade.dat, scale: 100}}\nrecords: kept\nprobe: {{tip_radius_mm: 1}}\n"
+        f"device: {{type: file, file: few.csv}}\ntolerance: {{lower_mm: -{tolerance_mm}, upper_mm: {tolerance_mm}}}\n{more}"
+    )
+    assert cmmlink("run", example / "few.yaml", "--headless").code in (0, 1, 3)
+    assert cmmlink("export", "last", "--records", example / "kept", "--out", folder / "evidence").code == 0
+    return Evidence(folder / "evidence")
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory: pytest.TempPathFactory) -> Evidence:
+    return run_and_export(tmp_path_factory.mktemp("sound"), "points.csv", 0.05)
+
+
+@pytest.fixture(scope="module")
+def bad(tmp_path_factory: pytest.TempPathFactory) -> Evidence:
+    return run_and_export(tmp_path_factory.mktemp("bad"), "points-bad.csv", 0.03)
+
+
+@pytest.fixture
+def altered(sound: Evidence, tmp_path: Path) -> Evidence:
+    return Evidence(Path(shutil.copytree(sound.folder, tmp_path / "evidence")))
+
+
+def test_a_sound_run_is_proved_with_python_and_numpy_alone(sound: Evidence) -> None:
+    command = [sys.executable, "-I", verify.__file__, str(sound.folder), "--head", sound.head]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "Proved: CONFORM follows." in done.stdout
+    assert "Not checked" not in done.stdout
+    lines = Path(verify.__file__).read_text().splitlines()
+    assert len(lines) <= 400
+    assert {line.split()[1] for line in lines if line.startswith(("import ", "from "))} == {
+        "csv", "hashlib", "json", "math", "sys", "pathlib", "typing", "numpy",
+    }  # fmt: skip
+
+
+def test_a_part_that_fails_is_refuted_in_every_placement(bad: Evidence) -> None:
+    assert json.loads(bad.body("result"))["verdict"] == "nonconform"
+    assert "NOT CONFORM follows: no placement passes." in verify.check(bad.folder, bad.head)["Proved"]
+
+
+def test_a_part_that_passes_is_not_refuted(altered: Evidence) -> None:
+    result = json.loads(altered.body("result"))
+    result["characteristics"] = [one | {"verdict": "nonconform"} for one in result["characteristics"]]
+    altered.set_result(**result | {"verdict": "nonconform"})
+    assert any("no placement passes" in sentence for sentence in verify.check(altered.folder)["NOT TRUE"])
+
+
+def with_file(name: str, change: Callable[[bytes], bytes]) -> Callable[[Evidence], None]:
+    def alter(evidence: Evidence) -> None:
+        path = next(evidence.folder.glob(name))
+        before = path.read_bytes()
+        path.write_bytes(change(before))
+        assert path.read_bytes() != before
+
+    return alter
+
+
+def with_nominal(change: Callable[[dict[str, Any]], object]) -> Callable[[Evidence], None]:
+    def alter(evidence: Evidence) -> None:
+        nominal = json.loads((evidence.folder / "nominal.json").read_text())
+        change(nominal)
+        (evidence.folder / "nominal.json").write_text(json.dumps(nominal))
+
+    return alter
+
+
+def with_result(**values: Any) -> Callable[[Evidence], None]:
+    return lambda evidence: evidence.set_result(**values)
+
+
+def turn(evidence: Evidence) -> None:
+    pose = json.loads(evidence.body("result"))["registration"]
+    evidence.set_result(registration=pose | {"rotation_deg": pose["rotation_deg"] + 1e-6})
+
+
+def leave_out_a_point(evidence: Evidence) -> None:
+    rows = np.frombuffer(evidence.body("points"), "<f8").copy()
+    n = len(rows) // 5
+    kept = np.arange(n) != 7
+    parts = [rows[:n][kept], rows[n : 2 * n][kept], rows[2 * n :].reshape(n, 3)[kept].ravel()]
+    evidence.replace("points", np.concatenate(parts).tobytes())
+
+
+def reject_a_point(evidence: Evidence) -> None:
+    body = bytearray(evidence.body("deviations"))
+    body[-1] = 1
+    evidence.replace("deviations", bytes(body))
+
+
+def cut_off(evidence: Evidence) -> None:
+    evidence.rows.pop()
+    evidence.bodies.pop()
+    evidence.write()
+
+
+def leave_out_a_record(evidence: Evidence) -> None:
+    at = next(k for k, row in enumerate(evidence.rows) if row["kind"] == "events")
+    del evidence.rows[at], evidence.bodies[at]
+    evidence.write()
+
+
+def with_row(**values: str) -> Callable[[Evidence], None]:
+    def alter(evidence: Evidence) -> None:
+        evidence.rows[3] |= values
+        evidence.write()
+
+    return alter
+
+
+def widen_everything(evidence: Evidence) -> None:
+    result = json.loads(evidence.body("result"))
+    evidence.set_plan("upper_mm: 0.05", "upper_mm: 0.08")
+    evidence.set_result(tolerance=result["tolerance"] | {"upper_mm": 0.08})
+
+
+ALTERATIONS: dict[str, Callable[[Evidence], None]] = {
+    "a byte of the records": with_file("records.bin", lambda data: data[:-9] + bytes([data[-9] ^ 1]) + data[-8:]),
+    "bytes behind the records": with_file("records.bin", lambda data: data + b"x"),
+    "a hash": with_row(sha256="11" * 32),
+    "the hash before it": with_row(previous_sha256="11" * 32),
+    "the time of a record": with_row(time_s="1.0"),
+    "the kind of a record": with_row(kind="events"),
+    "the count of a record": with_row(count="17"),
+    "a run that is cut off": cut_off,
+    "a record left out": leave_out_a_record,
+    "the plan's file": with_file("plan.yaml", lambda data: data.replace(b"0.05", b"0.08")),
+    "the nominal's file": with_file("nominal-*", lambda data: data.replace(b"1.000465277", b"1.000465278")),
+    "the result's file": with_file("result.json", lambda data: data.replace(b'"lost": 0', b'"lost": 1')),
+    "a control point by a micrometre": with_nominal(lambda nominal: nominal["control_points_mm"][9].__setitem__(0, 90.0)),
+    "a knot": with_nominal(lambda nominal: nominal["knots"].__setitem__(99, nominal["knots"][99] + 1e-4)),
+    "a weight": with_nominal(lambda nominal: nominal["weights"].__setitem__(40, 1.01)),
+    "the side of the material": with_nominal(lambda nominal: nominal.__setitem__("material", "right")),
+    "a point by a micrometre, chain anew": lambda evidence: evidence.move("points", 700, 1e-3),
+    "a deviation by a micrometre, chain anew": lambda evidence: evidence.move("deviations", 5 * 300 + 9, 1e-3),
+    "a station, chain anew": lambda evidence: evidence.move("deviations", 4 * 300 + 9, 1e-3),
+    "a place, chain anew": lambda evidence: evidence.move("deviations", 9, 1e-3),
+    "a point left out, chain anew": leave_out_a_point,
+    "a point rejected, chain anew": reject_a_point,
+    "the verdict, chain anew": with_result(verdict="uncertain"),
+    "the verdict of all, chain anew": lambda evidence: evidence.set_result(
+        verdict="uncertain",
+        characteristics=[one | {"verdict": "uncertain"} for one in json.loads(evidence.body("result"))["characteristics"]],
+    ),
+    "the largest deviation, chain anew": with_result(max_deviation_mm=0.001),
+    "the smallest deviation, chain anew": with_result(min_deviation_mm=-0.001),
+    "the points out, chain anew": with_result(out_of_tolerance=2),
+    "the coverage, chain anew": with_result(coverage=0.97),
+    "the longest gap, chain anew": with_result(largest_gap_mm=0.5),
+    "the count, chain anew": with_result(received=301),
+    "lost points, chain anew": with_result(lost=3),
+    "a scan without its end, chain anew": with_result(complete=False),
+    "the angle, chain anew": turn,
+    "the plan's limits, chain anew": lambda evidence: evidence.set_plan("upper_mm: 0.05", "upper_mm: 0.08"),
+    "the limits that were applied, chain anew": with_result(
+        tolerance={"lower_mm": -0.05, "upper_mm": 0.08, "uncertainty_mm": 0.0, "decision_rule": ""}
+    ),
+    "the tip, chain anew": lambda evidence: evidence.set_plan("tip_radius_mm: 1.0", "tip_radius_mm: 1.001"),
+    "the section, chain anew": lambda evidence: evidence.set_plan("  x_axis:\n  - 1.0\n  - 0.0", "  x_axis:\n  - 1.0\n  - 0.001"),
+}
+
+
+@pytest.mark.parametrize("name", ALTERATIONS)
+def test_an_alteration_is_found(altered: Evidence, name: str) -> None:
+    head = altered.head
+    ALTERATIONS[name](altered)
+    findings = verify.check(altered.folder, None if "anew" in name else head)
+    assert "NOT TRUE" in findings, findings
+
+
+def test_what_was_written_anew_as_a_whole_is_found_by_the_hash_that_was_kept_elsewhere(altered: Evidence) -> None:
+    head = altered.head
+    widen_everything(altered)
+    assert "NOT TRUE" not in verify.check(altered.folder)
+    assert [sentence for sentence in verify.check(altered.folder, head)["NOT TRUE"] if "kept elsewhere" in sentence]
+
+
+@pytest.mark.parametrize("name", ["records.bin", "chain.csv", "nominal.json", "plan.yaml", "result.json", "run.json"])
+def test_evidence_that_cannot_be_read_is_said_to_be_so(altered: Evidence, name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    (altered.folder / name).unlink()
+    assert verify.main([str(altered.folder)]) == 2
+    assert capsys.readouterr().out.startswith("The evidence cannot be read: ")
