@@ -103,7 +103,7 @@ def _result(store: Store, run: str, files: NewFiles) -> None:
     ending = str(recorded.end["state"])
     blocks = (unpack_judged(record.body) for record in store.records(run, "deviations"))
     write_deviations(blocks, files("deviations.csv"), ending)
-    with suppress(PlanError, StoreError):  # of what cannot be read there is no curve; the rest of the evidence is written all the same
+    with suppress(ValueError, StoreError):  # a plan or nominal that cannot be read has no curve; all else is written all the same
         profile = recorded_profile(recorded_plan(recorded), recorded)
         _json(files("nominal.json"), nominal_document(profile))
         zones = zone_document(recorded.result, profile)
