@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from cmmlink.errors import PlanError
-from cmmlink.plan import Device, DmeDevice, FileDevice, ModbusDevice, Plan, SerialDevice, map_of
+from cmmlink.line_sample import check_existing, line_decoder
+from cmmlink.plan import Device, DmeDevice, FileDevice, LinesDevice, ModbusDevice, Plan, SerialDevice, map_of
 from cmmlink.scratch import Scratch, scratch_in
 from drivers import DME_UNSEEN, Decoder, PointFileSource, RegisterDecoder, RegisterSurvey, ScanSource, decoder, unseen_in
 from drivers.links.axis import Beam, ConstantFeed, FollowedAxis
@@ -55,6 +56,10 @@ def notes_on(device: Device) -> Iterator[str]:
     if isinstance(device, DmeDevice):
         yield DME_UNSEEN
         return
+    if isinstance(device, LinesDevice):
+        yield from (f"{device.format.name}: {words}" for words in unseen_in(device.format.name))
+        yield f"the lines are taken to be in {'inches' if device.unit == 'inch' else 'millimetres'}, as the plan says (device.unit)"
+        return
     if isinstance(device, SerialDevice):
         yield from (f"{device.format}: {words}" for words in unseen_in(device.format))
     elif not (registers := map_of(device.map)).counts_points:
@@ -67,7 +72,11 @@ def notes_on(device: Device) -> Iterator[str]:
 
 def words_of(device: Device) -> str:
     """How results, records and pages call a device."""
-    return f"file {device.file.name}" if isinstance(device, FileDevice) else f"{device.type} {device.address}"
+    if isinstance(device, FileDevice):
+        return f"file {device.file.name}"
+    if isinstance(device, LinesDevice) and device.file is not None:
+        return f"lines of {device.file.name}"
+    return f"{device.type} {device.address}"
 
 
 def source_of(plan: Plan, scratch: Scratch | None = None) -> ScanSource:
@@ -77,16 +86,21 @@ def source_of(plan: Plan, scratch: Scratch | None = None) -> ScanSource:
         room = scratch or scratch_in(plan.records)
         return PointFileSource(device.file, device.scale, unit=device.unit, columns=device.columns, invalid=device.invalid, room=room)
     try:
+        if isinstance(device, LinesDevice):
+            return _machine_tool(plan, device)
         return _machine(plan, device) if isinstance(device, DmeDevice) else _source_with_axis(device)
     except ValueError as error:
         raise PlanError(f"device: {error}") from None
 
 
-def decoder_of(device: Device) -> Decoder | None:
-    """The decoder of what a device sends. None where the points themselves are recorded.
+def decoder_of(plan: Plan) -> Decoder | None:
+    """The decoder of what the device of a plan sends. None where the points themselves are recorded.
 
     That is so for files and for devices on an axis, and for machines: what their answers mean depends on what they were asked.
     """
+    device = plan.device
+    if isinstance(device, LinesDevice):
+        return line_decoder(device, plan.probe.tip_radius_mm, device.parity_in_bytes)
     return None if isinstance(device, FileDevice | DmeDevice) or device.axis is not None else _decoder(device)
 
 
@@ -112,6 +126,22 @@ def _source_with_axis(device: SerialDevice | ModbusDevice) -> ScanSource:
         return FollowedAxis(source, _link(axis.follow), beam)
     assert axis.feed_mm_s is not None
     return ConstantFeed(source, beam, axis.feed_mm_s)
+
+
+def _machine_tool(plan: Plan, device: LinesDevice) -> ScanSource:
+    """The source of a machine tool's lines. A port is opened with eight data bits where it has seven: its parity is checked with them."""
+    from drivers.links.growing_file import GrowingFile  # noqa: PLC0415 - for those who have one
+    from drivers.links.listener import Listener  # noqa: PLC0415 - likewise
+    from drivers.links.serial_scanner import SerialScanner  # noqa: PLC0415 - it loads pyserial
+
+    checked = device.parity_in_bytes
+    settings = LinkSettings(device.baud_rate, "N" if checked else device.parity, device.silence_s, device.reconnect_s)
+    made = line_decoder(device, plan.probe.tip_radius_mm, checked)
+    if device.file is not None:
+        check_existing(device)
+        return SerialScanner(GrowingFile(device.file, existing=device.existing), made, settings)
+    assert device.address is not None
+    return SerialScanner(Listener(device.address) if device.listen else device.address, made, settings)
 
 
 def _machine(plan: Plan, device: DmeDevice) -> ScanSource:

@@ -13,8 +13,9 @@ import numpy as np
 from cmmlink.characteristics import Builder, base_of, known_pose, pose_of
 from cmmlink.errors import PlanError
 from cmmlink.events import RunStarted
+from cmmlink.line_sample import check_sample
 from cmmlink.nominal_files import NominalFile, load_nominal, material_side
-from cmmlink.plan import CtPlan, Discretisation, Nominal, Plan, Section, place_of
+from cmmlink.plan import CtPlan, Discretisation, LinesDevice, Nominal, Plan, Section, place_of
 from drivers import PointFileError, read_bytes
 from inspection import (
     Characteristic,
@@ -53,6 +54,8 @@ def find_problems(plan: Plan, plan_file: Path) -> tuple[NominalProfile | None, t
     """The profile of a plan, and everything that is wrong with the values that depend on it, each with file, line and key."""
     found = Problems(plan_file)
     profile = found.attempt("nominal.file", lambda: profile_of(plan))
+    if isinstance(plan.device, LinesDevice):
+        found.attempt("device.format.sample", partial(check_sample, plan.device, plan.probe.tip_radius_mm))
     found.attempt("temperature" if plan.temperature is not None else "uncertainty.temperature", lambda: check_fixed_place(plan))
     if profile is not None:
         found.attempt("uncertainty", lambda: zone_of(plan, profile))

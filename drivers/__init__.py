@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from drivers.files.row_reading import shorten
     from drivers.files.stated_units import UnitName, mm_per
     from drivers.files.text_table import Columns, count_of, numbers_of, parse_columns, read_bytes, read_text
-    from drivers.links.address import device_address
+    from drivers.links.address import HostPort, device_address
     from drivers.links.capture import Capture
     from drivers.maps import shipped_map, shipped_maps
     from drivers.source import (
@@ -79,7 +79,7 @@ else:
         "drivers.files.row_reading": ("shorten",),
         "drivers.files.stated_units": ("UnitName", "mm_per"),
         "drivers.files.text_table": ("Columns", "count_of", "numbers_of", "parse_columns", "read_bytes", "read_text"),
-        "drivers.links.address": ("device_address",),
+        "drivers.links.address": ("HostPort", "device_address"),
         "drivers.links.capture": ("Capture",),
         "drivers.maps": ("shipped_map", "shipped_maps"),
         "drivers.source": (
@@ -126,6 +126,7 @@ __all__ = [
     "DeviceRefused",
     "DmeJob",
     "Heartbeat",
+    "HostPort",
     "LinkDown",
     "LinkError",
     "LinkUp",

@@ -1,4 +1,7 @@
-"""The line a simulated device is reached on: a pseudo-terminal (POSIX) or a TCP server (any system), one client at a time."""
+"""The line a simulated device is reached on: a pseudo-terminal (POSIX) or a TCP server (any system), one client at a time.
+
+Controls of machine tools can do more: connect to whoever listens, or write into a file.
+"""
 
 import os
 import select
@@ -6,6 +9,7 @@ import socket
 import sys
 import tempfile
 import time
+from pathlib import Path
 from typing import Protocol
 
 if sys.platform != "win32":
@@ -18,6 +22,7 @@ class Line(Protocol):
     """Bytes to and from the client, if there is one; what is sent without a client is gone, as on a real line."""
 
     address: str
+    is_read_live: bool  # whether the client has to be there still when the last bytes are sent
 
     def is_connected(self) -> bool:
         """Take a new client if one is waiting, and tell whether there is one."""
@@ -45,6 +50,14 @@ def open_line(address: str) -> Line:
     return TcpLine(*host_and_port(address))
 
 
+def open_line_of_control(address: str) -> Line:
+    """Open `pty`, `host:port`, `to:host:port` for whoever listens there, or `file:PATH`."""
+    kind, _, rest = address.partition(":")
+    if kind == "file" and rest:
+        return FileLine(Path(rest))
+    return CallingLine(*host_and_port(rest)) if kind == "to" else open_line(address)
+
+
 def host_and_port(address: str) -> tuple[str, int]:
     """Take `host:port` apart. Raises ValueError where a host or a port is missing: none would serve every network."""
     host, _, port = address.rpartition(":")
@@ -55,6 +68,8 @@ def host_and_port(address: str) -> tuple[str, int]:
 
 class TcpLine:
     """A TCP server with one client."""
+
+    is_read_live = True
 
     def __init__(self, host: str, port: int) -> None:
         self._server = socket.create_server((host, port), backlog=1)
@@ -124,6 +139,8 @@ class PtyLine:
     The address is a link to the terminal of the moment, so that it can vanish and come back as a USB port does.
     """
 
+    is_read_live = True
+
     def __init__(self) -> None:
         if sys.platform == "win32":
             raise ValueError("pseudo-terminals exist on POSIX systems only; serve host:port instead")
@@ -185,3 +202,72 @@ class PtyLine:
         """Give up the address."""
         self.unplug()
         self._folder.cleanup()
+
+
+class CallingLine(TcpLine):
+    """A TCP client that calls until somebody answers. What was sent is on its way, so it may hang up when it has said all."""
+
+    is_read_live = False
+
+    def __init__(self, host: str, port: int) -> None:
+        self._client = None
+        self._host_port = (host, port)
+        self._may_call = True
+        self.address = f"{host}:{port}"
+
+    def is_connected(self) -> bool:
+        """Call if nobody has answered yet, and tell whether somebody did."""
+        if self._client is None and self._may_call:
+            try:
+                self._client = socket.create_connection(self._host_port, timeout=POLL_S)
+            except OSError:
+                return False
+            self._client.setblocking(False)
+        return self._client is not None
+
+    def unplug(self) -> None:
+        """Hang up, and call no more."""
+        self._drop()
+        self._may_call = False
+
+    def plug(self) -> None:
+        """Call again."""
+        self._may_call = True
+
+
+class FileLine:
+    """A file into which the control prints, line by line; it needs no client."""
+
+    is_read_live = False
+
+    def __init__(self, path: Path) -> None:
+        self._file = path.open("ab", buffering=0)
+        self._plugged = True
+        self.address = str(path)
+
+    def is_connected(self) -> bool:
+        """Nobody has to be there."""
+        return True
+
+    def send(self, data: bytes) -> bool:
+        """Write all, unless the disk is away."""
+        if self._plugged:
+            self._file.write(data)
+        return self._plugged
+
+    def receive(self, wait_s: float) -> bytes:
+        """Nobody says anything."""
+        time.sleep(wait_s)
+        return b""
+
+    def unplug(self) -> None:
+        """Take the disk away."""
+        self._plugged = False
+
+    def plug(self) -> None:
+        """Bring it back."""
+        self._plugged = True
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()

@@ -25,7 +25,7 @@ from pymodbus.server import ModbusSerialServer, ModbusTcpServer
 from pymodbus.server.base import ModbusBaseServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
-from simulators.faults import CATALOGUE, Injector
+from simulators.faults import Injector, refuse_others
 from simulators.line import PtyLine, host_and_port
 from simulators.motion import Walk, walk
 from simulators.settings import Announce, SimulatorSettings
@@ -83,9 +83,7 @@ Maker = Callable[[Walk, Injector, bool], RegisterDevice]
 
 def serve_registers(settings: SimulatorSettings, announce: Announce, make: Maker, move: Callable[..., Walk] = walk) -> None:
     """Serve one scan of a device made by `make(walk, injector, swapped)`."""
-    strange = [fault.name for fault in settings.faults if CATALOGUE[fault.name].dme_only]
-    if strange:
-        raise ValueError(f"fault {strange[0]!r} strikes measuring machines only")
+    refuse_others(settings.faults, "registers")
     logging.getLogger("pymodbus").addHandler(logging.NullHandler())
     asyncio.run(RegisterService(settings, announce, make, move(settings.path_mm, settings.motion)).run())
 

@@ -66,6 +66,9 @@ def settings_from(
         parser.error(str(error))
 
 
+_ADDRESS = "pty, or host:port (port 0: any free one); a machine tool takes to:host:port and file:PATH as well"
+
+
 class _OneLine(argparse.ArgumentParser):
     """A parser whose errors are one message, without the usage before it."""
 
@@ -82,7 +85,7 @@ def _parser(program: str | None, *, needs_path: bool) -> argparse.ArgumentParser
         epilog=f"faults, from point number POINT on (up to before STOP), with the value and its default:\n{faults}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--address", required=True, metavar="A", help="pty, or host:port (port 0: any free one)")
+    parser.add_argument("--address", required=True, metavar="A", help=_ADDRESS)
     usual = "" if needs_path else " [the section of the demonstration]"
     parser.add_argument("--path", required=needs_path, type=Path, metavar="POINTS", help=f"points of the path on the part, mm{usual}")
     parser.add_argument("--fault", action="append", default=[], metavar="NAME[:VALUE][@POINT[-STOP]]", help="may be given several times")

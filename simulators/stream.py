@@ -14,13 +14,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simulators.faults import CATALOGUE, Injector
+from simulators.faults import Injector, Only, refuse_others
 from simulators.line import Line, open_line
 from simulators.motion import Walk, walk
 from simulators.settings import Announce, SimulatorSettings
 
 HEARTBEAT_S = 0.5
-IMPATIENCE_S = 2.0  # a client that says nothing for so long gets the scan all the same
+IMPATIENCE_S = 2.0
 FAREWELL_S = 10.0  # how long the device waits for the client with the end of the scan
 TICK_S = 0.001
 BURST_POINTS = 64  # largest number of points sent at once when the scan is not paced
@@ -40,6 +40,8 @@ class Device:
     """A device as its line sees it; this one only streams, knows no signs of life and no beginning or end."""
 
     samples_per_frame = 1
+    kind: Only = ""  # of the faults that can strike no other device
+    impatience_s = IMPATIENCE_S  # a client that says nothing for so long gets the scan all the same
 
     def opening(self, count: int) -> bytes:
         """Return what precedes the first point."""
@@ -70,12 +72,15 @@ class Device:
         return None
 
 
-def stream(settings: SimulatorSettings, device: Device, announce: Announce, move: Callable[..., Walk] = walk) -> None:
-    """Serve one scan of any streaming device; `move` moves the probe along the path."""
-    for fault in settings.faults:
-        if CATALOGUE[fault.name].registers_only or CATALOGUE[fault.name].dme_only:
-            kind = "Modbus devices" if CATALOGUE[fault.name].registers_only else "measuring machines"
-            raise ValueError(f"fault {fault.name!r} strikes {kind} only")
+def stream(
+    settings: SimulatorSettings,
+    device: Device,
+    announce: Announce,
+    move: Callable[..., Walk] = walk,
+    open_line: Callable[[str], Line] = open_line,
+) -> None:
+    """Serve one scan of any streaming device; `move` moves the probe along the path, `open_line` opens its address."""
+    refuse_others(settings.faults, device.kind)
     scan = move(settings.path_mm, settings.motion)
     injector = Injector(settings.faults, settings.motion.seed)
     line = open_line(settings.address)
@@ -137,7 +142,8 @@ class StreamedScan:
 
     def take_leave(self) -> None:
         """Keep the line up until the client has gone, so that the last bytes are not lost with it."""
-        self._wait_until(lambda: not self._line.is_connected())
+        if self._line.is_read_live:
+            self._wait_until(lambda: not self._line.is_connected())
 
     def _wait_until(self, met: Callable[[], bool]) -> None:
         end_s = self._clock() + FAREWELL_S
@@ -205,5 +211,5 @@ class StreamedScan:
             if not self._line.is_connected():
                 begin_s = math.inf
             elif begin_s == math.inf:
-                begin_s = self._clock() + IMPATIENCE_S
+                begin_s = self._clock() + self._device.impatience_s
             self._listen(0.02)

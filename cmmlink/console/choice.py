@@ -9,7 +9,7 @@ from cmmlink.console.refused import without_folders
 from cmmlink.devices import words_of
 from cmmlink.errors import PlanError
 from cmmlink.from_plan import check_plan, zone_of
-from cmmlink.plan import FileDevice, Plan, load_plan
+from cmmlink.plan import Plan, load_plan
 from drivers import PointFileError
 from inspection import InspectionError, NominalProfile
 
@@ -70,4 +70,4 @@ def _description(name: str, text: str, plan: Plan, profile: NominalProfile) -> C
     ]
     if plan.probe.tip_radius_mm:
         facts.append(("Probe", f"ball, radius {plan.probe.tip_radius_mm:g} mm"))
-    return ChosenPlan(name, text, "", None, plan.part.name, tuple(facts), has_address=not isinstance(plan.device, FileDevice))
+    return ChosenPlan(name, text, "", None, plan.part.name, tuple(facts), has_address=plan.has_address)

@@ -6,7 +6,7 @@ from cmmlink.console.choice import CheckedPlan, Choice
 from cmmlink.console.device_test import UNTESTED
 from cmmlink.console.protocol import DeviceTest
 from cmmlink.console.refused import Refused, answer_errors
-from cmmlink.plan import FileDevice, next_serial_number
+from cmmlink.plan import next_serial_number
 
 _LONGEST_NAME = 120
 
@@ -62,7 +62,7 @@ class Entry:
         if checked is None:
             raise Refused(self.choice.shown.problem)
         plan = checked.plan
-        if self.address and not isinstance(plan.device, FileDevice):
+        if self.address and plan.has_address:
             with answer_errors():
                 plan = plan.with_address(self.address)
         with answer_errors():

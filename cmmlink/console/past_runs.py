@@ -16,7 +16,7 @@ from cmmlink.console.protocol import RunRow
 from cmmlink.endings import Ended
 from cmmlink.errors import StoreError
 from cmmlink.events import Counts, RunStarted, Sink
-from cmmlink.plan import Device, Plan
+from cmmlink.plan import Plan
 from cmmlink.record import (
     Replay,
     Store,
@@ -69,7 +69,7 @@ class PastRuns:
     """
 
     folder: Path
-    decoder_of: Callable[[Device], Decoder | None]
+    decoder_of: Callable[[Plan], Decoder | None]
     clock: Callable[[], float]
     now: Callable[[], datetime]
     _known: dict[tuple[str, str], RunRow] = field(default_factory=dict)

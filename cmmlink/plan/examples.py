@@ -124,6 +124,42 @@ device:
 registration: {datum: {result: fixture/result.json}}
 """
 
+_MACHINE_TOOL = """
+part: {name: blade 7}
+nominal: {file: blade.dat, scale: 100}
+tolerance: {lower_mm: -0.05, upper_mm: 0.05}
+probe: {tip_radius_mm: 1.0}
+device:
+  type: lines
+  address: "192.168.1.5:9100"
+  listen: true
+  unit: mm
+  format: {language: g800, result_set: BLADE-7}
+  radius_tolerance_mm: 0.002
+  silence_s: 300
+  reconnect_s: 60
+registration: {datum: {rotation_deg: 0, translation_mm: [0, 0]}}
+"""
+
+_PRINTED_FILE = """
+part: {name: blade 7}
+nominal: {file: blade.dat, scale: 100}
+tolerance: {lower_mm: -0.05, upper_mm: 0.05}
+device:
+  type: lines
+  file: prints/blade.txt
+  existing: true
+  unit: inch
+  format: {pattern: "X(?P<x>[-+ .0-9]+)Y(?P<y>[-+ .0-9]+)", end: M30, points: 200, pass_over: "O[0-9]+", sample: sample.txt}
+"""
+
+_PRINTED_LINE = """
+part: {name: blade 7}
+nominal: {file: blade.dat, scale: 100}
+tolerance: {lower_mm: -0.05, upper_mm: 0.05}
+device: {type: lines, address: COM3, baud_rate: 9600, data_bits: 7, parity: E, unit: mm, format: g800}
+"""
+
 _FILE = """
 part: {name: blade 7}
 nominal: {file: blade.dat, scale: 100}
@@ -196,6 +232,9 @@ PLANS: tuple[tuple[type[BaseModel], str], ...] = (
     (Plan, SCAN),
     (CtPlan, _SURFACE),
     (Plan, _REGISTERS),
+    (Plan, _PRINTED_LINE),
+    (Plan, _MACHINE_TOOL),
+    (Plan, _PRINTED_FILE),
     (Plan, _FILE),
     (Plan, _FILE_WITH_SCALE),
     (Plan, _MORE_OF_A_SCAN),

@@ -19,11 +19,12 @@ from cmmlink.errors import PlanError, YamlError
 from cmmlink.plan.datum import Datum
 from cmmlink.plan.deciding import Deciding
 from cmmlink.plan.dme import DmeSettings
+from cmmlink.plan.lines import LinesSettings
 from cmmlink.plan.report import REPORT, ReportSettings
 from cmmlink.plan.results import OUT, Results, ResultsOrFolder
 from cmmlink.plan.serial_numbers import SERIAL_NUMBER, SerialNumbers
 from cmmlink.plan.yaml_model import Positive, Settings, Text, line_of, read_model
-from drivers import AxisName, PointFileError, UnitName, device_address, read_text, shipped_maps
+from drivers import AxisName, HostPort, PointFileError, UnitName, device_address, read_text, shipped_maps
 from inspection import FitName, Material, Method
 
 Vector = tuple[float, float, float]
@@ -162,6 +163,27 @@ class DmeDevice(DmeSettings):
     address: Address = Field(description="host:port of the server; the usual port is 1294")
 
 
+class LinesDevice(LinesSettings):
+    """A machine tool that prints touched points as lines of text, over a serial port, over TCP, or into a file that grows."""
+
+    type: Literal["lines"] = Field(description="a machine tool that prints touched points as lines of text")
+    address: Address | None = Field(default=None, description="a port name like COM3 or /dev/ttyUSB0, or host:port; null beside a file")
+
+    @model_validator(mode="after")
+    def _one_place(self) -> "LinesDevice":
+        if (self.address is None) == (self.file is None):
+            raise ValueError("either an address or a file")
+        if self.listen and not isinstance(device_address(self.address or ""), HostPort):
+            raise ValueError("listen beside an address host:port only")
+        return self
+
+    @property
+    def parity_in_bytes(self) -> str:
+        """The parity that comes as the eighth bit of each byte: that of a serial port with seven data bits. Nothing where none comes."""
+        is_port = self.address is not None and isinstance(device_address(self.address), str)
+        return {"E": "even", "O": "odd", "N": ""}[self.parity] if is_port and self.data_bits == 7 else ""
+
+
 class FileDevice(Settings):
     """A file of points in place of a device."""
 
@@ -181,7 +203,7 @@ class FileDevice(Settings):
     )
 
 
-Device = Annotated[SerialDevice | ModbusDevice | DmeDevice | FileDevice, Field(discriminator="type")]
+Device = Annotated[SerialDevice | ModbusDevice | DmeDevice | LinesDevice | FileDevice, Field(discriminator="type")]
 Axis.model_rebuild()
 
 
@@ -318,6 +340,11 @@ class Plan(Deciding):
             raise PlanError(str(error)) from None
         return self.model_copy(update={"device": self.device.model_copy(update={"address": address})})
 
+    @property
+    def has_address(self) -> bool:
+        """Whether the device is reached at an address, and not read from a file."""
+        return getattr(self.device, "address", None) is not None
+
 
 def load_plan(path: str | PathLike[str]) -> Plan:
     """Read and check a plan. Raises PlanError: file, line, key, the value found and what is allowed."""
@@ -358,7 +385,7 @@ def place_of(path: Path, key: str) -> str:
 
 def with_own_maps(device: Device, replaced: Callable[[Path], str | dict[str, Any]]) -> Device:
     """Return the device with the user's own register maps replaced, also in the device that its axis follows."""
-    if isinstance(device, FileDevice | DmeDevice):
+    if isinstance(device, FileDevice | DmeDevice | LinesDevice):
         return device
     update: dict[str, Any] = {}
     if isinstance(device, ModbusDevice) and device.own_map is not None:
@@ -373,6 +400,10 @@ def _with_paths_from(folder: Path, plan: Plan) -> Plan:
     device = with_own_maps(plan.device, lambda own: str(folder / own))
     if isinstance(device, FileDevice):
         device = device.model_copy(update={"file": folder / device.file})
+    elif isinstance(device, LinesDevice):
+        sample = None if device.format.sample is None else folder / device.format.sample
+        file = None if device.file is None else folder / device.file
+        device = device.model_copy(update={"file": file, "format": device.format.model_copy(update={"sample": sample})})
     datum = plan.registration.datum
     if datum is not None and datum.result is not None:
         datum = datum.model_copy(update={"result": folder / datum.result})

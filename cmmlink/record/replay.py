@@ -21,7 +21,7 @@ from cmmlink.errors import PlanError, StoreError, YamlError
 from cmmlink.events import RunStarted, Sink
 from cmmlink.from_plan import inspection_of, notes_on_datum, notes_on_nominal, notes_on_temperature, profile_of
 from cmmlink.pipeline import RunOutcome, run_inspection
-from cmmlink.plan import Device, Plan, read_model, value_of, words_of_allowed
+from cmmlink.plan import Plan, read_model, value_of, words_of_allowed
 from cmmlink.record.bodies import PlacedArrival, pack_document
 from cmmlink.record.derived import Change, derived_draft
 from cmmlink.record.reader import RecordedRun, arrivals_of, points_of, reads_of
@@ -73,7 +73,7 @@ class Replay:
 def replay_run(
     store: Store,
     recorded: RecordedRun,
-    decoder_of: Callable[[Device], Decoder | None],
+    decoder_of: Callable[[Plan], Decoder | None],
     *,
     tolerance: tuple[float, float] | None = None,
     method: str | None = None,
@@ -100,7 +100,7 @@ def replay_run(
     changed = _with_changes(plan, tolerance, method, settings or {})
     profile = profile or recorded_profile(changed, recorded)
     stop = stop or threading.Event()
-    decoder = _decoder_of(plan.device, recorded, decoder_of)
+    decoder = _decoder_of(plan, recorded, decoder_of)
     reading = _Reading(_arrivals(store, recorded, decoder, stop))
     source = Capture(reading, decoder, _failure(recorded))
     started = RunStarted.from_header(recorded.header)
@@ -160,9 +160,9 @@ def recorded_plan(recorded: RecordedRun) -> Plan:
         raise StoreError(f"the plan of run {recorded.run} cannot be read by this version of cmmlink: {error}") from None
 
 
-def _decoder_of(device: Device, recorded: RecordedRun, decoder_of: Callable[[Device], Decoder | None]) -> Decoder | None:
+def _decoder_of(plan: Plan, recorded: RecordedRun, decoder_of: Callable[[Plan], Decoder | None]) -> Decoder | None:
     try:
-        return decoder_of(device)
+        return decoder_of(plan)
     except ValueError as error:  # a format, an option or a register map that was valid on that day, or is gone
         raise StoreError(f"the device in the plan of run {recorded.run} cannot be read by this version of cmmlink: {error}") from None
 

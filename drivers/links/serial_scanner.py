@@ -1,4 +1,4 @@
-"""A scanner on a serial port, or on a TCP socket that stands for one: the only file of drivers that knows pyserial.
+"""A scanner on a serial port, or on a line that stands for one: the only file of drivers that knows pyserial.
 
 Parity errors and overruns do not show through pyserial, on any system: checksums and counters in the format must
 tell them. What pyserial raises becomes a `LinkError` here.
@@ -9,12 +9,12 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import closing, suppress
-from typing import Protocol
 
 import serial
 
 from drivers.errors import DeviceError, LinkError, ProtocolError
 from drivers.links.address import HostPort, device_address, require_port
+from drivers.links.line import Line, Opener
 from drivers.links.link_settings import LinkSettings
 from drivers.links.reconnect import keep_up
 from drivers.links.tcp_line import POLL_S, WRITE_S, TcpLine, open_tcp
@@ -32,19 +32,19 @@ def ports() -> list[tuple[str, str]]:
 
 
 class SerialScanner:
-    """Points of one scan from a serial address: the name of a port of this computer, or `host:port`."""
+    """Points of one scan from the name of a port of this computer, from `host:port`, or from a place that is opened in a way of its own."""
 
     def __init__(
         self,
-        address: str,
+        address: str | Opener,
         decoder: Decoder,
         settings: LinkSettings = USUAL,
         *,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         """Raises ValueError for an address that is none."""
-        self._place = device_address(address)
-        self._address = address
+        self._place = device_address(address) if isinstance(address, str) else address
+        self._address = address if isinstance(address, str) else address.words
         self._decoder = decoder
         self._settings = settings
         self._clock = clock
@@ -60,7 +60,7 @@ class SerialScanner:
         kept_up = keep_up(self._open, self._scan, reconnect_s=settings.reconnect_s, stopped=stopped, clock=self._clock)
         return explained(self._address, kept_up)
 
-    def _scan(self, port: "_Line", until_s: float) -> Iterator[Arrival]:
+    def _scan(self, port: Line, until_s: float) -> Iterator[Arrival]:
         watch = Watch(self._settings.silence_s, until_s, self._clock())
         try:
             while not self._stopped.is_set():
@@ -79,7 +79,7 @@ class SerialScanner:
             yield from self._decoder.break_off()
             raise
 
-    def _say_goodbye(self, port: "_Line") -> None:
+    def _say_goodbye(self, port: Line) -> None:
         """Send what the device has to hear at the end of the scan; a device that is gone by then need not hear it."""
         with suppress(LinkError):
             self._write(port, self._decoder.request())
@@ -90,11 +90,7 @@ class SerialScanner:
         if not watch.is_over(now_s):
             return
         if watch.garbled and (not watch.heard_sound or now_s - watch.last_byte_s < silence_s / 2):
-            line = (
-                ""
-                if isinstance(self._place, HostPort)
-                else f"baud rate ({self._settings.baud_rate}), parity ({self._settings.parity}) and "
-            )
+            line = f"baud rate ({self._settings.baud_rate}), parity ({self._settings.parity}) and " if isinstance(self._place, str) else ""
             raise ProtocolError(
                 f"{self._address}: bytes arrive but for {silence_s:g} s not one valid frame; check {line}the format of the device"
             )
@@ -102,44 +98,38 @@ class SerialScanner:
             raise LinkError(f"{self._address}: bytes arrive, but for {silence_s:g} s no new point and no moving heartbeat; is it scanning?")
         raise LinkError(f"{self._address}: silent for {silence_s:g} s; is the device switched on and scanning?")
 
-    def _open(self, until_s: float) -> "closing[_Line]":
+    def _open(self, until_s: float) -> closing[Line]:
         """Open the line for as long as the context is entered, within the silence that is borne, and not beyond `until_s`."""
+        within_s = min(self._settings.silence_s, until_s - self._clock())
         try:
             if isinstance(self._place, HostPort):
-                within_s = min(self._settings.silence_s, until_s - self._clock())
                 return closing(TcpLine(open_tcp(self._place, within_s, self._stopped)))
+            if not isinstance(self._place, str):
+                return closing(self._place.open(within_s, self._stopped))
             require_port(self._place)
             return closing(_PortLine(self._place, self._settings))
         except (serial.SerialException, OSError, ValueError) as error:
             hint = "is it plugged in, free, and named right? `cmmlink ports` lists the ports"
             if isinstance(self._place, HostPort):
                 hint = "is it switched on, free and in the network, and are host and port right?"
+            elif not isinstance(self._place, str):
+                hint = self._place.hint
             raise LinkError(f"{self._address}: cannot be opened: {error}; {hint}") from error
 
-    def _read(self, port: "_Line") -> bytes:
+    def _read(self, port: Line) -> bytes:
         """Return what is there, at the latest after POLL_S."""
         try:
             return port.read()
         except (serial.SerialException, OSError) as error:
             raise LinkError(f"{self._address}: the link was lost: {error}") from error
 
-    def _write(self, port: "_Line", data: bytes) -> None:
+    def _write(self, port: Line, data: bytes) -> None:
         if not data:
             return
         try:
             port.write(data)
         except (serial.SerialException, OSError) as error:
             raise LinkError(f"{self._address}: the link was lost: {error}") from error
-
-
-class _Line(Protocol):
-    """An open line. `read` returns what is there, at the latest after POLL_S; both raise OSError or SerialException."""
-
-    def read(self) -> bytes: ...
-
-    def write(self, data: bytes) -> None: ...
-
-    def close(self) -> None: ...
 
 
 class _PortLine:

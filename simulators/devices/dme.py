@@ -170,7 +170,7 @@ class Server:
 def serve(settings: SimulatorSettings, announce: Announce) -> None:
     """Serve the machine until it is ended."""
     for fault in settings.faults:
-        if CATALOGUE[fault.name].registers_only or fault.name in _KNOWN_ELSEWHERE:
+        if CATALOGUE[fault.name].only not in ("", "dme") or fault.name in _KNOWN_ELSEWHERE:
             raise ValueError(f"fault {fault.name!r} does not strike measuring machines")
     injector = Injector(settings.faults, settings.motion.seed)
     rate_hz = settings.motion.rate_hz

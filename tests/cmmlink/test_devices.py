@@ -40,11 +40,11 @@ def test_each_type_of_device_has_its_source(points: dict[str, Any]) -> None:
 
 
 def test_each_type_of_device_has_its_decoder_where_bytes_are_recorded(points: dict[str, Any]) -> None:
-    assert isinstance(decoder_of(plan_with(POSITION).device), AsciiDecoder)
-    assert isinstance(decoder_of(plan_with(SENSOR).device), OptoncdtDecoder)
-    assert isinstance(decoder_of(plan_with(REGISTERS).device), RegisterDecoder)
-    assert decoder_of(plan_with(points).device) is None
-    assert decoder_of(plan_with(SENSOR | {"axis": {"feed_mm_s": 10}}).device) is None
+    assert isinstance(decoder_of(plan_with(POSITION)), AsciiDecoder)
+    assert isinstance(decoder_of(plan_with(SENSOR)), OptoncdtDecoder)
+    assert isinstance(decoder_of(plan_with(REGISTERS)), RegisterDecoder)
+    assert decoder_of(plan_with(points)) is None
+    assert decoder_of(plan_with(SENSOR | {"axis": {"feed_mm_s": 10}})) is None
 
 
 def test_a_device_is_called_by_its_type_and_where_it_is(points: dict[str, Any]) -> None:

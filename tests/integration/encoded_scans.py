@@ -82,6 +82,7 @@ class Wire:
     """A line whose other end is a decoder: it hears every byte at once and says what the driver would send."""
 
     address = "wire"
+    is_read_live = True
 
     def __init__(self, made: Decoder) -> None:
         self.transcript: Transcript = []

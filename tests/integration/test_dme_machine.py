@@ -241,7 +241,7 @@ def test_a_machine_that_is_not_homed_is_sent_home_where_the_plan_allows_it(tmp_p
 
 def test_the_plan_of_the_page_of_machines_finds_the_part_that_is_simulated_without_a_path(tmp_path: Path) -> None:
     page = (ROOT / "docs" / "machines.md").read_text(encoding="utf-8")
-    [text] = re.findall(r"```yaml\n(.*?)```", page, re.DOTALL)
+    text = re.findall(r"```yaml\n(.*?)```", page, re.DOTALL)[0]
     (tmp_path / "nominal.csv").write_bytes(plan_file().with_name("nominal.csv").read_bytes())
     options = ["--tip-radius-mm", "1.0", "--form-error-mm", "0.02", "--unpaced"]
     with simulated("dme", "127.0.0.1:0", tmp_path, *options, path_mm=section_on_machine(), noise_mm=0.0) as machine:

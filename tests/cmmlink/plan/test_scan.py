@@ -123,9 +123,9 @@ MISTAKES = {
     "zero scale": (SHORT.replace("1e2", "0"), "line 2: nominal.scale is '0'; expected a number greater than 0"),
     "device type": (
         SHORT.replace("serial, ", "seriel, "),
-        "line 6: device.type is 'seriel'; did you mean serial? Allowed: serial, modbus, dme, file",
+        "line 6: device.type is 'seriel'; did you mean serial? Allowed: serial, modbus, dme, lines, file",
     ),
-    "no device type": (SHORT.replace("type: serial, ", ""), "line 6: device.type is missing; Allowed: serial, modbus, dme, file"),
+    "no device type": (SHORT.replace("type: serial, ", ""), "line 6: device.type is missing; Allowed: serial, modbus, dme, lines, file"),
     "device key": (
         SHORT.replace("address", "adress"),
         "line 6: device.adress is not a known key; did you mean address? Allowed: type, address, baud_rate, silence_s",

@@ -20,12 +20,18 @@ from drivers.source import Arrival, Damaged, Decoder, Lost, PointBatch, Rejected
 from tests.drivers.codecs import wire_bytes
 from tests.drivers.codecs.wire_bytes import PIECES, TURNS, Registers, cuttings, damaged
 
+PATTERN = "N(?P<seq>[0-9]+) X(?P<x>[-+ .0-9]+) Y(?P<y>[-+ .0-9]+)"
 OPTIONS: dict[str, list[dict[str, object]]] = {
     "ascii": [{}, {"unit": "mm"}],
     "binary": [{}],
     "optoncdt": [{"range_mm": 50.0}, {"range_mm": 50.0, "rate_hz": 1000.0, "largest_step_mm": 0.5, "count": 20}],
     "riftek": [{"range_mm": 50.0, "rate_hz": 1000.0}, {"range_mm": 50.0, "rate_hz": 1000.0, "count": 12, "largest_step_mm": 0.5}],
     "riftek-ascii": [{"rate_hz": 100.0}, {"rate_hz": 100.0, "count": 9, "largest_step_mm": 1.0}],
+    "g800": [{"unit": "mm"}, {"unit": "inch", "tip_radius_mm": 38.1, "set_name": "B"}, {"unit": "mm", "tip_radius_mm": 1.0}],
+    "pattern": [
+        {"pattern": PATTERN, "unit": "mm", "points": 25},
+        {"pattern": PATTERN, "unit": "mm", "end": "M30", "pass_over": "[(].*"},
+    ],
 }
 MAPS = {
     "latest": RegisterMap.model_validate(wire_bytes.LATEST_MAP),
@@ -175,6 +181,8 @@ SPECIAL: dict[str, Callable[[int], bytes]] = {
     ),
     "riftek": lambda i: bytes((0xC0 if i % 2 else 0x80) | (i & 3) << 4 | 5 for _ in range(4)),
     "riftek-ascii": lambda i: b"1.5\r\n" if i % 2 else b"-\r\n",
+    "g800": lambda i: b"G801 N%d X1. Y2. Z3. R%d.\r\n" % (i + 1, i % 2),
+    "pattern": lambda i: b"N%d X1 Y%d\r" % (i + 1, i) if i % 2 else b"(A)\r",
 }
 
 

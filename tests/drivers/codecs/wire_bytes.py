@@ -130,6 +130,39 @@ def riftek_ascii_pieces(rng: Random) -> Pieces:
     return [rng.choice(odd) if rng.random() < 0.15 else b"%.3f\r\n" % (i * 0.5 - 3) for i in range(rng.randint(3, 60))]
 
 
+def g800_pieces(rng: Random) -> Pieces:
+    """Sets of nominal and measured points, some without the other, some labelled wrongly, some numbered anew."""
+    end = rng.choice([b"\r\n", b"\r", b"\n"])
+    pieces = [rng.choice([b"", b"RESULTSFILE A" + end]), b"START" + end, rng.choice([b"", b"\x12", b"RESULTSFILE B" + end, b"hello" + end])]
+    for i in range(1, rng.randint(3, 30)):
+        place = b"N%d X%.4f Y   -%.4f Z-.5" % (i % 20, i, i / 3)
+        nominal, measured = b"G800 " + place + b" I0. J1. K0. O0. U.1 L-.1" + end, b"G801 " + place + b" R1.5" + end
+        pieces += rng.choice(
+            [*12 * [[nominal, measured]], [nominal], [measured], [nominal.replace(b"0 N", b"1 N"), measured], 2 * [measured]]
+        )
+        if rng.random() < 0.1:
+            odd = [
+                b"TOOLPATHID 4",
+                b"G330 N1 A0. B0. X%d." % i,
+                b"G802 N1 DEVIATION .1",
+                b"G801 N1 X1.2.3",
+                b"END",
+                b"START",
+                b"\x80",
+                300 * b"7",
+            ]
+            pieces.append(rng.choice(odd) + end)
+    return [*pieces, *rng.choice([[], [b"END" + end, b"START" + end, measured, b"END" + end]])]
+
+
+def pattern_pieces(rng: Random) -> Pieces:
+    """Lines with a number, some twice, some of another form."""
+    odd = [b"(A)\r", b"M30\r", b"N1 X1 Y\r", b"N99 X1.2.3 Y1\r", b"\x14\r", b"POSN X1\r", 300 * b"1" + b"\r"]
+    return [
+        rng.choice(odd) if rng.random() < 0.1 else b"N%d X %.3f Y-  .5\r" % (i - rng.randint(0, 1), i) for i in range(1, rng.randint(4, 50))
+    ]
+
+
 STRANGE = (b"\x07\x01", b"\x04\x02\x00\x01", b"\x03\x02\x00\x01", b"\x18\x00\x02\x00\x00", b"\x90\x02")
 JUNK = (b"\n", b"->", b"-", b"A", 700 * b"7", 4100 * b"x", 9000 * b"-")
 
@@ -241,6 +274,8 @@ PIECES: dict[str, Callable[[Random], Pieces]] = {
     "optoncdt": optoncdt_pieces,
     "riftek": riftek_pieces,
     "riftek-ascii": riftek_ascii_pieces,
+    "g800": g800_pieces,
+    "pattern": pattern_pieces,
 }
 
 

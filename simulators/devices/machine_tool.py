@@ -1,0 +1,161 @@
+"""Simulated machine tools that probe a part on their table and print each touched point as lines of text.
+
+`machine-tool` prints the language of inspection (G800 nominal, G801 measured), `machine-tool-dprnt` one line of DPRNT a point. Numbers are
+printed as controls do: DPRNT shows leading zeros as blanks, the posts of CAM systems leave them out.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulators.faults import Injector
+from simulators.line import open_line_of_control
+from simulators.motion import walk
+from simulators.settings import Announce, SimulatorSettings
+from simulators.stream import Device, Sample, stream
+
+_MM_PER_INCH = 25.4
+_DC2, _DC4 = "\x12", "\x14"
+_OTHER_PART = ("START", "RESULTSFILE OTHER-RESULTS", "G800 N1 X0. Y0. Z0. I0. J1. K0. O0. U.1 L.1", "G801 N1 X0. Y9.9 Z0. R1.5", "END")
+
+
+def short(value: float, decimals: int) -> str:
+    """A number as posts write it: without the zeros behind, but with its point."""
+    return f"{value:.{decimals}f}".rstrip("0")
+
+
+def bare(value: float, decimals: int) -> str:
+    """A number as a control prints it that leaves out leading zeros."""
+    text = f"{value:.{decimals}f}"
+    sign, digits = ("-", text[1:]) if text.startswith("-") else ("", text)
+    return sign + (digits[1:] if digits.startswith("0.") else digits)
+
+
+def dprnt(value: float, before: int, after: int) -> str:
+    """A number as `DPRNT[#100[wf]]` prints it: sign or blank, leading zeros as blanks; the field grows where the number does."""
+    return f"{value:{before + after + 1}.{after}f}"
+
+
+@dataclass(frozen=True, slots=True)
+class Quirks:
+    """How the control prints: the end of its lines, whether in inches, whether with parity, and what it leaves out."""
+
+    end: str = "\r\n"
+    inch: bool = False
+    parity: bool = False
+    closes: bool = True
+    old_set: bool = False
+
+    @classmethod
+    def asked_for(cls, injector: Injector) -> "Quirks":
+        """The quirks among the faults that were asked for."""
+        end = "\r" if injector.expects("cr-only") else "\r\n"
+        return cls(end, injector.expects("inch"), injector.expects("parity"), not injector.expects("no-end"), injector.expects("old-set"))
+
+    def bytes_of(self, *lines: str) -> bytes:
+        """Lines as they leave the control."""
+        data = "".join(line + self.end for line in lines).encode("ascii")
+        return bytes(byte | 0x80 if byte.bit_count() % 2 else byte for byte in data) if self.parity else data
+
+    def own(self, millimetres: NDArray[np.float64] | float) -> NDArray[np.float64]:
+        """A length in the unit of the control."""
+        return np.asarray(millimetres, dtype=np.float64) / (_MM_PER_INCH if self.inch else 1.0)
+
+
+class InspectingControl(Device):
+    """Prints nominal and measured points, and around them what a post prints."""
+
+    kind = "lines"
+    impatience_s = 0.0  # nobody asks a control to begin: its operator does, when somebody listens
+
+    def __init__(
+        self, nominal_mm: NDArray[np.float64], outward: NDArray[np.float64], radius_mm: float, quirks: Quirks, injector: Injector
+    ) -> None:
+        self._nominal_mm, self._outward, self._radius_mm = nominal_mm, outward, radius_mm
+        self._quirks, self._injector = quirks, injector
+
+    def told_to_begin(self) -> bool:
+        """Nobody tells a control."""
+        return False
+
+    def opening(self, count: int) -> bytes:
+        """Switch the printer on, and say of which part the results are."""
+        old = _OTHER_PART if self._quirks.old_set else ()
+        planes = ("G331 N1 A0. B0. C0. X0. Y0. Z0.", "G330 N1 A0. B0. C0. X0 Y0 Z0 I0 R0")
+        heading = ("START", "RESULTSFILE PART-RESULTS", "TIMESTAMP 260314 150926", "TOOLPATHID 1", "TOOLPATH SECTION")
+        return self._quirks.bytes_of(*old, _DC2 + heading[0], *heading[1:], *planes)
+
+    def frame(self, samples: Sequence[Sample]) -> bytes:
+        """Print one point: where it should be, and where the ball was when it touched."""
+        [taken] = samples
+        nominal = self.nominal_line(taken.index)
+        if self._injector.strikes("mislabelled", taken.index):
+            nominal = nominal.replace("G800", "G801")
+        if self._injector.strikes("no-contact", taken.index):
+            return self._quirks.bytes_of(nominal)
+        return self._quirks.bytes_of(nominal, self.measured_line(taken.index, taken.point_mm))
+
+    def nominal_line(self, index: int) -> str:
+        """The nominal point of this number, as a post wrote it into the program."""
+        x, y, z = (short(value, 4) for value in self._quirks.own(self._nominal_mm[index]).tolist())
+        i, j, k = (short(value, 5) for value in self._outward[index].tolist())
+        limit = short(float(self._quirks.own(0.127)), 4)
+        return f"G800 N{index + 1} X{x} Y{y} Z{z} I{i} J{j} K{k} O0. U{limit} L{limit}"
+
+    def measured_line(self, index: int, centre_mm: Sequence[float]) -> str:
+        """The centre of the ball, as the control printed it."""
+        x, y, z = (bare(value, 4) for value in self._quirks.own(np.array(centre_mm)).tolist())
+        return f"G801 N{index + 1} X{x} Y{y} Z{z} R{bare(float(self._quirks.own(self._radius_mm)), 4)}"
+
+    def closing(self, count: int) -> bytes:
+        """End the results, and switch the printer off."""
+        return self._quirks.bytes_of("END" + _DC4) if self._quirks.closes else b""
+
+
+class PrintingControl(InspectingControl):
+    """Prints one line a point, as a short macro of the user's own does."""
+
+    def opening(self, count: int) -> bytes:
+        """Switch the printer on."""
+        return self._quirks.bytes_of(_DC2)
+
+    def frame(self, samples: Sequence[Sample]) -> bytes:
+        """Print one point."""
+        [taken] = samples
+        if self._injector.strikes("no-contact", taken.index):
+            return b""
+        return self._quirks.bytes_of(self.point_line(taken.index, taken.point_mm))
+
+    def point_line(self, index: int, centre_mm: Sequence[float]) -> str:
+        """One point with its number: DPRNT[N#1[40]*X#2[44]*Y#3[44]*Z#4[44]]."""
+        x, y, z = (dprnt(value, 4, 4) for value in self._quirks.own(np.array(centre_mm)).tolist())
+        return f"N{index + 1:5d} X{x} Y{y} Z{z}"
+
+    def closing(self, count: int) -> bytes:
+        """Print a last line, and switch the printer off."""
+        return self._quirks.bytes_of("M30" + _DC4) if self._quirks.closes else b""
+
+
+def serve(settings: SimulatorSettings, announce: Announce, control: type[InspectingControl]) -> None:
+    """Probe a part and print it; the address may also be `to:host:port` or `file:PATH`."""
+    injector = Injector(settings.faults, settings.motion.seed)
+    ideal = replace(settings.motion, noise_mm=0.0, form_error_mm=0.0, defect_mm=0.0, tip_radius_mm=0.0)
+    nominal_mm = walk(settings.path_mm, ideal).points_mm
+    outward = walk(settings.path_mm, replace(ideal, tip_radius_mm=1.0)).points_mm - nominal_mm
+    made = control(nominal_mm, outward, settings.motion.tip_radius_mm, Quirks.asked_for(injector), injector)
+    stream(settings, made, announce, open_line=open_line_of_control)
+
+
+def serve_inspection(settings: SimulatorSettings, announce: Announce) -> None:
+    """Serve a machine tool that prints the language of inspection."""
+    serve(settings, announce, InspectingControl)
+
+
+def serve_dprnt(settings: SimulatorSettings, announce: Announce) -> None:
+    """Serve a machine tool that prints one line a point."""
+    serve(settings, announce, PrintingControl)
+
+
+DEVICES = {"machine-tool": serve_inspection, "machine-tool-dprnt": serve_dprnt}

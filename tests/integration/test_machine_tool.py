@@ -1,0 +1,260 @@
+"""A part on a simulated machine tool, from the printed line to the verdict, over every way that lines can take."""
+
+import re
+import socket
+import sys
+import threading
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cmmlink.demo import plan_file, section_on_machine
+from tests.cmmlink.command import cmmlink
+from tests.drivers.codecs.g800_transcript import DPRNT_PATTERN, GOLDEN, PRINT_OUT
+from tests.integration.simulated import simulated
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "machines.md"
+FINELY = "discretisation: {samples: 300}\n"
+TURN = np.linspace(0.0, 2.0 * np.pi, 2001)
+PART_MM = np.column_stack([40.0 * np.cos(TURN) + 4.0 * np.cos(2.0 * TURN), 15.0 * np.sin(TURN)])
+LENGTH_MM = float(np.hypot(*np.diff(PART_MM, axis=0).T).sum())
+COUNT, RADIUS_MM = 300, 1.5
+POSIX_ONLY = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals exist on POSIX systems only")
+PLAN = """\
+part: {{name: oval}}
+nominal: {{file: nominal.csv, closed: true}}
+tolerance: {{lower_mm: -0.05, upper_mm: 0.05}}
+probe: {{tip_radius_mm: 1.5}}
+device: {device}
+registration: {{datum: {{rotation_deg: 0}}}}
+allow: {{unseen_mm: 1.5}}
+out: null
+discretisation: {{samples: 500}}
+"""
+PART = ["--tip-radius-mm", str(RADIUS_MM), "--form-error-mm", "0.02"]
+NUMBERED = "{{pattern: 'N *(?P<seq>[0-9]+) " + DPRNT_PATTERN.replace("Y", " Y").replace("Z", " Z") + "', end: M30}}"
+
+
+def planned(folder: Path, device: str, more: str = "") -> Path:
+    np.savetxt(folder / "nominal.csv", PART_MM[::10], delimiter=",")
+    (folder / "plan.yaml").write_text(PLAN.format(device=device) + more, encoding="utf-8")
+    return folder / "plan.yaml"
+
+
+def measured(
+    folder: Path, device: str, *options: str, kind: str = "machine-tool", address: str = "127.0.0.1:0", more: str = ""
+) -> tuple[int, dict[str, Any], str]:
+    """Exit status, result and messages of a run against a simulated device, which is started before the run."""
+    with simulated(
+        kind,
+        address,
+        folder,
+        "--unpaced",
+        *PART,
+        *options,
+        path_mm=PART_MM,
+        count=COUNT,
+        rate_hz=5.0,
+        speed_mm_s=LENGTH_MM / COUNT * 5.0,
+        noise_mm=0.0,
+    ) as machine:
+        plan = planned(folder, device.replace("ADDRESS", machine.address), more)
+        done = cmmlink("run", plan, "--json", "--records", folder / "records")
+    assert done.out, done.err
+    return done.code, done.json(), done.err
+
+
+LINES = "{{type: lines, address: 'ADDRESS', unit: mm}}".replace("{{", "{").replace("}}", "}")
+EQUAL = ("verdict", "received", "judged", "rejected", "lost", "out_of_tolerance", "worst", "max_deviation_mm", "coverage")
+
+
+def test_a_part_has_the_same_result_by_a_machine_tool_and_by_a_serial_scanner(tmp_path: Path) -> None:
+    """Four decimals are printed: what differs is their rounding."""
+    defect = ("--defect-mm", "0.15", "--defect-station-mm", "70")
+    by_line = measured(tmp_path, "{type: serial, address: 'ADDRESS'}", *defect, kind="serial")
+    by_tool = measured(tmp_path, LINES, *defect)
+    assert by_tool[0] == by_line[0] == 1
+    for key in ("verdict", "received", "judged", "rejected", "lost", "out_of_tolerance"):
+        assert by_tool[1][key] == by_line[1][key], key
+    for key in ("max_deviation_mm", "min_deviation_mm", "rms_mm"):
+        assert by_tool[1][key] == pytest.approx(by_line[1][key], abs=1e-4), key
+    assert by_tool[1]["worst"]["station_mm"] == pytest.approx(by_line[1]["worst"]["station_mm"], abs=1e-3)
+
+
+def test_a_run_is_final_while_it_runs_and_replayed_from_its_lines(tmp_path: Path) -> None:
+    code, facts, errors = measured(tmp_path, LINES)
+    assert (code, facts["verdict"], facts["received"], facts["judged"]) == (0, "conform", COUNT, COUNT), errors
+    assert any("taken to be in millimetres" in note for note in facts["notes"])
+    again = cmmlink("replay", facts["run"], "--records", tmp_path / "records", "--json")
+    print(again)
+    assert again.json()["identical"] is True, again.err
+
+
+@pytest.mark.parametrize(
+    ("options", "device"),
+    [
+        (["cr-only"], LINES),
+        (["inch"], LINES.replace("unit: mm", "unit: inch")),
+        (["old-set"], LINES.replace("unit: mm", "unit: mm, format: {language: g800, result_set: PART-RESULTS}")),
+        (["mislabelled:0.2"], LINES),
+        (["repeated-frames:0.1"], LINES),
+    ],
+)
+def test_quirks_of_controls_change_nothing(options: list[str], device: str, tmp_path: Path) -> None:
+    code, facts, errors = measured(tmp_path, device, *(f"--fault={option}" for option in options))
+    assert (code, facts["verdict"], facts["judged"]) == (0, "conform", COUNT), errors
+
+
+@POSIX_ONLY
+def test_seven_data_bits_of_a_serial_port_carry_their_parity(tmp_path: Path) -> None:
+    device = LINES.replace("unit", "baud_rate: 9600, data_bits: 7, parity: E, unit")
+    code, facts, errors = measured(tmp_path, device, "--fault=parity", address="pty")
+    print(facts, errors)
+    assert (code, facts["verdict"], facts["judged"]) == (0, "conform", COUNT), errors
+    code, facts, errors = measured(tmp_path, device, "--fault=parity", "--fault=flip:0.001@1-299", address="pty")
+    assert (code, facts["verdict"], facts["out_of_tolerance"]) == (3, "uncertain", 0), errors
+    assert facts["damaged_bytes"] > 0
+
+
+@pytest.mark.parametrize(
+    ("fault", "code", "verdict", "words"),
+    [
+        ("no-contact:0.05", 3, "uncertain", "the probe touched nothing"),
+        ("lost-frames:0.05", 3, "uncertain", "lost"),
+        ("no-end", 4, "uncertain", "silent for"),
+        ("unplug@150", 4, "uncertain", "the link was lost"),
+    ],
+)
+def test_what_is_missing_never_proves_a_part(fault: str, code: int, verdict: str, words: str, tmp_path: Path) -> None:
+    device = LINES.replace("unit", "silence_s: 0.5, unit")
+    found = measured(tmp_path, device, f"--fault={fault}")
+    assert (found[0], found[1]["verdict"]) == (code, verdict), found[2]
+    assert words in found[2] + str(found[1])
+
+
+def test_a_ball_of_another_radius_is_told_by_name(tmp_path: Path) -> None:
+    code, _, errors = measured(tmp_path, LINES, "--tip-radius-mm", "2")
+    assert code == 4
+    assert "radius R of the ball is not the plan's 1.5 mm (probe.tip_radius_mm)" in errors
+
+
+def test_lines_of_a_macro_of_the_users_own_are_read_by_a_pattern(tmp_path: Path) -> None:
+    device = LINES.replace("unit", f"format: {NUMBERED}, unit".replace("{{", "{").replace("}}", "}"))
+    code, facts, errors = measured(tmp_path, device, "--fault=cr-only", kind="machine-tool-dprnt")
+    assert (code, facts["verdict"], facts["judged"]) == (0, "conform", COUNT), errors
+    code, facts, errors = measured(tmp_path, device, "--fault=no-contact:0.05", kind="machine-tool-dprnt")
+    assert (code, facts["verdict"]) == (3, "uncertain"), errors
+    assert facts["lost"] > 0
+
+
+def beside(run: Callable[[], None]) -> ExitStack:
+    """Do something beside the run."""
+    stack = ExitStack()
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
+    stack.callback(thread.join, 10.0)
+    return stack
+
+
+def printed(folder: Path) -> bytes:
+    """What a machine tool prints of the part, from its file."""
+    with simulated(
+        "machine-tool",
+        f"file:{folder / 'printed.txt'}",
+        folder,
+        "--unpaced",
+        *PART,
+        path_mm=PART_MM,
+        count=COUNT,
+        rate_hz=5.0,
+        speed_mm_s=LENGTH_MM / COUNT * 5.0,
+        noise_mm=0.0,
+    ) as machine:
+        assert machine.tally()["points"] == COUNT
+    return (folder / "printed.txt").read_bytes()
+
+
+def test_a_machine_that_connects_to_us_is_awaited(tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        address = f"127.0.0.1:{free.getsockname()[1]}"
+    plan = planned(tmp_path, LINES.replace("ADDRESS", address).replace("unit", "listen: true, unit"))
+    device = simulated(
+        "machine-tool", f"to:{address}", tmp_path, "--unpaced", *PART, path_mm=PART_MM, count=COUNT, rate_hz=5.0,
+        speed_mm_s=LENGTH_MM / COUNT * 5.0, noise_mm=0.0,
+    )  # fmt: skip
+    with device:
+        done = cmmlink("run", plan, "--json", "--records", tmp_path / "records")
+    assert (done.code, done.json()["judged"]) == (0, COUNT), done.err
+
+
+@pytest.mark.parametrize("old", [b"", GOLDEN])
+@pytest.mark.parametrize("begins_anew", [False, True])
+def test_a_file_is_read_as_it_grows_and_what_stood_in_it_before_is_not_of_the_scan(old: bytes, begins_anew: bool, tmp_path: Path) -> None:
+    data, file = printed(tmp_path), tmp_path / "machine.txt"
+    if old:
+        file.write_bytes(old)
+
+    def write() -> None:
+        while not any((tmp_path / "records").glob("*")):
+            time.sleep(0.01)
+        time.sleep(0.2)
+        with file.open("wb" if begins_anew else "ab", buffering=0) as out:
+            for at in range(0, len(data), 5000):
+                out.write(data[at : at + 5000])
+                time.sleep(0.01)
+
+    plan = planned(tmp_path, LINES.replace("address: 'ADDRESS'", "file: machine.txt"))
+    with beside(write):
+        done = cmmlink("run", plan, "--json", "--records", tmp_path / "records")
+    assert (done.code, done.json()["judged"]) == (0, COUNT), done.err
+
+
+def test_a_file_that_is_there_is_read_from_its_beginning_where_the_plan_says_so(tmp_path: Path) -> None:
+    data, device = printed(tmp_path), LINES.replace("address: 'ADDRESS'", "file: machine.txt, existing: true")
+    (tmp_path / "machine.txt").write_bytes(data)
+    done = cmmlink("run", planned(tmp_path, device), "--json", "--records", tmp_path / "records")
+    assert (done.code, done.json()["judged"]) == (0, COUNT), done.err
+    (tmp_path / "machine.txt").write_bytes(GOLDEN + data)
+    several = cmmlink("run", planned(tmp_path, device), "--json", "--records", tmp_path / "records")
+    assert several.code == 2
+    assert "machine.txt holds 2 sets" in several.out + several.err
+    named = device.replace("unit: mm", "unit: mm, format: {language: g800, result_set: PART-RESULTS}")
+    done = cmmlink("run", planned(tmp_path, named), "--json", "--records", tmp_path / "records")
+    assert (done.code, done.json()["judged"]) == (0, COUNT), done.err
+
+
+@pytest.mark.parametrize(
+    ("sample", "problem"),
+    [
+        (b"N 1 X 1.0 Y 2.0 Z 0.\rM30\r", ""),
+        (b"N 1 X 1.0 Y 2.0 Z 0.\rHELLO\r", "sample.txt, line 2: 'HELLO' gives no point: line that the pattern does not describe"),
+        (b"M30\r", "sample.txt holds no line with a point"),
+        (PRINT_OUT, "the machine prints features"),
+    ],
+)
+def test_check_tries_a_pattern_on_a_sample(sample: bytes, problem: str, tmp_path: Path) -> None:
+    (tmp_path / "sample.txt").write_bytes(sample)
+    told = NUMBERED.replace("{{", "{").replace("}}", ", pass_over: '-+', sample: sample.txt}")
+    plan = planned(tmp_path, LINES.replace("ADDRESS", "127.0.0.1:9").replace("unit", f"format: {told}, unit"))
+    checked = cmmlink("check", plan)
+    assert checked.code == (2 if problem else 0), checked.err
+    assert problem in checked.err
+    assert ("device.format.sample" in checked.err) is bool(problem)
+
+
+def test_the_plan_of_the_page_of_machines_finds_the_part_that_is_simulated_without_a_path(tmp_path: Path) -> None:
+    text = re.findall(r"```yaml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)[1]
+    (tmp_path / "nominal.csv").write_bytes(plan_file().with_name("nominal.csv").read_bytes())
+    options = ["--tip-radius-mm", "1.0", "--form-error-mm", "0.02", "--unpaced"]
+    part = simulated(
+        "machine-tool", "127.0.0.1:0", tmp_path, *options, path_mm=section_on_machine(), noise_mm=0.0, count=204, rate_hz=5, speed_mm_s=5
+    )
+    with part as machine:
+        (tmp_path / "plan.yaml").write_text(text.replace("127.0.0.1:9100", machine.address) + FINELY, encoding="utf-8")
+        done = cmmlink("run", tmp_path / "plan.yaml", "--json", "--records", tmp_path / "records")
+    assert (done.code, done.json()["verdict"]) == (0, "conform"), done.err
