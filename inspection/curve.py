@@ -142,7 +142,8 @@ class NurbsCurve:
         """Parameters (m,) wrapped into the domain of a closed curve. Raises ValueError for those outside that of an open one."""
         start, end = self.domain
         if self.closed:
-            return np.where((u >= start) & (u <= end), u, start + np.mod(u - start, end - start))
+            inside = (u >= start) & (u <= end)
+            return u if inside.all() else np.where(inside, u, start + np.mod(u - start, end - start))
         slack = 1e-12 * (end - start)
         if not ((u >= start - slack) & (u <= end + slack)).all():
             raise ValueError(f"parameter outside [{start}, {end}] of an open curve: {u.min()} .. {u.max()}")

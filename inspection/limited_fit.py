@@ -64,13 +64,12 @@ def register_within(
     look = _Look(points, nominal, start, freedoms, method, tip_radius_mm, target_mm)
     if shares is not None:
         look.weights = shares
-    amounts, steps, settled = _settle(look, np.zeros(len(freedoms)))
+    amounts, here, steps, settled = _settle(look, np.zeros(len(freedoms)))
     for _ in range(_WEIGHINGS if weights == "arc-length" and shares is None else 0):
-        here = look(amounts)
         weigh_by_station(np.where(here.takes_part, here.station_mm, np.nan), look.weights, nominal)
-        amounts, more, settled = _settle(look, amounts)
+        amounts, here, more, settled = _settle(look, amounts)
         steps += more
-    return _limited_fit(look, amounts, steps, settled)
+    return _limited_fit(look, amounts, here, steps, settled)
 
 
 class _State(NamedTuple):
@@ -104,7 +103,7 @@ class _Look:
         units = self.freedoms.units_mm(reach)
         free = self.freedoms.directions.T / units  # (3, k): a step of 1 moves the farthest point by 1 mm
         e, w, J = d.deviation_mm[part] - self.target_mm, self.weights[part], gradients(d.normal, arms)[part]
-        radial = (arms * d.normal).sum(axis=1)[part]
+        radial = (arms[:, 0] * d.normal[:, 0] + arms[:, 1] * d.normal[:, 1])[part]
         across = np.column_stack([-d.normal[part, 1], d.normal[part, 0], radial])
         bending = (across.T * (w * e * _bend(d, self.nominal.outward, self.tip_radius_mm)[part])) @ across
         bending[2, 2] -= float((w * e * radial).sum())
@@ -121,8 +120,8 @@ def _bend(d: Deviations, outward: float, tip_radius_mm: float) -> Array:
     return np.where(usable, np.where(at_corner, 1.0, -outward * d.curvature) / np.where(usable, below, 1.0), 0.0)
 
 
-def _settle(look: _Look, amounts: Array) -> tuple[Array, int, bool]:
-    """Go to the least mean square. Gives the amounts (k,), the steps, and whether the last moved nothing by more than 1e-9 mm."""
+def _settle(look: _Look, amounts: Array) -> tuple[Array, _State, int, bool]:
+    """Go to the least mean square. Gives the amounts (k,), what they lead to, the steps, and whether the last moved less than 1e-9 mm."""
     here, steps, settled = look(amounts), 0, not len(amounts)
     lower, upper = look.freedoms.lower, look.freedoms.upper
     while not settled and steps < _MOST_STEPS:
@@ -138,7 +137,7 @@ def _settle(look: _Look, amounts: Array) -> tuple[Array, int, bool]:
             share /= 2
         else:
             break
-    return amounts, steps, settled
+    return amounts, here, steps, settled
 
 
 def _step(state: _State, lower: Array, upper: Array) -> Array:
@@ -158,9 +157,9 @@ def _step(state: _State, lower: Array, upper: Array) -> Array:
     return np.clip(lsq_linear(rows, aim, (lower, open_to), method="bvls", tol=1e-15).x, lower, upper)
 
 
-def _limited_fit(look: _Look, amounts: Array, steps: int, settled: bool) -> LimitedFit:
-    """The result at amounts (k,) of the free motions."""
-    here, freedoms = look(amounts), look.freedoms
+def _limited_fit(look: _Look, amounts: Array, here: _State, steps: int, settled: bool) -> LimitedFit:
+    """The result at amounts (k,) of the free motions, and at what they lead to."""
+    freedoms = look.freedoms
     count = int((here.takes_part & (look.weights > 0)).sum())
     held = np.minimum(amounts - freedoms.lower, freedoms.upper - amounts) * here.units_mm <= _STANDSTILL_MM
     scatter = here.square / max(count - int((~held).sum()), 1)

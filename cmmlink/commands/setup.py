@@ -117,12 +117,12 @@ def prepare() -> int:
     from cmmlink.demo import plan_file as demo_plan_file
     from cmmlink.from_plan import profile_of
     from cmmlink.plan import load_plan
-    from inspection import compiled_code_folder, rehearse
+    from inspection import Outline, compiled_code_folder, find_airfoil, rehearse
 
     profile = profile_of(load_plan(demo_plan_file()))
     rehearse(profile, "veaw", reject_outliers=True)  # the method and the fit that need the most
     rehearse(profile)
-    profile.curve.few_derivatives(0.5, 2)  # by which characteristics look for places on a section
+    _ = Outline(find_airfoil(profile)).camber  # by what it takes, characteristics look for places on a section
     folder = compiled_code_folder()
     if folder is None:
         return fail("no folder for compiled code can be written, so that every command compiles anew", UNUSABLE)

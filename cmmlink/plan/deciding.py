@@ -1,8 +1,10 @@
 """What every plan says of how a part is judged: the tolerance, the characteristics, and what the verdict rests on."""
 
+import json
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import Annotated, Protocol
 
 import yaml
@@ -166,4 +168,10 @@ class Deciding(Settings):
 
     def effective_yaml(self) -> str:
         """Spell the plan with every default filled in and every path absolute; as a plan it means the same."""
-        return yaml.safe_dump(self.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
+        return "".join(_spelled(key, json.dumps(value)) for key, value in self.model_dump(mode="json").items())
+
+
+@lru_cache(maxsize=64)
+def _spelled(key: str, value_json: str) -> str:
+    """One key of a plan as YAML. The sections of a stack share all but one of theirs, and to spell twenty characteristics takes 10 ms."""
+    return yaml.safe_dump({key: json.loads(value_json)}, sort_keys=False, allow_unicode=True)

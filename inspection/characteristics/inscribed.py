@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from inspection.characteristics.outline import AirfoilSection
 from inspection.errors import InspectionError
+from inspection.kernels import nearest_squared, smallest_touching
 
 Array = NDArray[np.float64]
 
@@ -87,11 +88,11 @@ def inscribe_circles(section: AirfoilSection, u: Array) -> InscribedCircles:
     """The circles that touch the side from `first` to `nose` at the parameters u (k,), and the other side."""
     place, first, second, normal = section.frame(u)
     v = _touch_other_side(section, place, normal)
-    contact, v_first, v_second, _ = section.frame(v)
+    contact, v_first, v_second = section.derivatives(v, 2)
     d = contact - place
-    facing = _dot(normal, d)
+    facing = dot(normal, d)
     with np.errstate(divide="ignore", invalid="ignore"):
-        radius = np.where(facing > 0, _dot(d, d) / (2 * facing), np.nan)
+        radius = np.where(facing > 0, dot(d, d) / (2 * facing), np.nan)
     centre = place + radius[:, None] * normal
     is_whole = (v > section.nose) & (v < section.last) & (u > section.first) & (u < section.nose)
     with np.errstate(invalid="ignore"):
@@ -100,20 +101,14 @@ def inscribe_circles(section: AirfoilSection, u: Array) -> InscribedCircles:
         for a, b in ((first, second), (v_first, v_second)):
             curvature = section.inward * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / np.hypot(*a.T) ** 3
             is_whole &= radius * curvature <= 1 - _OSCULATING
-        slip = np.abs(_dot(centre - contact, v_first)) / np.hypot(*v_first.T)
+        slip = np.abs(dot(centre - contact, v_first)) / np.hypot(*v_first.T)
         is_whole &= slip <= _TANGENT * radius
-        nearest = _nearest(centre, section.points_mm)
+        nearest = np.sqrt(nearest_squared(centre, section.points_mm))
         is_whole &= nearest >= radius - _INSIDE * section.length_mm
     return InscribedCircles(u, v, place, contact, centre, radius, is_whole)
 
 
-def _nearest(places: Array, outline: Array) -> Array:
-    """Distances (k,) of places (k, 2) from the nearest of the samples (n, 2)."""
-    x, y = places[:, None, 0] - outline[None, :, 0], places[:, None, 1] - outline[None, :, 1]
-    return np.asarray(np.sqrt((x * x + y * y).min(axis=1)))
-
-
-def _dot(one: Array, other: Array) -> Array:
+def dot(one: Array, other: Array) -> Array:
     """The products (k,) of vectors (k, 2); a sum over rows of two takes several times as long."""
     return np.asarray(one[:, 0] * other[:, 0] + one[:, 1] * other[:, 1])
 
@@ -121,20 +116,16 @@ def _dot(one: Array, other: Array) -> Array:
 def _touch_other_side(section: AirfoilSection, place: Array, normal: Array) -> Array:
     """Parameters (k,) at which the circles at `place` (k, 2) touch the side from nose to last."""
     side = slice(section.nose_sample, None)
-    parameter, points = section.parameter[side], section.points_mm[side]
-    dx, dy = points[None, :, 0] - place[:, None, 0], points[None, :, 1] - place[:, None, 1]
-    facing = normal[:, None, 0] * dx + normal[:, None, 1] * dy
-    with np.errstate(divide="ignore", invalid="ignore"):
-        radius = np.where(facing > 0, (dx * dx + dy * dy) / (2 * facing), np.inf)
-    best = np.argmin(radius, axis=1)
+    parameter = section.parameter[side]
+    best = smallest_touching(place, normal, section.points_mm[side])
     low, high = parameter[np.maximum(best - 1, 0)], parameter[np.minimum(best + 1, len(parameter) - 1)]
     v = parameter[best]
     for _ in range(_NEWTON_STEPS):
-        contact, first, second, _ = section.frame(v)
+        contact, first, second = section.derivatives(v, 2)
         d = contact - place
-        square, facing_now = _dot(d, d), _dot(normal, d)
-        slope = 2 * _dot(d, first) * facing_now - square * _dot(normal, first)
-        bend = 2 * (_dot(first, first) + _dot(d, second)) * facing_now - square * _dot(normal, second)
+        square, facing_now = dot(d, d), dot(normal, d)
+        slope = 2 * dot(d, first) * facing_now - square * dot(normal, first)
+        bend = 2 * (dot(first, first) + dot(d, second)) * facing_now - square * dot(normal, second)
         with np.errstate(divide="ignore", invalid="ignore"):
             step = np.where(bend > 0, -slope / bend, -np.sign(slope) * (high - low) / 4)
         stepped = np.minimum(np.maximum(v + step, low), high)

@@ -87,11 +87,15 @@ class AirfoilSection:
 
     def point(self, u: ArrayLike) -> Array:
         """Points (m, 2) at the parameters u (m,)."""
-        return np.asarray(self.curve.few_derivatives(self._on_outline(u), 0)[0])
+        return np.asarray(self.derivatives(np.asarray(u), 0)[0])
+
+    def derivatives(self, u: Array, order: int) -> Array:
+        """Point and derivatives by u up to `order`: (order + 1, m, 2)."""
+        return self.curve.few_derivatives(self._on_outline(u), order)
 
     def frame(self, u: Array) -> tuple[Array, Array, Array, Array]:
         """Point (m, 2), derivative by u (m, 2), second derivative (m, 2) and unit normal into the section (m, 2)."""
-        point, first, second = self.curve.few_derivatives(self._on_outline(u), 2)
+        point, first, second = self.derivatives(u, 2)
         unit = first / np.hypot(first[:, 0], first[:, 1])[:, None]
         return point, first, second, self.inward * np.column_stack([-unit[:, 1], unit[:, 0]])
 
@@ -113,7 +117,7 @@ class AirfoilSection:
 
     def _on_outline(self, u: ArrayLike) -> Array:
         """Parameters (m,) within the outline: those beyond an end become that end, and a round outline has none."""
-        return np.asarray(u if self.trailing == "round" else np.clip(u, self.first, self.last), dtype=np.float64)
+        return np.asarray(u if self.trailing == "round" else np.minimum(np.maximum(u, self.first), self.last), dtype=np.float64)
 
     def side_of(self, u: float) -> Side:
         """The side that a parameter lies on."""

@@ -19,7 +19,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from inspection.characteristics.inscribed import CamberLine, InscribedCircles, inscribe_circles
+from inspection.characteristics.inscribed import CamberLine, InscribedCircles, dot, inscribe_circles
 from inspection.characteristics.outline import AirfoilSection, Edge
 from inspection.characteristics.section_value import SectionValue
 from inspection.characteristics.zoom import find_maximum
@@ -86,8 +86,11 @@ def _crossings(section: AirfoilSection, circles: InscribedCircles) -> tuple[Arra
     for start, low, high in ((circles.u, section.first, section.nose), (circles.v, section.nose, section.last)):
         u = start.copy()
         for _ in range(8):
-            point, first, _, _ = section.frame(u)
-            u = np.clip(u - ((point - centre) * along).sum(axis=1) / (first * along).sum(axis=1), low, high)
+            point, first = section.derivatives(u, 1)
+            off, rise = dot(point - centre, along), dot(first, along)
+            before, u = u, np.minimum(np.maximum(u - off / rise, low), high)
+            if np.array_equal(u, before):  # every further step would give the same
+                break
         found.append(u)
     return found[0], found[1]
 

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from inspection.kernels.side_by_side import fit_compiled_beside, is_fit_compiled
     from inspection.kernels.splines import spline_derivatives
     from inspection.kernels.thinning import strides
+    from inspection.kernels.touching import nearest_squared, smallest_touching
     from inspection.kernels.tree_growing import GrownTree, shortest_tree
 else:
     from inspection.front_door import load_on_use
@@ -46,6 +47,7 @@ else:
         "inspection.kernels.side_by_side": ("fit_compiled_beside", "is_fit_compiled"),
         "inspection.kernels.splines": ("spline_derivatives",),
         "inspection.kernels.thinning": ("strides",),
+        "inspection.kernels.touching": ("nearest_squared", "smallest_touching"),
         "inspection.kernels.tree_growing": ("GrownTree", "shortest_tree"),
     }
 
@@ -80,10 +82,12 @@ __all__ = [
     "fit_compiled_beside",
     "is_fit_compiled",
     "judge_rows",
+    "nearest_squared",
     "project",
     "project_on_samples",
     "project_outward",
     "shortest_tree",
+    "smallest_touching",
     "spline_derivatives",
     "strides",
     "take_in",

@@ -2,7 +2,7 @@
 
 from typing import get_args
 
-from inspection import RigidTransform, discretize, register_fine, rehearse
+from inspection import Outline, RigidTransform, discretize, find_airfoil, register_fine, rehearse
 from inspection.methods import Method
 from tests.inspection import profiles
 
@@ -13,7 +13,7 @@ def compile_kernels() -> None:
     for method in get_args(Method):
         rehearse(nominal, method, reject_outliers=True)
         register_fine(nominal.points_mm, nominal, RigidTransform.identity(), method=method)
-    nominal.curve.few_derivatives(0.5, 2)
+    assert len(Outline(find_airfoil(nominal)).camber.points_mm)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 from cmmlink.errors import PlanError
 from cmmlink.plan import Plan, load_plan, read_model
@@ -52,6 +53,7 @@ def test_the_example_of_the_drawing_loads_as_it_stands() -> None:
 def test_a_plan_spelled_in_full_means_the_same() -> None:
     plan = read(HEAD + OF_THE_ISSUE)
     assert read(plan.effective_yaml()) == plan
+    assert plan.effective_yaml() == yaml.safe_dump(plan.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
 
 
 @pytest.mark.parametrize(
