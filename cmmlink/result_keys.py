@@ -242,6 +242,10 @@ class RunLine(JsonObject):
     started: str | None = Field(description="date and time in UTC, with a Z; of records of earlier versions with the offset from UTC")
     part: str | None = Field(description="the name of the part")
     serial_number: str | None = Field(description="the serial number of the part, empty where none was given")
+    operator: str | None = Field(description="who measured, empty where nobody said so")
+    plan_file: str | None = Field(
+        description="the name of the plan's file, empty where there was none; null in records of earlier versions"
+    )
     state: State = Field(description="how the run ended; running: it is being recorded just now; damaged: its records were altered")
     received: int | None = Field(description="the points received; null while the run goes on")
     verdict: VerdictName | None = Field(description="the verdict; null where there is none")
@@ -300,6 +304,7 @@ class Shown(JsonObject):
     part: str = Field(description="the name of the part")
     serial_number: str = Field(description="the serial number of the part, empty where none was given")
     operator: str = Field(description="who measured, empty where nobody was named")
+    plan_file: str | None = Field(default=None, description="the name of the plan's file; records of earlier versions have none")
     device: str = Field(description="the device that the points came from")
     simulated: bool = Field(description="whether the device was a simulated one")
     notes: list[str] = Field(

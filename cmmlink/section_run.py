@@ -51,7 +51,7 @@ def plan_of_section(plan: CtPlan, cut: SurfaceSection, nominal: Path) -> Plan:
         allow=plan.allow,
         out=NO_RESULTS,
         report=plan.report,
-    )
+    ).named(plan.file_name)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

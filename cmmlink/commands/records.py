@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -21,6 +21,9 @@ from inspection import Method, Verdict
 if TYPE_CHECKING:
     from cmmlink.record import Replay
 
+VerdictSought = Literal["conform", "nonconform", "uncertain", "none"]
+SortKey = Literal["started", "part", "serial_number", "operator", "plan_file", "state", "verdict"]
+
 _DETAILS = ("run", "started", "ended", "state", "message", "verdict", "part", "serial_number", "operator", "device", "chain_sha256")
 _MOST_DISAGREEMENTS = 5
 _PROVES = (
@@ -35,14 +38,29 @@ _PROVES_OF_MERGED = (
     "The result of run {run} and the records agree: the run was merged from another station, and nothing of it was changed since the "
     "result was written there. The other records are not covered by it."
 )
+_DAYS = ["%Y-%m-%d"]
 _LONGEST_HEADLINE = len("INTERRUPTED AT 99 %")
 
 
-def runs(records: Records = None, as_json: Json = False) -> int:
-    """List the recorded runs."""
-    from cmmlink.record import list_runs
+def runs(
+    part: Annotated[str, typer.Option(metavar="TEXT", help="Only runs of parts whose name holds this.")] = "",
+    serial: Annotated[str, typer.Option(metavar="TEXT", help="Only serial numbers that hold this.")] = "",
+    operator: Annotated[str, typer.Option(metavar="TEXT", help="Only operators whose name holds this.")] = "",
+    plan: Annotated[str, typer.Option(metavar="TEXT", help="Only plans whose file name holds this.")] = "",
+    verdict: Annotated[VerdictSought | None, typer.Option(help="Only this verdict; none: ended early, or no verdict.")] = None,
+    since: Annotated[datetime | None, typer.Option(formats=_DAYS, help="Only runs of this day or later.")] = None,
+    until: Annotated[datetime | None, typer.Option(formats=_DAYS, help="Only runs of this day or earlier.")] = None,
+    sort: Annotated[SortKey, typer.Option(help="What the list is sorted by; runs alike stay in the order of time.")] = "started",
+    records: Records = None,
+    as_json: Json = False,
+) -> int:
+    """List the recorded runs, all or those that are looked for."""
+    from cmmlink.record import RunSearch, list_runs
 
-    found = list_runs(records_folder(records), now, deciding=True)
+    days = [None if day is None else day.date() for day in (since, until)]
+    search = RunSearch(part, serial, operator, plan, verdict or "", *days)
+    found = list_runs(records_folder(records), now, deciding=True, search=search)
+    found.sort(key=lambda entry: str(entry[sort] or "").casefold())
     if as_json:
         from cmmlink.result_keys import RunLine
 
@@ -55,7 +73,8 @@ def runs(records: Records = None, as_json: Json = False) -> int:
         decided = f"  decided by {entry['decided_by']}" if entry["decided_by"] else ""
         _say(f"{head}  {received:>9} points  {_part_in(entry)}{decided}")
     if not found:
-        _say(f"no run was recorded yet in {records_folder(records)}")
+        sought = "no such run was recorded" if search != RunSearch() else "no run was recorded yet"
+        _say(f"{sought} in {records_folder(records)}")
     return 0
 
 

@@ -3,12 +3,14 @@
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import fields
+from datetime import date
 from typing import Any, NamedTuple, get_args, get_type_hints
 
-from cmmlink.console.protocol import Acknowledge, Choose, Command, Enter, ImportSurface, OfRun, Plain, json_of
+from cmmlink.console.protocol import Acknowledge, Choose, Command, Enter, ImportSurface, OfRun, Plain, Search, json_of
 from cmmlink.console.refused import Refused
 from cmmlink.console.register_words import KeepMap, LookAtRegisters
 from cmmlink.console.station import Station
+from cmmlink.record import RunSearch, VerdictSought
 
 _LONGEST_WORD = 40  # of a command's name in an answer
 _WORDS = {str: "text", int: "whole number", bool: "yes or no"}
@@ -77,6 +79,23 @@ def action_of(command: Command, station: Station) -> Callable[[], str] | None:
         case Plain(do):
             return actions.get(do)
     return None
+
+
+def search_of(sought: Search) -> RunSearch | None:
+    """What a page looks for; None where that is everything. Raises Refused."""
+    verdict = next((name for name in get_args(VerdictSought) if name == sought.verdict), None)
+    if verdict is None:
+        raise Refused(f"there is no verdict {sought.verdict!r}")
+    days = [_day_of(text) for text in (sought.since, sought.until)]
+    search = RunSearch(sought.part, sought.serial_number, sought.operator, sought.plan, verdict, *days)
+    return None if search == RunSearch() else search
+
+
+def _day_of(text: str) -> date | None:
+    try:
+        return date.fromisoformat(text) if text else None
+    except ValueError:
+        raise Refused(f"{text!r} is no day; expected one like 2026-03-31") from None
 
 
 def _checked_value(document: Mapping[str, Any], key: str, hint: Any) -> Any:

@@ -15,6 +15,7 @@ import numpy as np
 
 from cmmlink import extremes, words
 from cmmlink.console import protocol
+from cmmlink.console.form_answers import PlanSaved, Understood
 from cmmlink.console.register_words import MapSaved
 from inspection import Verdict
 
@@ -34,7 +35,7 @@ def declarations_ts() -> str:
     for union in (protocol.Message, protocol.Command):
         for message in get_args(union):
             _collect(message, seen)
-    for answer in (protocol.Device, protocol.Understood, protocol.PlanSaved, MapSaved):
+    for answer in (protocol.Device, Understood, PlanSaved, MapSaved):
         _collect(answer, seen)
     lines += [_interface(record) for record in seen]
     lines += [f"\nexport type {name} = {_type(union)};\n" for name, union in _unions().items()]

@@ -1,7 +1,7 @@
 """One open page: what it looks at, what it was sent, and how long it may take to read."""
 
 import asyncio
-from collections.abc import Awaitable
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -10,11 +10,13 @@ from starlette.websockets import WebSocket
 
 from cmmlink.console.connections import Visitor
 from cmmlink.console.drawing import nominal_message, points_message
-from cmmlink.console.protocol import Message
+from cmmlink.console.protocol import FoundRuns, History, Message
 from cmmlink.extremes import PointsVersion
+from cmmlink.record import RunSearch
 from cmmlink.run_view import RunView
 
 _SENT_WITHIN_S = 10.0  # a page that takes longer to read one message is gone
+NOTHING_SOUGHT = FoundRuns(None, 0)
 _UNSEEN = PointsVersion(-1, 0)
 
 
@@ -23,6 +25,7 @@ class OpenPage:
     """One connected browser. Belongs to the event loop.
 
     generation : of the points it was sent last; counted for each page, because runs number theirs alike
+    search     : the runs that it looks for; `found` are those that there were when the history was `searched_in`
     expelled   : it has to come in again, with a new address
     """
 
@@ -34,8 +37,18 @@ class OpenPage:
     seen: PointsVersion = _UNSEEN
     generation: int = 0
     sent: dict[str, Message] = field(default_factory=dict)
+    search: RunSearch | None = None
+    found: FoundRuns = NOTHING_SOUGHT
+    searched_in: History | None = None
     expelled: bool = False
     sending: asyncio.Lock = field(default_factory=asyncio.Lock)
+
+    async def look_for_runs(self, history: History, find: Callable[[RunSearch], FoundRuns]) -> None:
+        """Look for the runs that the page looks for, unless the history has nothing new since."""
+        if self.search is None or self.searched_in is history:
+            return
+        self.searched_in = history
+        self.found = await anyio.to_thread.run_sync(find, self.search)
 
     async def send(self, message: str | bytes) -> None:
         """Send one message. A page that does not read is gone: it may hold neither memory nor the control of the station."""

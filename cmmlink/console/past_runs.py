@@ -19,6 +19,7 @@ from cmmlink.events import Counts, RunStarted, Sink
 from cmmlink.plan import Plan
 from cmmlink.record import (
     Replay,
+    RunSearch,
     Store,
     derived_of,
     earlier_run,
@@ -75,8 +76,15 @@ class PastRuns:
     _known: dict[tuple[str, str], RunRow] = field(default_factory=dict)
 
     def runs(self) -> Sequence[RunRow]:
-        """All runs, newest first. Raises StoreError."""
-        entries = list_runs(self.folder, self.now)[::-1][:_MOST_LISTED]
+        """The newest runs, newest first. Raises StoreError."""
+        return self.find_runs(RunSearch())[0]
+
+    def find_runs(self, search: RunSearch) -> tuple[Sequence[RunRow], int]:
+        """The newest of the runs that are looked for, newest first, and how many there are. Raises StoreError."""
+        found = list_runs(self.folder, self.now, search=search)
+        return self._rows_of(found[::-1][:_MOST_LISTED]), len(found)
+
+    def _rows_of(self, entries: Sequence[dict[str, Any]]) -> Sequence[RunRow]:
         if not entries:
             return []
         unknown = [entry for entry in entries if _key(entry) not in self._known]
@@ -176,6 +184,8 @@ def _row_of(entry: dict[str, Any], result: dict[str, Any]) -> RunRow:
         local_words(datetime.fromisoformat(entry["started"])) if entry["started"] else "",
         entry["part"] or "",
         entry["serial_number"] or "",
+        entry["operator"] or "",
+        entry["plan_file"] or "",
         section_words(entry["stack"]),
         bool(entry["simulated"]),
         entry["state"],
@@ -187,6 +197,8 @@ def _row_of(entry: dict[str, Any], result: dict[str, Any]) -> RunRow:
         "" if verdict in (None, Verdict.CONFORM) else worst_words(characteristics_at_end(result).rows),
         worst.get("deviation_mm"),
         worst.get("station_mm"),
+        worst.get("x_mm"),
+        worst.get("y_mm"),
         zone.get("lower_mm"),
         zone.get("upper_mm"),
     )

@@ -15,7 +15,7 @@ from typing import Any, TypeVar, get_args
 
 import numpy as np
 
-from cmmlink.console.protocol import FieldName, FormMistake, PlanSaved, Understood
+from cmmlink.console.form_answers import FieldName, FormMistake, PlanSaved, Understood
 from cmmlink.console.refused import without_folders
 from cmmlink.errors import PlanError
 from cmmlink.new_plan import (

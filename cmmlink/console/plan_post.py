@@ -11,7 +11,8 @@ import anyio.to_thread
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import PlainTextResponse, Response
 
-from cmmlink.console.protocol import LARGEST_NOMINAL, PlanSaved, Understood, json_of
+from cmmlink.console.form_answers import PlanSaved, Understood
+from cmmlink.console.protocol import LARGEST_NOMINAL, json_of
 from cmmlink.console.refused import Refused, words_of
 from cmmlink.console.station import Station
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cmmlink.console.choice import Choice, check_choice
+from cmmlink.console.form_answers import PlanSaved, Understood
 from cmmlink.console.plan_form import PlanForm, save_form, understand_nominal
-from cmmlink.console.protocol import PlanSaved, Understood
 from cmmlink.console.refused import Refused, answer_errors
 from cmmlink.console.register_look import keep_map
 from cmmlink.console.register_words import KeepMap, MapSaved

@@ -13,6 +13,7 @@ from dataclasses import dataclass, fields
 from typing import Any, Literal
 
 from cmmlink.characteristic_rows import CharacteristicRow
+from cmmlink.console.form_answers import PlanSaved, Understood
 from cmmlink.console.register_words import KeepMap, LookAtRegisters, MapSaved, RegisterTable
 from cmmlink.run_state import RunState
 from cmmlink.words import VERDICT_NAMES, VERDICT_WORDS, Shape, VerdictName
@@ -192,6 +193,8 @@ class RunRow:
     began: str
     part: str
     serial_number: str
+    operator: str
+    plan: str
     section: str
     simulated: bool
     state: str
@@ -203,6 +206,8 @@ class RunRow:
     of: str
     worst_mm: float | None
     worst_station_mm: float | None
+    worst_x_mm: float | None
+    worst_y_mm: float | None
     lower_mm: float | None
     upper_mm: float | None
     judged: tuple[str, ...] = ()
@@ -210,10 +215,19 @@ class RunRow:
 
 @dataclass(frozen=True, slots=True)
 class History:
-    """The runs on record, newest first."""
+    """The newest runs on record, newest first."""
 
     runs: tuple[RunRow, ...]
     type: Literal["history"] = "history"
+
+
+@dataclass(frozen=True, slots=True)
+class FoundRuns:
+    """The newest of the runs that the page looks for, newest first, and how many there are; null where it looks for none."""
+
+    runs: tuple[RunRow, ...] | None
+    total: int
+    type: Literal["found"] = "found"
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,60 +274,6 @@ class Device:
     description: str
 
 
-Asked = Literal["unit", "chord", "curve", "ends", "side"]
-FieldName = Literal["nominal", "unit", "curve", "ends", "side", "part", "tolerance", "source", "radius", "results", "name"]
-
-
-@dataclass(frozen=True, slots=True)
-class FormMistake:
-    """What is wrong with the answer in a field of a new plan."""
-
-    field: FieldName
-    words: str
-
-
-@dataclass(frozen=True, slots=True)
-class Understood:
-    """What is understood of a nominal that a page hands in. The answer to its post at `/nominal`, as JSON.
-
-    problem    : why it cannot be read; empty where it can
-    asks       : what it leaves open: the unit is that of the file, or the length of the chord that it is drawn in units of
-    curves     : number and words of each curve of a drawing; empty where there is one
-    turns_left : a profile that goes round does so counter-clockwise
-    points_mm  : along the curve, from its start; in units of the file where the unit is not known, as are length and size
-    part, name : names for part and plan that are offered; files: of points and surfaces beside the plans
-    """
-
-    problem: str = ""
-    mistakes: tuple[FormMistake, ...] = ()
-    asks: tuple[Asked, ...] = ()
-    curves: tuple[tuple[int, str], ...] = ()
-    closed: bool = False
-    turns_left: bool = False
-    length_mm: float = 0.0
-    size_mm: tuple[float, float] = (0.0, 0.0)
-    unit_known: bool = True
-    source_format: str = ""
-    notes: tuple[str, ...] = ()
-    points_mm: tuple[tuple[float, float], ...] = ()
-    part: str = ""
-    name: str = ""
-    files: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class PlanSaved:
-    """What came of a new plan: its name once it is saved, else what is wrong. The answer to a post at `/plan`, as JSON.
-
-    surface : it is a plan of a CT surface; taken: there was a plan of this name
-    """
-
-    name: str = ""
-    surface: bool = False
-    taken: bool = False
-    mistakes: tuple[FormMistake, ...] = ()
-
-
 @dataclass(frozen=True, slots=True)
 class Choose:
     """Choose a plan and have it checked."""
@@ -346,6 +306,20 @@ class OfRun:
 
     run: str
     do: Literal["open", "replay"]
+
+
+@dataclass(frozen=True, slots=True)
+class Search:
+    """Look for runs; what is empty asks for nothing. Days are written 2026-03-31; the verdict is a name of one, or none."""
+
+    part: str
+    serial_number: str
+    operator: str
+    plan: str
+    verdict: str
+    since: str
+    until: str
+    do: Literal["search"] = "search"
 
 
 @dataclass(frozen=True, slots=True)
@@ -382,10 +356,11 @@ Message = (
     | ShownRun
     | CharacteristicList
     | History
+    | FoundRuns
     | SurfaceState
     | RegisterTable
 )
-Command = Choose | Enter | Acknowledge | OfRun | OpenSection | ImportSurface | LookAtRegisters | KeepMap | Plain
+Command = Choose | Enter | Acknowledge | OfRun | Search | OpenSection | ImportSurface | LookAtRegisters | KeepMap | Plain
 
 
 def json_of(message: Message | Understood | PlanSaved | MapSaved) -> str:

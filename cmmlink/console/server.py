@@ -14,6 +14,7 @@ import logging
 import threading
 import time
 from collections.abc import Awaitable, Callable, Iterator
+from contextlib import suppress
 from dataclasses import asdict, replace
 from importlib import resources
 from typing import Any
@@ -28,12 +29,12 @@ from starlette.types import ASGIApp
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from cmmlink.characteristic_rows import MOST_ROWS, Characteristics, most_shown
-from cmmlink.console.commands import Received, action_of, read_json, receive
+from cmmlink.console.commands import Received, action_of, read_json, receive, search_of
 from cmmlink.console.connections import LARGEST_COMMAND, LARGEST_HEAD, BoundedServer, PageProtocol, Visitor
 from cmmlink.console.guard import Guard
 from cmmlink.console.keys import Keys
 from cmmlink.console.listening import Access, encryption_of, listen_at
-from cmmlink.console.open_page import OpenPage
+from cmmlink.console.open_page import NOTHING_SOUGHT, OpenPage
 from cmmlink.console.plan_post import POST_S, Posts
 from cmmlink.console.protocol import (
     TOO_MANY_PAGES,
@@ -49,6 +50,7 @@ from cmmlink.console.protocol import (
     OfRun,
     OpenSection,
     Plain,
+    Search,
     ShownRun,
     json_of,
 )
@@ -293,6 +295,10 @@ class ConsoleServer:
             page.opened = await anyio.to_thread.run_sync(self.station.open_run, command.run)
         elif isinstance(command, OpenSection):
             page.opened = await anyio.to_thread.run_sync(self.station.open_section, command.section)
+        elif isinstance(command, Search):
+            page.search, page.found, page.searched_in = search_of(command), NOTHING_SOUGHT, None
+            await page.look_for_runs(self.station.history, self.station.find_runs)
+            return "all runs" if page.search is None else f"{page.found.total} runs found"
         elif isinstance(command, Plain):
             return await self._obey_plain(page, command)
         return "opened"
@@ -323,6 +329,8 @@ class ConsoleServer:
         while not page.expelled:
             began_s = time.monotonic()
             await page.show_points(page.opened or self.station.view)
+            with suppress(Refused):  # the records cannot be read just now, of which there is an alarm
+                await page.look_for_runs(self.station.history, self.station.find_runs)
             for message in self._newest(page):
                 if page.sent.get(message.type) != message:
                     page.sent[message.type] = message
@@ -344,6 +352,7 @@ class ConsoleServer:
         is_final = state is not None and state.phase == "finished"
         yield CharacteristicList(most_shown(shown.rows), max(len(shown.rows) - MOST_ROWS, 0), shown.uncertainty, is_final)
         yield station.history
+        yield page.found
         yield station.ct.state
         yield station.registers.state
 

@@ -15,9 +15,10 @@ from cmmlink.console.choice import CheckedPlan
 from cmmlink.console.ct_import import CtImport, InspectSurface
 from cmmlink.console.device_test import TESTING, listen_to_device
 from cmmlink.console.entry import Entry
+from cmmlink.console.form_answers import PlanSaved, Understood
 from cmmlink.console.job import Job, JobKind
 from cmmlink.console.plan_shelf import DEMO, Listed, PlanShelf
-from cmmlink.console.protocol import DeviceTest, History, PlanSaved, StationState, Understood
+from cmmlink.console.protocol import DeviceTest, FoundRuns, History, StationState
 from cmmlink.console.refused import Refused, answer_errors
 from cmmlink.console.register_look import RegisterLook
 from cmmlink.console.register_words import KeepMap, LookAtRegisters, MapSaved
@@ -27,6 +28,7 @@ from cmmlink.devices import words_of
 from cmmlink.errors import StoreError
 from cmmlink.events import RunStarted
 from cmmlink.plan import Plan
+from cmmlink.record import RunSearch
 from cmmlink.run_view import RunContext, RunView
 from cmmlink.words import repetition_words
 
@@ -237,6 +239,13 @@ class Station:
         view = RunView(section.context, self._setup.clock, lambda: section.context.began)
         view.recall(section.started, section.ended)
         return view
+
+    def find_runs(self, search: RunSearch) -> FoundRuns:
+        """Look for recorded runs."""
+        records = self._records()
+        with answer_errors():
+            rows, total = records.find_runs(search)
+        return FoundRuns(tuple(rows), total)
 
     def export_run(self, run: str, folder: Path) -> Path:
         """Write a recorded run as a zip archive into a folder."""

@@ -13,6 +13,7 @@ from cmmlink.console.protocol import RunRow
 from cmmlink.devices import Connect
 from cmmlink.events import Sink
 from cmmlink.plan import Plan
+from cmmlink.record import RunSearch
 from cmmlink.run import FinishedRun
 
 
@@ -24,7 +25,10 @@ class Records(Protocol):
         """Where runs are recorded."""
 
     def runs(self) -> Sequence[RunRow]:
-        """All runs, newest first."""
+        """The newest runs, newest first."""
+
+    def find_runs(self, search: RunSearch) -> tuple[Sequence[RunRow], int]:
+        """The newest of the runs that are looked for, newest first, and how many there are."""
 
     def measured_before(self, part: str, serial_number: str) -> str | None:
         """Give the newest run of a part with this serial number, None where there is none."""

@@ -5,10 +5,10 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import Annotated, Protocol
+from typing import Annotated, Protocol, Self
 
 import yaml
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import Field, PrivateAttr, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from cmmlink.plan.characteristics import AskedCharacteristic, AskedProfile
@@ -84,6 +84,8 @@ def _first_profile(asked: tuple[AskedCharacteristic, ...]) -> AskedProfile | Non
 class Deciding(Settings):
     """How the verdict on the part is reached: what every plan may say, and how every plan is spelled in full."""
 
+    _file_name: str = PrivateAttr("")
+
     rule: RuleName = Field(
         default="minimum-zone",
         description="what decides without a datum: minimum-zone (a part conforms when any placement passes, ISO 1101), or best-fit",
@@ -105,6 +107,17 @@ class Deciding(Settings):
     decision_rule: DecisionRule = Field(default="iso-14253-1", description=DECISION_RULE)
     uncertainty: Uncertainty | None = Field(default=None, description=UNCERTAINTY)
     temperature: Temperature | None = Field(default=None, description=TEMPERATURE)
+
+    @property
+    def file_name(self) -> str:
+        """The name of the file that the plan was read from; empty where it was made without one."""
+        return self._file_name
+
+    def named(self, file_name: str) -> Self:
+        """The same plan, read from a file of this name."""
+        plan = self.model_copy()
+        plan._file_name = file_name
+        return plan
 
     @field_validator("characteristics")
     @classmethod

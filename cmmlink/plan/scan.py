@@ -354,7 +354,7 @@ def load_plan(path: str | PathLike[str]) -> Plan:
     except PointFileError as error:
         raise PlanError(str(error)) from None
     try:
-        plan = read_model(text, Plan)
+        plan = read_model(text, Plan).named(path.name)
     except YamlError as error:
         raise PlanError(f"{path}: {error}") from None
     plan = _with_paths_from(path.resolve().parent, plan)

@@ -148,7 +148,7 @@ def load_ct_plan(path: str | PathLike[str]) -> CtPlan:
     """Read and check a plan. Raises PlanError: file, line, key, the value found and what is allowed."""
     path = Path(path)
     try:
-        plan = read_model(read_text(path), CtPlan)
+        plan = read_model(read_text(path), CtPlan).named(path.name)
     except PointFileError as error:
         raise PlanError(str(error)) from None
     except YamlError as error:

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     )
     from cmmlink.record.recorder import QUEUE_BYTES, Recorder, RecordReference, RunInputs, software
     from cmmlink.record.replay import Replay, keep_judgement, recorded_plan, recorded_profile, replay_run
+    from cmmlink.record.search import RunSearch, VerdictSought
     from cmmlink.record.station_lock import PATIENCE_S
     from cmmlink.record.store import FILE_NAME, Store
 else:
@@ -67,6 +68,7 @@ else:
         ),
         "cmmlink.record.recorder": ("QUEUE_BYTES", "Recorder", "RecordReference", "RunInputs", "software"),
         "cmmlink.record.replay": ("Replay", "keep_judgement", "recorded_plan", "recorded_profile", "replay_run"),
+        "cmmlink.record.search": ("RunSearch", "VerdictSought"),
         "cmmlink.record.station_lock": ("PATIENCE_S",),
         "cmmlink.record.store": ("FILE_NAME", "Store"),
     }
@@ -87,7 +89,9 @@ __all__ = [
     "Recorder",
     "Replay",
     "RunInputs",
+    "RunSearch",
     "Store",
+    "VerdictSought",
     "arrivals_of",
     "back_up",
     "check_chain",

@@ -22,13 +22,14 @@ from cmmlink.record.chain import Record, is_damaged
 from cmmlink.record.derived import derived_of
 from cmmlink.record.origin import origin_of
 from cmmlink.record.recorder import end_draft
+from cmmlink.record.search import RunSearch
 from cmmlink.record.shapes import End, Header, Result, checked
 from cmmlink.record.station_lock import PATIENCE_S
 from cmmlink.record.store import Store, has_records, name_record
 from cmmlink.words import deciding_words
 from drivers import Arrival, PointBatch, Rejected, WireBytes
 
-_FROM_HEADER = ("run", "started", "part", "serial_number", "simulated")
+_FROM_HEADER = ("run", "started", "part", "serial_number", "simulated", "operator", "plan_file")
 _FROM_END = ("state", "received", "verdict", "coverage")
 _SHAPES: dict[str, type[Any]] = {"run": Header, "result": Result, "end": End}
 _CUT_OFF = "the program ended before the run did: power failure, crash or kill"
@@ -85,17 +86,19 @@ def open_to_read(folder: Path, now: Callable[[], datetime], *, close_interrupted
         yield store
 
 
-def list_runs(folder: Path, now: Callable[[], datetime], deciding: bool = False) -> list[dict[str, Any]]:
-    """Every run, oldest first: what its header says of it, its place in a stack, and how it ended; none where there is none.
+def list_runs(folder: Path, now: Callable[[], datetime], deciding: bool = False, search: RunSearch | None = None) -> list[dict[str, Any]]:
+    """Every run that is looked for, oldest first: what its header says of it, its place in a stack, and how it ended.
 
     The state of a run that another process records just now is "running"; a run that gave no result has no verdict.
 
+    search   : which runs; None: all
     deciding : read the results as well, and tell which of several characteristics decided; else nothing is told of that
     """
     if not has_records(folder):
         return []
     with open_to_read(folder, now) as store:
-        entries = [_entry(store, begin, end) for begin, end in store.begins_and_ends()]
+        all_entries = (_entry(store, begin, end) for begin, end in store.begins_and_ends())
+        entries = [entry for entry in all_entries if search is None or search.finds(entry)]
         return [entry | {"decided_by": _decider(store, entry) if deciding else ""} for entry in entries]
 
 

@@ -44,6 +44,7 @@ _POSE_S = 0.1  # the shortest time between two notes of a pose that still moves
 class RunInputs:
     """Everything that a run depends on and that its record keeps: the effective plan as YAML, the nominal's file, the software versions.
 
+    plan_file : the name of the plan's file, empty where the plan was made without one
     stack : of a section of a surface its place in its stack and what the stack rests on; None of every other run
     """
 
@@ -52,6 +53,7 @@ class RunInputs:
     nominal: bytes
     software: Mapping[str, str]
     stack: Mapping[str, Any] | None = None
+    plan_file: str = ""
 
     @classmethod
     def of(cls, plan: "Plan", stack: Mapping[str, Any] | None = None) -> "RunInputs":
@@ -70,7 +72,7 @@ class RunInputs:
             nominal = plan.nominal.file.read_bytes()
         except OSError as error:
             raise PlanError(f"{plan.nominal.file}: cannot be read: {error.strerror or error}") from error
-        return cls(plan.effective_yaml(), plan.nominal.file.name, nominal, software(), stack)
+        return cls(plan.effective_yaml(), plan.nominal.file.name, nominal, software(), stack, plan.file_name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,6 +198,7 @@ class Recorder:
             "clock_s": self._clock(),
             **asdict(started),
             "software": dict(inputs.software),
+            "plan_file": inputs.plan_file,
             "plan_sha256": hashlib.sha256(plan).hexdigest(),
             "nominal": inputs.nominal_name,
             "nominal_sha256": hashlib.sha256(inputs.nominal).hexdigest(),

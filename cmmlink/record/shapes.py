@@ -53,6 +53,7 @@ class Header(_Document):
     notes: list[str] = []
     software: dict[str, str | None]
     nominal: str
+    plan_file: str = ""
     stack: Place | None = None
 
 

@@ -243,6 +243,8 @@ export interface RunRow {
   readonly began: string;
   readonly part: string;
   readonly serial_number: string;
+  readonly operator: string;
+  readonly plan: string;
   readonly section: string;
   readonly simulated: boolean;
   readonly state: string;
@@ -254,15 +256,24 @@ export interface RunRow {
   readonly of: string;
   readonly worst_mm: number | null;
   readonly worst_station_mm: number | null;
+  readonly worst_x_mm: number | null;
+  readonly worst_y_mm: number | null;
   readonly lower_mm: number | null;
   readonly upper_mm: number | null;
   readonly judged: readonly string[];
 }
 
-/** The runs on record, newest first. */
+/** The newest runs on record, newest first. */
 export interface History {
   readonly runs: readonly RunRow[];
   readonly type: "history";
+}
+
+/** The newest of the runs that the page looks for, newest first, and how many there are; null where it looks for none. */
+export interface FoundRuns {
+  readonly runs: readonly RunRow[] | null;
+  readonly total: number;
+  readonly type: "found";
 }
 
 /** One judged section of a CT surface. */
@@ -335,6 +346,18 @@ export interface Acknowledge {
 export interface OfRun {
   readonly run: string;
   readonly do: "open" | "replay";
+}
+
+/** Look for runs; what is empty asks for nothing. Days are written 2026-03-31; the verdict is a name of one, or none. */
+export interface Search {
+  readonly part: string;
+  readonly serial_number: string;
+  readonly operator: string;
+  readonly plan: string;
+  readonly verdict: string;
+  readonly since: string;
+  readonly until: string;
+  readonly do: "search";
 }
 
 /** Look at one section of the CT surface. */
@@ -427,6 +450,6 @@ export interface MapSaved {
   readonly taken: boolean;
 }
 
-export type Message = Admitted | Hello | Alive | Answer | Control | StationState | AlarmList | ShownRun | CharacteristicList | History | SurfaceState | RegisterTable;
+export type Message = Admitted | Hello | Alive | Answer | Control | StationState | AlarmList | ShownRun | CharacteristicList | History | FoundRuns | SurfaceState | RegisterTable;
 
-export type Command = Choose | Enter | Acknowledge | OfRun | OpenSection | ImportSurface | LookAtRegisters | KeepMap | Plain;
+export type Command = Choose | Enter | Acknowledge | OfRun | Search | OpenSection | ImportSurface | LookAtRegisters | KeepMap | Plain;

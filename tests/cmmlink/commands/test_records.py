@@ -10,6 +10,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 from zlib import crc32
@@ -65,11 +66,25 @@ def test_runs_lists_the_run_with_the_promised_keys(station: Station) -> None:
     (entry,) = told("runs", "--records", station.records)["runs"]
     assert re.fullmatch(r"\d{8}-\d{6}-0001", entry.pop("run"))
     assert re.match(r"\d{4}-\d\d-\d\dT", entry.pop("started"))
-    assert entry == {"part": "blade", "serial_number": "0012", "state": "complete", "received": 600, "verdict": "conform"}
+    said = {"part": "blade", "serial_number": "0012", "operator": "Ada", "plan_file": "plan.yaml"}
+    assert entry == said | {"state": "complete", "received": 600, "verdict": "conform"}
     words = cmmlink("runs", "--records", station.records).out
     assert "complete" in words
     assert "  CONFORM  " in words
     assert "blade 0012" in words
+
+
+def test_runs_are_searched_and_sorted(station: Station) -> None:
+    def serials(*options: str) -> list[str]:
+        return [entry["serial_number"] for entry in told("runs", "--records", station.records, *options)["runs"]]
+
+    day = datetime.now().astimezone().date()
+    found = ("--part", "LADE", "--serial", "12", "--operator", "ada", "--plan", "plan.y", "--verdict", "conform", "--until", str(day))
+    assert serials(*found) == serials("--sort", "verdict") == ["0012"]
+    for absent in (("--operator", "Bob"), ("--verdict", "none"), ("--since", str(day + timedelta(1)))):
+        assert serials(*found, *absent) == []
+    assert "no such run was recorded" in cmmlink("runs", "--records", station.records, "--operator", "Bob").out
+    assert cmmlink("runs", "--records", station.records, "--since", "yesterday").code == 2
 
 
 def test_runs_where_nothing_was_recorded_is_empty_and_writes_nothing(tmp_path: Path) -> None:

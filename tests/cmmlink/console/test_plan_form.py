@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from cmmlink.commands.check import check
+from cmmlink.console.form_answers import PlanSaved
 from cmmlink.console.plan_form import PlanForm, save_form, understand_nominal
-from cmmlink.console.protocol import PlanSaved
 from cmmlink.plan import load_ct_plan, load_plan
 from tests.cmmlink.oval_part import oval_points, write_points
 from tests.cmmlink.test_new_plan import circles
