@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from inspection import ZoneCertificate
 
 if TYPE_CHECKING:
-    from inspection import CharacteristicResult, ConsumptionCertificate, FoundDatum, RigidTransform, WorstPlace
+    from inspection import CharacteristicResult, ConsumptionCertificate, FoundDatum, RigidTransform, VaryingZone, WorstPlace
 
 
 def characteristic_json(found: "CharacteristicResult") -> dict[str, Any]:
@@ -60,7 +60,8 @@ def certificate_json(proof: "ZoneCertificate | ConsumptionCertificate | None") -
         "consumption": None if isinstance(proof, ZoneCertificate) else proof.fit.consumption,
         "bound": proof.zone_mm / 2 - proof.gap_mm if isinstance(proof, ZoneCertificate) else proof.bound,
         "gap_mm": proof.gap_mm if isinstance(proof, ZoneCertificate) else None,
-        "tip_radius_mm": proof.tip_radius_mm if isinstance(proof, ZoneCertificate) else None,
+        "tip_radius_mm": proof.tip_radius_mm,
+        "limits": None if isinstance(proof, ZoneCertificate) else _limits(proof.zone),
         "pose": pose_json(fit.nominal_from_section),
         "active": [
             {"index": row, "x_mm": x, "y_mm": y, "deviation_mm": e, "station_mm": s, "multiplier": share}
@@ -73,6 +74,12 @@ def certificate_json(proof: "ZoneCertificate | ConsumptionCertificate | None") -
         "finest_mm": number(proof.finest_mm),
         "words": proof.words,
     }
+
+
+def _limits(zone: "VaryingZone") -> dict[str, Any]:
+    """Limits that vary along the profile."""
+    columns = {"station_mm": zone.station_mm, "lower_mm": zone.lower_mm, "upper_mm": zone.upper_mm}
+    return {name: values.tolist() for name, values in columns.items()} | {"between": zone.between, "border_mm": zone.border_mm}
 
 
 def _datum(datum: "FoundDatum") -> list[dict[str, Any]]:

@@ -70,6 +70,16 @@ class Holding(Witness):
     multiplier: float = Field(description="its share in the balance of gradients; they are positive and add up to 1")
 
 
+class VaryingLimits(JsonObject):
+    """Limits of the deviation that vary along the profile."""
+
+    station_mm: list[float] = Field(description="where they stand, rising; the same twice is a step")
+    lower_mm: list[float] = Field(description="the lower limits there")
+    upper_mm: list[float] = Field(description="the upper limits there")
+    between: Literal["linear", "smooth", "constant"] = Field(description="how they run from station to station")
+    border_mm: float = Field(description="within this distance of a step the limits of both its sides hold")
+
+
 class Certificate(JsonObject):
     """What proves a minimum zone, or a least consumption of a zone that varies, over every placement of the part."""
 
@@ -79,7 +89,8 @@ class Certificate(JsonObject):
     consumption: float | None = Field(description="of a zone that varies: the largest share of it that the points consume")
     bound: float = Field(description="the proof is of this: half a zone in mm, or a share of the zone")
     gap_mm: float | None = Field(description="by how much that is less than half the minimum zone")
-    tip_radius_mm: float | None = Field(description="the points are centres of a ball of this radius")
+    tip_radius_mm: float = Field(description="the points are centres of a ball of this radius")
+    limits: VaryingLimits | None = Field(description="of a least consumption: the limits that are consumed")
     pose: Pose = Field(description="where the part lies in it")
     active: list[Holding] = Field(description="the points that hold it: no small motion makes it smaller")
     imbalance: float | None = Field(description="what is left of the sum of the points' gradients, by multiplier and sign; 0 is a proof")

@@ -380,7 +380,7 @@ class Verified(JsonObject):
 
 
 class ZoneVerified(JsonObject):
-    """The check of one minimum zone."""
+    """The check of one minimum zone, or of one least consumption."""
 
     name: str = Field(description="the name of the characteristic")
     verified: bool = Field(description="whether everything that was stated is so")

@@ -1,14 +1,17 @@
-"""The check of a minimum zone by whoever doubts it: zone.json in, yes or no out, by code that shares nothing with what found the zone.
+"""The check of a minimum zone, or of a least consumption, by whoever doubts it: zone.json in, yes or no out.
+
+It shares nothing with the code that found the zone.
 
 What is checked needs a dense polygon of the nominal and the distance to it. First that the pose brings the points into the zone and that
 those which hold it balance, so that no small motion makes it smaller. Then that no rigid motion at all brings the witnesses into a zone
 narrower by the stated gap: a box of motions moves a point by at most a known length, so a point that is farther out than that refutes
 the whole box; a box that no point refutes is cut. The distance to the curve is known between two bounds, and only the kinder one counts.
+Limits that vary along the profile are those of wherever a point's nearest place may come to, the loosest of them.
 """
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -17,6 +20,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.spatial import cKDTree
 
+from cmmlink.zone_limits import LoosestLimits, StatedLimits
+
 Array = NDArray[np.float64]
 
 _SAMPLES = 400_000
@@ -24,24 +29,34 @@ _MOST_BOXES = 2_000_000
 _WAVE = 2048
 _SAME_MM = 2e-6  # deviations at the pose are those that were stated, to the rounding of the pose
 _SAME_SQUARE_MM2 = 1e-11  # of squares of distances, by round-off: 3 um along the curve
+_STEP_MM = 1e-3  # of motions by which it is seen what the points consume more and less
+_BALANCED_BY_STEPS = 5e-3  # of the largest rate
 _BALANCED = 1e-4  # what may be left of the sum of unit gradients: the normals of a polygon are off by its steps
 
 
 @dataclass(frozen=True, slots=True)
 class ZoneCheck:
-    """What the check of one zone found. `problem` is empty where everything that was stated is so."""
+    """What the check of one zone found. `problem` is empty where everything that was stated is so.
+
+    half_mm, gap_mm : of a minimum zone; consumption, bound : of a least consumption, 0 of a minimum zone
+    """
 
     name: str
     half_mm: float
     gap_mm: float
     boxes: int
     problem: str
+    consumption: float = 0.0
+    bound: float = 0.0
 
     @property
     def words(self) -> str:
         """The outcome in one line."""
         if self.problem:
             return f"{self.name}: NOT VERIFIED: {self.problem}"
+        if self.consumption:
+            found = f"{self.name}: verified: least consumption {self.consumption:.6f} of the zone"
+            return f"{found}; no rigid motion brings the witnesses into {self.bound:.6f} of it ({self.boxes:,} boxes)"
         bound = f"no rigid motion brings the witnesses within {self.half_mm - self.gap_mm:.6f} mm of its middle"
         if self.half_mm <= self.gap_mm:
             bound = f"half of it is no wider than {self.gap_mm:.6f} mm, and nothing smaller by so much can be"
@@ -52,10 +67,10 @@ def check_zones(document: Mapping[str, Any]) -> tuple[ZoneCheck, ...]:
     """Check every zone of a zone.json. Raises ValueError for a document that is none."""
     try:
         curve = _Polygon(document["nominal"])
-        return tuple(_check(zone, curve) for zone in document["zones"])
+        return tuple((_check_consumption if zone.get("kind") == "consumption" else _check)(zone, curve) for zone in document["zones"])
     except KeyError as error:
         raise ValueError(f"is no zone.json: {error} is missing; expected the file that a run wrote beside its result") from None
-    except (TypeError, IndexError):
+    except (TypeError, IndexError, AttributeError):
         raise ValueError("is no zone.json: its values have other types; expected the file that a run wrote beside its result") from None
 
 
@@ -89,12 +104,13 @@ class _Polygon:
         self.reach = float(self.step.max()) / 2  # no place of the curve is farther from a vertex along the polygon
         self.sag = float((self.step * smooth).max()) / 4  # an arc of this turning stands off its chord by an eighth of step times turning
         self.tree = cKDTree(self.places)
+        travelled = np.concatenate([[0.0], np.cumsum(self.step if self.closed else self.step[:-1])])
+        self.station, self.length = travelled[: len(self.places)], float(travelled[-1])
 
     def is_at(self, places: Array, station_mm: Array) -> NDArray[np.bool_]:
         """Whether the curve is nearest to places (k, 2) at stations (k,); where both sides are as near, two stations are."""
-        travelled = np.concatenate([[0.0], np.cumsum(self.step if self.closed else self.step[:-1])])
-        inside = (station_mm >= 0) & (station_mm <= travelled[-1] + 2 * self.reach)
-        at = np.clip(np.searchsorted(travelled[: len(self.places)], station_mm), 1, len(self.places) - 1)
+        inside = (station_mm >= 0) & (station_mm <= self.length + 2 * self.reach)
+        at = np.clip(np.searchsorted(self.station, station_mm), 1, len(self.places) - 1)
         square = [np.square(places - self.places[at - back]).sum(axis=1) for back in (0, 1)]
         nearest = np.square(self.tree.query(places)[0])
         return np.asarray(inside & (np.minimum(*square) <= nearest + (4 * self.reach) ** 2 + _SAME_SQUARE_MM2))
@@ -125,9 +141,59 @@ def _check(zone: Mapping[str, Any], curve: _Polygon) -> ZoneCheck:
         return found  # no zone is narrower than none at all
     if problem or not zone["proven"]:
         return ZoneCheck(found.name, half, gap, 0, problem or "what the file says is not proven over every placement")
-    boxes, refuted = _refute(witnesses, curve, half - gap, middle + tip)
+    limits = np.array(middle + tip - half + gap), np.array(middle + tip + half - gap)
+    boxes, refuted = _refute(witnesses, curve, lambda places, radius: limits, half + abs(middle))
     problem = "" if refuted else f"after {boxes:,} boxes of motions it is not shown that every other placement needs a wider zone"
     return ZoneCheck(found.name, half, gap, boxes, problem)
+
+
+def _check_consumption(zone: Mapping[str, Any], curve: _Polygon) -> ZoneCheck:
+    """Check one least consumption: what the points consume at the pose, how they balance, and the proof of every other motion."""
+    limits = StatedLimits.of(zone["limits"], curve.length, curve.closed)
+    found = ZoneCheck(str(zone["name"]), 0.0, 0.0, 0, "", float(zone["consumption"]), float(zone["bound"]))
+    problem = limits.problem or _problem_of_consumption(zone, curve, limits)
+    if problem or not zone["proven"]:
+        return replace(found, problem=problem or "what the file says is not proven over every placement")
+    loosest, tip = LoosestLimits(curve.places, curve.station, limits, found.bound), float(zone["tip_radius_mm"])
+
+    def allowed(places: Array, radius: Array) -> tuple[Array, Array]:
+        lower, upper = loosest.near(places, radius)
+        return lower + tip, upper + tip
+
+    boxes, refuted = _refute(_places(zone["witnesses"]), curve, allowed, loosest.farthest + tip)
+    problem = "" if refuted else f"after {boxes:,} boxes of motions it is not shown that every other placement consumes more"
+    return replace(found, boxes=boxes, problem=problem)
+
+
+def _problem_of_consumption(zone: Mapping[str, Any], curve: _Polygon, limits: StatedLimits) -> str:
+    """What is not as stated at the pose of a least consumption."""
+    angle, shift = math.radians(zone["pose"]["rotation_deg"]), np.array(zone["pose"]["translation_mm"], dtype=np.float64)
+
+    def consumed(points: Array, motion: Array) -> Array:
+        moved = _moved(points, angle, shift)
+        middle = moved.mean(axis=0)
+        distance, _, station = _signed_distances(curve, _moved(moved - middle, float(motion[2]), middle + motion[:2]))
+        lower, upper = limits.at(station)
+        return np.asarray((2 * (distance - zone["tip_radius_mm"]) - lower - upper) / (upper - lower))
+
+    active, witnesses, still = _places(zone["active"]), _places(zone["witnesses"]), np.zeros(3)
+    same = 2 * _SAME_MM / float((limits.upper_mm - limits.lower_mm).min())
+    here = consumed(active, still)
+    if not len(here) or np.abs(np.abs(here) - zone["consumption"]).max() > same:
+        return "the points that hold it do not consume as much as is stated"
+    if np.abs(consumed(witnesses, still)).max() > zone["consumption"] + same:
+        return "a witness consumes more at the pose, so that it is not shown to be a point that the consumption is of"
+    problem = _problem_of_points(zone, curve, _moved(active, angle, shift)) or _problem_of_multipliers(zone)
+    if problem or not zone["bound"] < zone["consumption"]:
+        return problem or "what is to be proven is not below what is consumed"
+    share = np.array([point["multiplier"] for point in zone["active"]]) * np.sign(here)
+    reach = float(np.hypot(*(active - active.mean(axis=0)).T).max())
+    left = []  # where limits turn at a point, its rate either way is another one, and any between them may be what balances
+    for step in _STEP_MM * np.diag([1.0, 1.0, 1.0 / reach]):
+        both = np.stack([share * (consumed(active, step) - here), share * (here - consumed(active, -step))])
+        size = np.abs(both).max()
+        left.append(max(both.min(axis=0).sum(), -both.max(axis=0).sum()) / size if size else 0.0)
+    return f"the points do not balance: {max(left):.1e} of a unit is left" if max(left) > _BALANCED_BY_STEPS else ""
 
 
 def _places(points: Sequence[Mapping[str, float]]) -> Array:
@@ -141,8 +207,8 @@ def _moved(places: Array, angle: float, shift: Array) -> Array:
     return np.asarray(places @ np.array([[c, s], [-s, c]]) + shift)
 
 
-def _problem_of_witnesses(zone: Mapping[str, Any], curve: _Polygon, angle: float, shift: Array) -> str:
-    """What tells that the witnesses are not points that the zone holds. A point from elsewhere refutes whatever one likes."""
+def _problem_of_points(zone: Mapping[str, Any], curve: _Polygon, holding: Array) -> str:
+    """What tells that the points named are not those of the zone; `holding` (a, 2) is where the pose brings those that hold it."""
     place_of: dict[Any, tuple[float, float]] = {}
     for point in (*zone["active"], *zone["witnesses"]):
         place = (point["x_mm"], point["y_mm"])
@@ -150,20 +216,32 @@ def _problem_of_witnesses(zone: Mapping[str, Any], curve: _Polygon, angle: float
             return f"point {point['index']} is told to be in two places"
     if not {point["index"] for point in zone["active"]} <= {point["index"] for point in zone["witnesses"]}:
         return "a point that holds the zone is none of the witnesses"
-    moved = _moved(_places(zone["witnesses"]), angle, shift)
-    off = _signed_distances(curve, moved)[0] - zone["tip_radius_mm"] - zone["middle_mm"]
-    if np.abs(off).max(initial=0.0) > zone["zone_mm"] / 2 + _SAME_MM:
-        return "a witness is not in the zone at its pose, so that it is not shown to be a point that the zone is of"
-    holding = _moved(_places(zone["active"]), angle, shift)
     stated = np.array([point["station_mm"] for point in zone["active"]], dtype=np.float64)
     return "" if curve.is_at(holding, stated).all() else "a point that holds the zone is not at the station that is told"
+
+
+def _problem_of_witnesses(zone: Mapping[str, Any], curve: _Polygon, angle: float, shift: Array) -> str:
+    """What tells that the witnesses are not points that the zone holds. A point from elsewhere refutes whatever one likes."""
+    moved = _moved(_places(zone["witnesses"]), angle, shift)
+    off = _signed_distances(curve, moved)[0] - zone["tip_radius_mm"] - zone["middle_mm"]
+    problem = _problem_of_points(zone, curve, _moved(_places(zone["active"]), angle, shift))
+    if np.abs(off).max(initial=0.0) > zone["zone_mm"] / 2 + _SAME_MM and "station" not in problem:
+        return problem or "a witness is not in the zone at its pose, so that it is not shown to be a point that the zone is of"
+    return problem
+
+
+def _problem_of_multipliers(zone: Mapping[str, Any]) -> str:
+    """What is wrong with the multipliers alone."""
+    share = np.array([point["multiplier"] for point in zone["active"]])
+    sound = len(share) and share.min() > 0 and abs(share.sum() - 1) <= 1e-6
+    return "" if sound else "the multipliers are not positive with the sum 1"
 
 
 def _problem_at_pose(zone: Mapping[str, Any], active: Array, curve: _Polygon) -> str:
     """What is not as stated at the pose: the deviations of the points that hold the zone, or their balance."""
     angle, shift = math.radians(zone["pose"]["rotation_deg"]), np.array(zone["pose"]["translation_mm"], dtype=np.float64)
     moved = _moved(active, angle, shift)
-    distance, normal = _signed_distances(curve, moved)
+    distance, normal, _ = _signed_distances(curve, moved)
     off = distance - zone["tip_radius_mm"] - zone["middle_mm"]
     problem = _problem_of_witnesses(zone, curve, angle, shift)
     if problem:
@@ -173,9 +251,9 @@ def _problem_at_pose(zone: Mapping[str, Any], active: Array, curve: _Polygon) ->
         return "the points that hold the zone are not at its limits"
     if zone["zone_mm"] / 2 <= zone["gap_mm"]:
         return ""  # points all on the nominal need not balance
-    share = np.array([point["multiplier"] for point in zone["active"]])
-    if not len(share) or share.min() <= 0 or abs(share.sum() - 1) > 1e-6:
-        return "the multipliers are not positive with the sum 1"
+    problem, share = _problem_of_multipliers(zone), np.array([point["multiplier"] for point in zone["active"]])
+    if problem:
+        return problem
     arms = moved - moved.mean(axis=0)
     reach = float(np.hypot(*arms.T).max())
     rates = np.column_stack([normal, (arms[:, 0] * normal[:, 1] - arms[:, 1] * normal[:, 0]) / reach])
@@ -183,10 +261,10 @@ def _problem_at_pose(zone: Mapping[str, Any], active: Array, curve: _Polygon) ->
     return f"the points do not balance: {left:.1e} of a unit is left" if left > _BALANCED else ""
 
 
-def _signed_distances(curve: _Polygon, places: Array) -> tuple[Array, Array]:
-    """Signed distances (k,) of places (k, 2) to the polygon, out of material positive, and the directions (k, 2) in which they grow."""
+def _signed_distances(curve: _Polygon, places: Array) -> tuple[Array, Array, Array]:
+    """Signed distances (k,) of places (k, 2) to the polygon, positive out of material, the ways (k, 2) they grow, and stations (k,)."""
     _, vertex = curve.tree.query(places)
-    n, best, direction = len(curve.places), np.full(len(places), np.inf), np.zeros_like(places)
+    n, best, direction, station = len(curve.places), np.full(len(places), np.inf), np.zeros_like(places), np.zeros(len(places))
     for first in (vertex - 1, vertex):
         a, b = curve.places[first % n], curve.places[(first + 1) % n]
         along = b - a
@@ -200,15 +278,22 @@ def _signed_distances(curve: _Polygon, places: Array) -> tuple[Array, Array]:
         best = np.where(nearer, sign * distance, best)
         grown = np.where((distance > 1e-12)[:, None], sign[:, None] * off / np.maximum(distance, 1e-12)[:, None], normal)
         direction = np.where(nearer[:, None], grown, direction)
-    return best, direction
+        station = np.where(nearer, curve.station[first % n] + t * curve.step[first % n], station)
+    return best, direction, station
 
 
-def _refute(points: Array, curve: _Polygon, half: float, middle: float) -> tuple[int, bool]:
-    """Refute every rigid motion that would bring points (w, 2) within `half` of `middle`. Gives the boxes, and whether all fell."""
+Allowed = Callable[[Array, Array], tuple[Array, Array]]  # the loosest limits (k,) near places (k, 2), within radii (k,)
+
+
+def _refute(points: Array, curve: _Polygon, allowed: Allowed, farthest: float) -> tuple[int, bool]:
+    """Refute every rigid motion that would bring points (w, 2) between limits. Gives the boxes, and whether all fell.
+
+    farthest : the largest deviation that is allowed anywhere, either way
+    """
     arms = points - points[0]
     lengths = np.hypot(*arms.T)
     low, high = curve.places.min(axis=0), curve.places.max(axis=0)
-    side = float((high - low).max()) / 2 + half + abs(middle)
+    side = float((high - low).max()) / 2 + farthest
     boxes = np.array([[*((low + high) / 2), 0.0, side, math.pi]])  # x, y, angle, half widths
     looked_at = 0
     while len(boxes):
@@ -220,23 +305,26 @@ def _refute(points: Array, curve: _Polygon, half: float, middle: float) -> tuple
         for arm, length in zip(arms, lengths, strict=True):
             if not len(left):
                 break
-            left = left[~_is_out(left, arm, float(length), curve, half, middle)]
+            left = left[~_is_out(left, arm, float(length), curve, allowed)]
         if len(left) and left[:, 3].max() < 1e-9 and left[:, 4].max() < 1e-12:
             return looked_at, False
         boxes = np.concatenate([boxes, *_cut(left, float(lengths.max()))])
     return looked_at, True
 
 
-def _is_out(boxes: Array, arm: Array, length: float, curve: _Polygon, half: float, middle: float) -> NDArray[np.bool_]:
-    """Which boxes (k, 5) a point refutes, that lies at `arm` from the anchor: whatever motion of the box, it is out of the zone."""
+def _is_out(boxes: Array, arm: Array, length: float, curve: _Polygon, allowed: Allowed) -> NDArray[np.bool_]:
+    """Which boxes (k, 5) a point refutes, that lies at `arm` from the anchor: whatever motion of the box, it is out of the limits."""
     c, s = np.cos(boxes[:, 2]), np.sin(boxes[:, 2])
     places = boxes[:, :2] + np.column_stack([c * arm[0] - s * arm[1], s * arm[0] + c * arm[1]])
     moves = math.sqrt(2) * boxes[:, 3] + 2 * np.sin(np.minimum(boxes[:, 4], math.pi) / 2) * length
     low, high, either = curve.bounds(places, moves)
-    room = half + moves + 1e-9
-    above, below = low - middle > room, high - middle < -room
+    # Wherever the point goes in the box, its nearest place on the curve stays so near to where the box's centre puts it.
+    near = np.maximum(np.abs(low), np.abs(high)) + 2 * moves + curve.reach + 1e-6
+    lower, upper = allowed(places, near)
+    room = moves + 1e-9
+    above, below = low - upper > room, high - lower < -room
     nearest = np.minimum(np.abs(low), np.abs(high))
-    both = (nearest - middle > room) & (-nearest - middle < -room)
+    both = (nearest - upper > room) & (-nearest - lower < -room)
     return np.where(either, both, above | below)
 
 

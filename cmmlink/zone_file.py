@@ -1,19 +1,24 @@
-"""zone.json: what a third party needs to check the minimum zones of a result, with no more than a routine for the closest point."""
+"""zone.json: what a third party needs to check minimum zones and least consumptions, with no more than a routine for the closest point."""
 
 from collections.abc import Mapping
 from typing import Any
 
 from inspection import NominalProfile
 
-_STATED = ("zone_mm", "middle_mm", "gap_mm", "tip_radius_mm", "pose", "active", "witnesses", "proven")
+_OF_BOTH = ("kind", "tip_radius_mm", "pose", "active", "witnesses", "proven")
+_STATED = {"minimum-zone": ("zone_mm", "middle_mm", "gap_mm"), "consumption": ("consumption", "bound", "limits")}
 
 
 def zone_document(result: Mapping[str, Any], profile: NominalProfile) -> dict[str, Any] | None:
-    """The minimum zones of a result, as JSON holds it, with the nominal that they are about; None where it has none."""
+    """The minimum zones and the proven least consumptions of a result, as JSON holds it, with their nominal; None where it has none.
+
+    Results of earlier versions do not hold the limits that are consumed, so that nobody can check a consumption of theirs.
+    """
+    proofs = [(one["name"], one["certificate"]) for one in result.get("characteristics", ()) if one["certificate"] is not None]
     zones = [
-        {"name": one["name"], **{key: one["certificate"][key] for key in _STATED}}
-        for one in result.get("characteristics", ())
-        if one["certificate"] is not None and one["certificate"]["kind"] == "minimum-zone"
+        {"name": name, **{key: proof[key] for key in (*_OF_BOTH, *_STATED[proof["kind"]])}}
+        for name, proof in proofs
+        if proof["kind"] == "minimum-zone" or (proof["proven"] and proof.get("limits") is not None)
     ]
     if not zones:
         return None

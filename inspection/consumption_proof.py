@@ -61,8 +61,18 @@ def certify_consumption(
         if better is None or better.consumption >= fit.consumption:
             break
         fit = better
-    place = points[fit.active], points[witnesses]
-    return ConsumptionCertificate(fit, place[0], asked, proof.outcome == "refuted", witnesses, place[1], proof.boxes, proof.finest_mm)
+    return ConsumptionCertificate(
+        fit=fit,
+        zone=zone,
+        active_place_mm=points[fit.active],
+        bound=asked,
+        proven=proof.outcome == "refuted",
+        witnesses=witnesses,
+        witness_place_mm=points[witnesses],
+        boxes=proof.boxes,
+        finest_mm=proof.finest_mm,
+        tip_radius_mm=tip_radius_mm,
+    )
 
 
 def _prove(

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inspection.rigid import RigidTransform
+from inspection.zones import VaryingZone
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -107,6 +108,7 @@ class ConsumptionCertificate:
     """The least consumption of a zone by measured points, and what is proven of it.
 
     fit              : the pose that consumes least, the points that hold it and their multipliers
+    zone             : what is consumed
     active_place_mm  : (a, 2) where those points were measured, in section coordinates
     bound            : the share of the zone that the proof is of
     proven           : no rigid motion brings the witnesses into that share; False where the search ended before it knew, or where a
@@ -115,9 +117,11 @@ class ConsumptionCertificate:
     witness_place_mm : (w, 2) where they were measured, in section coordinates
     boxes            : of motions that were looked at
     finest_mm        : the least by which a refuted box moves the point that refutes it
+    tip_radius_mm    : the points are centres of a ball of this radius
     """
 
     fit: ConsumptionFit
+    zone: VaryingZone
     active_place_mm: Array
     bound: float
     proven: bool
@@ -125,6 +129,7 @@ class ConsumptionCertificate:
     witness_place_mm: Array
     boxes: int
     finest_mm: float
+    tip_radius_mm: float
 
     @property
     def words(self) -> str:

@@ -15,12 +15,13 @@ _PROVES = "Checked from the points, the pose and the nominal in the file alone; 
 
 
 def verify_zone(
-    file: Annotated[Path, typer.Argument(metavar="zone.json", help="The proof of minimum zones that a run has written.")],
+    file: Annotated[Path, typer.Argument(metavar="zone.json", help="The proofs of zones that a run has written.")],
     as_json: Json = False,
 ) -> int:
-    """Check the minimum zones of a result without the code that found them.
+    """Check the minimum zones and least consumptions of a result without the code that found them.
 
-    It is shown anew that no rigid motion brings the named points into a smaller zone. Exit status 0 only where all is as stated.
+    It is shown anew that no rigid motion brings the named points into a smaller zone, or into a smaller share of a zone that varies. Exit
+    status 0 only where all is as stated.
     """
     from cmmlink.zone_check import check_zones
 

@@ -210,7 +210,7 @@ def test_every_number_of_a_line_profile_is_that_of_its_points_at_its_pose(walk: 
     share = np.where(inside, np.abs(2 * e - low - high) / (high - low), -1.0)
     k = int(np.argmin(np.hypot(*(places - [found["worst"]["x_mm"], found["worst"]["y_mm"]]).T)))
     assert share[k] == pytest.approx(share.max(), abs=1e-5)  # of points that hold a zone, any may be told
-    assert found["consumption"] == pytest.approx(share.max(), abs=5e-5)  # of a zone of 0.06 mm that is 1.5 um
+    assert found["consumption"] == pytest.approx(share.max(), abs=5e-5)  # of a zone of 0.06 mm that is 1.5 nm
     told = [found[key] for key in ("deviation", "lower", "upper", "value")]
     width = 2 * np.abs(e - (low + high) / 2)[inside].max()
     assert told == pytest.approx([e[k], low[k], high[k], width], abs=2e-6)
