@@ -12,6 +12,7 @@ import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from datetime import datetime
+from functools import cache
 from importlib import metadata
 from itertools import islice
 from typing import TYPE_CHECKING, Any
@@ -104,7 +105,13 @@ class _Pose:
 def software() -> dict[str, str]:
     """Versions of everything that a result depends on."""
     system = {"cmmlink": __version__, "python": platform.python_version(), "machine": f"{platform.system()} {platform.machine()}"}
-    return system | {package: metadata.version(package) for package in ("numpy", "scipy", "numba")}
+    return system | {package: _version(package) for package in ("numpy", "scipy", "numba")}
+
+
+@cache
+def _version(package: str) -> str:
+    """The version of a package, which is looked up among all that is installed: once, for every section of a stack asks."""
+    return metadata.version(package)
 
 
 def result_sha256(document: Mapping[str, Any], bodies: Iterable[bytes]) -> str:

@@ -1,6 +1,6 @@
 """What every characteristic of a run is judged on: the run's result, its terms, and what is known to be missing."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from inspection.characteristics.characteristic import Region
 from inspection.cloud import MANY, drawn_rows, row_blocks
 from inspection.conclusion import Conclusion, Missing, Reason, conclude
+from inspection.datum import DatumFeatures, FoundDatum
 from inspection.evaluation.region import is_inside
 from inspection.filters import FilteredProfile, ProfileFilter, filter_profile
 from inspection.gaps import Measured, measure_region, weigh_by_station
@@ -32,12 +33,14 @@ class Basis:
     result   : the profile as the run judged it
     terms    : what it was held against
     missing  : points that are known to be missing; complete : the scan came to its end
+    datums   : those that were found of its points, by their features: several characteristics are placed by the same
     """
 
     result: InspectionResult
     terms: Terms
     missing: Missing
     complete: bool
+    datums: dict[DatumFeatures, FoundDatum] = field(default_factory=dict, repr=False)
 
     @property
     def nominal(self) -> NominalProfile:

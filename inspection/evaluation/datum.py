@@ -28,6 +28,8 @@ def check_datum(nominal: NominalProfile, features: DatumFeatures) -> None:
 
 def datum_of(features: DatumFeatures, basis: Basis) -> FoundDatum:
     """The datum that the points of a run give. Raises InspectionError where they give none."""
+    if features in basis.datums:
+        return basis.datums[features]
     registration, terms = basis.result.registration, basis.terms
     if terms.known_pose is None and registration.rivals:
         raise InspectionError("The part fits the nominal in another pose as well: which of its features are the datum is not known.")
@@ -37,7 +39,8 @@ def datum_of(features: DatumFeatures, basis: Basis) -> FoundDatum:
     if not len(points):
         raise InspectionError("The datum was not found: no point was judged.")
     settings = (terms.limits.gap_max_mm, terms.method, terms.tip_radius_mm, terms.weights)
-    return find_datum(points, basis.nominal, features, basis.pose, *settings)
+    basis.datums[features] = find_datum(points, basis.nominal, features, basis.pose, *settings)
+    return basis.datums[features]
 
 
 def uncertainty_at(datum: FoundDatum, asked: LineProfile, basis: Basis) -> float:
@@ -48,6 +51,8 @@ def uncertainty_at(datum: FoundDatum, asked: LineProfile, basis: Basis) -> float
     """
     nominal, region = basis.nominal, asked.region
     if basis.terms.uncertainty is None:
+        if not basis.result.zone.uncertainty_mm:
+            return 0.0
         inside = np.ones(len(nominal), dtype=np.bool_) if region is None else is_inside(nominal.station_mm, region, nominal)
         if not inside.any():
             inside[:] = True
