@@ -26,7 +26,7 @@ export const selectOf = (id) => elementOf(id, HTMLSelectElement);
  * @param {new () => Kind} kind
  * @returns {Kind}
  */
-function elementOf(id, kind) {
+export function elementOf(id, kind) {
   const element = document.getElementById(id);
   if (!(element instanceof kind)) throw new Error(`the page has no ${kind.name} with the id ${id}`);
   return element;

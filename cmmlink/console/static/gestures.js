@@ -1,4 +1,7 @@
-// Mouse and keys of a drawing: zoom, pan, read-out. Both drawings have the same, and all that the mouse does the keys do too.
+// Mouse, fingers and keys of a drawing: zoom, pan, read-out. Both drawings have the same, and all that the mouse does the keys do too.
+
+import { make } from "./dom.js";
+import { gettext } from "./words.js";
 
 /** @import { Cursor, Drawing, Place } from "./drawing.js" */
 /** @import { HeldPoint } from "./points.js" */
@@ -25,6 +28,8 @@ export function listen(drawing, onCursor, worstPoint) {
     onCursor(cursor);
   };
   listenToMouse(drawing, read);
+  listenToFingers(drawing);
+  addButtons(drawing);
 
   const place = () => (cursor ? drawing.place(cursor) : drawing.middle);
   const jump = (/** @type {HeldPoint | null} */ point) => {
@@ -80,7 +85,7 @@ function listenToMouse(drawing, read) {
   element.addEventListener("pointermove", (event) => {
     const place = placeOf(event);
     if (!drawing.isReady) return;
-    if (dragged && event.buttons) {
+    if (dragged && event.buttons && event.isPrimary) {
       drawing.pan(dragged[0] - place[0], dragged[1] - place[1]);
       dragged = place;
     } else read(drawing.nearest(place));
@@ -88,6 +93,63 @@ function listenToMouse(drawing, read) {
   element.addEventListener("pointerleave", () => read(null));
   element.addEventListener("dblclick", () => drawing.fit());
   element.addEventListener("blur", () => read(null));
+}
+
+/**
+ * Two fingers zoom and pan: what is between them stays between them.
+ * @param {Drawing} drawing
+ */
+function listenToFingers(drawing) {
+  const { element } = drawing;
+  /** @type {Map<number, Place>} */
+  const fingers = new Map();
+  const lift = (/** @type {PointerEvent} */ event) => fingers.delete(event.pointerId);
+  element.addEventListener("pointerdown", (event) => {
+    if (event.pointerType === "touch") fingers.set(event.pointerId, [event.clientX, event.clientY]);
+  });
+  element.addEventListener("pointermove", (event) => {
+    if (!fingers.has(event.pointerId) || !drawing.isReady) return;
+    const before = spanOf([...fingers.values()]);
+    fingers.set(event.pointerId, [event.clientX, event.clientY]);
+    const after = spanOf([...fingers.values()]), box = element.getBoundingClientRect();
+    if (!before || !after) return;
+    event.stopImmediatePropagation();
+    drawing.pan(before.x - after.x, before.y - after.y);
+    drawing.zoom(before.apart / Math.max(after.apart, 1), [after.x - box.left, after.y - box.top]);
+  }, true);
+  for (const name of /** @type {const} */ (["pointerup", "pointercancel"])) element.addEventListener(name, lift);
+}
+
+/**
+ * The middle between two fingers, and how far they are apart; null where there are not two.
+ * @param {Place[]} fingers
+ */
+function spanOf(fingers) {
+  if (fingers.length !== 2) return null;
+  const [[x, y], [u, v]] = fingers;
+  return { x: (x + u) / 2, y: (y + v) / 2, apart: Math.hypot(u - x, v - y) };
+}
+
+/**
+ * The buttons of a drawing, for who has no wheel: closer, farther, all of it.
+ * @param {Drawing} drawing
+ */
+function addButtons(drawing) {
+  const zoom = (/** @type {number} */ factor) => drawing.isReady && drawing.zoom(factor, drawing.middle);
+  /** @type {[sign: string, name: string, act: () => void][]} */
+  const buttons = [
+    ["+", gettext("Zoom in"), () => zoom(1 / ZOOM)], ["\u2212", gettext("Zoom out"), () => zoom(ZOOM)],
+    ["\u2922", gettext("Show all"), () => drawing.isReady && drawing.fit()],
+  ];
+  document.querySelector(`.zooms[data-of="${drawing.name}"]`)?.append(...buttons.map(([sign, name, act]) => {
+    const button = make("button", sign);
+    button.setAttribute("type", "button");
+    button.setAttribute("aria-label", name);
+    button.title = name;
+    button.className = "small";
+    button.addEventListener("click", act);
+    return button;
+  }));
 }
 
 /**

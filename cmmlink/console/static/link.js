@@ -81,7 +81,7 @@ export class Link {
     this.token = token;
     this.code = "";
     keep(token);
-    history.replaceState(null, "", location.pathname);
+    history.replaceState(null, "", location.pathname + location.search);
   }
 
   look() {

@@ -4,6 +4,7 @@ import { showAlarms, toggleAlarmList } from "./alarms.js";
 import { cardOf } from "./card.js";
 import { Characteristics } from "./characteristics.js";
 import { CtView } from "./ct.js";
+import { listenToDisplay } from "./display.js";
 import { buttonOf, byId, inputOf, put } from "./dom.js";
 import { Downloads } from "./downloads.js";
 import { listen } from "./gestures.js";
@@ -14,6 +15,7 @@ import { ageWords, showBanners, showButtons, showLamps, showRun } from "./panels
 import { PartView } from "./part_view.js";
 import { Scan } from "./points.js";
 import { Profile } from "./profile.js";
+import { Question } from "./question.js";
 import { RegistersView } from "./registers.js";
 import { Strip } from "./strip.js";
 import { Timing } from "./timing.js";
@@ -26,7 +28,7 @@ import { gettext, translate, translateElements } from "./words.js";
 
 translateElements(document.documentElement);
 
-const VIEWS = ["live", "part", "history", "ct", "registers"];
+const VIEWS = ["live", "part", "history", "ct", "registers", "wall"];
 const MOST_MAGNIFICATION = 5000;
 const SLIDER_STEPS = 1000;
 const SAID_MS = 8000; // so long the answer to a command stays
@@ -107,7 +109,7 @@ function takeRun({ run, recorded }) {
   const isNew = run && run.phase !== "finished" && heard.run?.number !== run.number;
   heard.run = run;
   heard.isRecorded = recorded;
-  if (isNew) go("live");
+  if (isNew && heard.view !== "wall") go("live");
   redraw();
 }
 
@@ -199,6 +201,7 @@ function paintWords() {
   }
   showBanners(heard, (act) => ask({ do: act }));
   showButtons(heard);
+  if (question.isAsked && !heard.station?.running) question.answer(false);
   showAge();
 }
 
@@ -286,13 +289,21 @@ function nextPart() {
   partView.enterSerialNumber();
 }
 
+/** A page that watches is refused at once; one that controls asks first. */
+function abort() {
+  if (heard.control?.controls) question.ask();
+  else ask({ do: "abort" });
+}
+
 /** Leave what is in front: the list of alarms, a recorded run, a view. */
 function leave() {
-  if (heard.station?.running) ask({ do: "abort" });
+  if (heard.station?.running) abort();
   else if (!byId("alarm-list").hidden) toggleAlarmList();
   else if (heard.isRecorded) ask({ do: "live" });
   else go("live");
 }
+
+const question = new Question(() => ask({ do: "abort" }));
 
 const worstPoint = () => (heard.run ? scan.points.worst(heard.run.zone) : null);
 
@@ -344,7 +355,7 @@ buttonOf("start").addEventListener("click", start);
 buttonOf("run-demo").addEventListener("click", () => ask({ do: "demo" }));
 buttonOf("report-shown").addEventListener("click", reportShown);
 buttonOf("end").addEventListener("click", () => ask({ do: "end" }));
-buttonOf("abort").addEventListener("click", () => ask({ do: "abort" }));
+buttonOf("abort").addEventListener("click", abort);
 buttonOf("next").addEventListener("click", nextPart);
 buttonOf("acknowledge").addEventListener("click", () => ask({ do: "acknowledge" }));
 buttonOf("alarm-list-button").addEventListener("click", toggleAlarmList);
@@ -353,9 +364,11 @@ inputOf("magnification").addEventListener("input", (event) => {
 });
 buttonOf("magnification-auto").addEventListener("click", () => profile.magnify(null));
 for (const drawing of drawings) listen(drawing, readOut, worstPoint);
+window.addEventListener("beforeprint", paintDrawings);
+listenToDisplay();
 setInterval(() => {
   showAge();
   if (performance.now() - saidAt > SAID_MS) put("said", "");
 }, 250);
 Object.assign(window, { timing: () => ({ ...timing.summary(), held: scan.points.held }) });
-go("part");
+go(new URLSearchParams(location.search).has("wall") ? "wall" : "part");

@@ -31,6 +31,7 @@ export function showRun(heard) {
   const card = cardOf(heard), { run } = card;
   put("part", card.part || gettext("No part"));
   put("serial-number", card.serial);
+  byId("serial-number").style.setProperty("--letters", String(card.serial.length)); // on the wall a longer one is smaller
   byId("serial-number").title = card.serial; // a long one is cut
   put("plan-operator", card.names.filter(Boolean).join("  \u00b7  "));
   byId("before").hidden = !card.before;
@@ -58,8 +59,8 @@ export function showRun(heard) {
 const cardKind = ({ kind }) => (kind === "replay" || kind === "recorded" ? "past" : "run");
 
 /** @param {Card} shown */
-function showVerdict({ word: told, shape, final, of, why: toldWhy, phase }) {
-  const word = translate(told), why = translate(toldWhy);
+function showVerdict({ word: told, shape, final, of: whose, why: reason, phase }) {
+  const word = translate(told), of = translate(whose), why = translate(reason);
   const card = byId("verdict");
   document.body.dataset.verdict = shape;
   card.dataset.final = String(final);

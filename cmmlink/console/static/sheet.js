@@ -7,11 +7,21 @@
 /** @type {Layer[]} */
 const LAYERS = ["ground", "marks", "cursor"];
 
-export const INK = {
-  text: "#1b2733", soft: "#5a6b7b", faint: "#c9d2da", line: "#22313f", band: "#e3eeea", limit: "#6d8f84", ground: "#ffffff",
-  in: "#3f9483", near: "#8a7a10", "not-proven": "#b37400", over: "#c2410c", under: "#1d5fae", gap: "#d9dfe5",
-  region: "#6a5790", chosen: "#4b2a8c", "region-ground": "rgb(75 42 140 / 9%)", "uncertain-ground": "rgb(242 176 30 / 22%)",
-};
+/** What the style sheets call --draw-NAME. */
+const INKS = /** @type {const} */ ([
+  "text", "soft", "faint", "line", "band", "limit", "ground", "label", "in", "near", "not-proven", "over", "under", "gap", "region",
+  "chosen", "region-ground", "uncertain-ground",
+]);
+
+/** The colours of drawings, as the style sheets have them. @type {Record<typeof INKS[number], string>} */
+export const INK = /** @type {any} */ ({});
+
+/** Take over the colours of the style sheets, and have everything drawn anew with them. */
+export function readInk() {
+  const style = getComputedStyle(document.documentElement);
+  for (const name of INKS) INK[name] = style.getPropertyValue(`--draw-${name}`).trim();
+  document.dispatchEvent(new Event("ink"));
+}
 
 export class Sheet {
   /**
@@ -29,6 +39,7 @@ export class Sheet {
       this.fit();
       onResize();
     }).observe(element);
+    document.addEventListener("ink", onResize);
   }
 
   fit() {
@@ -152,7 +163,7 @@ export function label(pen, sheet, words, x, y, ink, strong = false) {
   const top = Math.min(Math.max(y - tall - 10, 4), sheet.height - tall - 4);
   pen.beginPath();
   pen.roundRect(left, top, wide, tall, 5);
-  pen.fillStyle = "rgba(255, 255, 255, 0.94)";
+  pen.fillStyle = INK.label;
   pen.fill();
   pen.lineWidth = 1.5;
   pen.strokeStyle = ink;

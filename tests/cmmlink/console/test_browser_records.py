@@ -117,6 +117,7 @@ def check_report_while_measuring(bench: Bench, page: Page, folder: Path) -> None
     assert "second - first" in PdfReader(folder / "both.pdf").pages[0].extract_text()
     page.keyboard.press("ArrowDown")
     page.keyboard.press("Escape")
+    page.keyboard.press("Escape")
     expect(page.locator("#start")).to_be_enabled()
     expect(page.locator("#runs tr[aria-selected=true]")).to_contain_text("B-0042")
     expect(page.locator("#report-shown")).to_be_visible()  # at the verdict of the chosen run

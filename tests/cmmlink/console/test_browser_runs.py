@@ -95,6 +95,7 @@ def test_what_was_aborted_never_stands_as_a_settled_verdict(bench: Bench, keep: 
     page.keyboard.press("2")
     page.locator("#view-part").wait_for(state="visible")
     page.keyboard.press("Escape")
+    page.keyboard.press("Escape")
     expect(page.locator("#verdict-word")).to_have_text("READY")
     expect(page.locator("#before")).to_have_text(re.compile(r"Before: B-0041.*ABORTED AT (49|50) %"))
     page.keyboard.press("1")

@@ -1,0 +1,122 @@
+"""Pictures of every view of the page, to be looked at one by one: `make screenshots`, or `python -m tests.cmmlink.console.screenshots FOLDER`.
+
+Every view in every language and theme, on the screens of a control desk, an office, an old panel and a telephone.
+"""
+
+import re
+import shutil
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+from playwright.sync_api import Browser, Page, sync_playwright
+
+from cmmlink.commands.console import inspect_surface
+from cmmlink.console.past_runs import PastRuns
+from cmmlink.console.server import ConsoleServer
+from cmmlink.console.station import Station
+from cmmlink.from_plan import profile_of
+from cmmlink.plan.scan import load_plan
+from drivers.source import Damaged
+from inspection import RigidTransform, synthetic
+from tests.drivers.surface.meshes import binary_stl, tube, write
+from tests.inspection.profiles import AIRFOILS
+
+from . import test_browser_characteristics as characteristics
+from .conftest import FLAGS, TOKEN
+from .played import CLOSED, Device, batches, measured, opened, setup_of, write_plan
+from .test_browser_records import CT_PLAN
+
+SIZES = ((1920, 1080), (1366, 768), (800, 600), (360, 740))
+LANGUAGES = ("en-GB", "de-DE")
+THEMES = ("light", "dark")
+VIEWS = ("part", "live", "history", "ct", "wall")
+
+
+@contextmanager
+def measured_station(folder: Path) -> Iterator[tuple[Station, ConsoleServer, Device]]:
+    """A station at which seven parts were measured, the last with twelve characteristics, and a surface was inspected."""
+    files = {"blade.yaml": write_plan(folder), "vane.yaml": write_plan(folder, "vane.yaml", characteristics.PLAN)}
+    shutil.copy(AIRFOILS / "goe404.dat", folder)
+    surface = folder / "ct.yaml"
+    surface.write_text(CT_PLAN, encoding="utf-8")
+    profile = profile_of(load_plan(files["blade.yaml"]))
+    ring = synthetic.scan(profile, np.linspace(0, profile.length_mm, 800, endpoint=False), np.zeros(800), RigidTransform.identity()).points_mm
+    write(folder / "blade.stl", binary_stl(tube(ring, np.array((0, 20)))))
+    device = Device()
+    records = PastRuns(folder / "records", lambda _: None, time.monotonic, lambda: datetime.now().astimezone())
+    setup = replace(
+        setup_of(files, device.connect, records),
+        ct_plans=lambda: {"ct.yaml": surface},
+        inspect_surface=lambda file, stop, on_start, on_section: inspect_surface(folder / "records", file, stop, on_start, on_section),
+    )
+    station = Station(setup)
+    server = ConsoleServer(station, "screenshots", token=TOKEN)
+    server.start()
+    station.list_plans()
+    station.choose("blade.yaml")
+    for seed, defect_mm in enumerate((0.0, 0.02, 0.12, 0.0, -0.15, 0.01)):
+        device.renew()
+        points = batches(measured(profile, 2000, seed=seed, defect_mm=defect_mm, at_mm=60.0), 100)
+        device.source.put(opened(2000), *points, *([Damaged(17, "checksum")] if defect_mm > 0.1 else []), CLOSED)
+        station.start()
+        assert station.wait(30.0)
+    station.import_ct("ct.yaml")
+    assert station.wait(30.0)
+    station.choose("vane.yaml")
+    device.renew()
+    device.source.put(opened(4000), *batches(characteristics.vane(4000, 0.08, 30.0), 200), CLOSED)
+    station.start()
+    assert station.wait(60.0)
+    yield station, server, device
+    server.stop()
+
+
+def pages(browser: Browser, server: ConsoleServer, languages: Sequence[str], themes: Sequence[str]) -> Iterator[tuple[str, Page]]:
+    """A page in each language and theme, and its name."""
+    for locale in languages:
+        for theme in themes:
+            context = browser.new_context(locale=locale, color_scheme="dark" if theme == "dark" else "light")
+            page = context.new_page()
+            page.goto(server.new_address())
+            page.locator("#plans div").first.wait_for(state="attached")
+            yield f"{locale[:2]}-{theme}", page
+            context.close()
+
+
+def show(page: Page, view: str) -> None:
+    """Bring a view of the page in front."""
+    if view == "wall":
+        page.keyboard.press("1")
+        page.goto(re.sub(r"[?#].*$", "", page.url) + "?wall")
+    else:
+        page.keyboard.press(str(("live", "part", "history", "ct").index(view) + 1))
+
+
+def main(folder: Path, only: str = "") -> None:
+    """Take every picture whose name holds a word."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as place, measured_station(Path(place)) as (_, server, _), sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)
+        for who, page in pages(browser, server, LANGUAGES, THEMES):
+            for view in VIEWS:
+                wanted = [(width, height) for width, height in SIZES if only in f"{view}-{who}-{width}x{height}"]
+                if not wanted:
+                    continue
+                show(page, view)
+                for width, height in wanted:
+                    page.set_viewport_size({"width": width, "height": height})
+                    page.wait_for_timeout(300)  # until the drawings have taken their new size
+                    page.screenshot(path=folder / f"{view}-{who}-{width}x{height}.png")
+        browser.close()
+    print(f"{len(list(folder.glob('*.png')))} pictures in {folder}")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), *sys.argv[2:])
