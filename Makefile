@@ -7,7 +7,7 @@ INSTALL := $(PIP) --no-build-isolation --editable
 # The tests start a hundred processes; where Python may keep no compiled files, each of them compiles every file anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo install test checks compiled lowest lowest-compiled lowest-drivers platforms upgrade bench slower paper faults powercuts kills fuzz soak damage memory proofs stops laws audit supply-chain docs
+.PHONY: demo install test checks compiled lowest lowest-compiled lowest-drivers platforms upgrade bench slower paper faults powercuts kills fuzz soak damage memory proofs stops laws audit supply-chain docs page-tools screenshots
 demo: .venv/installed
 	$(BIN)/cmmlink demo --out demo-result
 
@@ -19,7 +19,7 @@ install: .venv/all-installed
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest
 AT_ONCE := -n 3 --dist loadfile --no-loadscope-reorder
 
-test: checks compiled
+test: checks compiled page-tools
 	$(PYTEST) $(AT_ONCE) $(PYTEST_OPTIONS)
 	@tests/page/check $(PAGE_OPTIONS)
 
@@ -28,6 +28,15 @@ checks: .venv/test-installed
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# The tests in a browser have axe-core look at every view.
+page-tools:
+	@tests/page/check --install
+
+# Every view of the page in every language and theme, on four sizes of screen: 80 pictures to be looked at one by one.
+PICTURES_IN ?= build/screenshots
+screenshots: .venv/test-installed
+	$(BIN)/python -m tests.cmmlink.console.screenshots $(PICTURES_IN)
 
 # Tests have a time limit each, and the first one would have to compile the inspection; `make -j 2` does it beside the checks.
 compiled: .venv/test-installed

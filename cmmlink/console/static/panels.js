@@ -281,7 +281,8 @@ export function bannersOf({ run, isRecorded, station, control, isRemote, link })
  */
 function questionsOf(station, control) {
   if (!station?.question || !control?.controls) return [];
-  const words = gettext("Measure this part again? {question}. Else enter another serial number.", { question: translate(station.question) });
+  const question = translate(station.question);
+  const words = gettext("Measure this part again? {question}. Else enter another serial number.", { question });
   return [{ words, kind: "warning", button: gettext("Measure again"), act: "start again" }];
 }
 
