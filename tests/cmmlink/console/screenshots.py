@@ -1,5 +1,6 @@
-"""Pictures of every view of the page, to be looked at one by one: `make screenshots`, or `python -m tests.cmmlink.console.screenshots FOLDER`.
+"""Pictures of every view of the page, to be looked at one by one: `make screenshots`.
 
+Or `python -m tests.cmmlink.console.screenshots FOLDER [WORD]` for those whose name holds a word, like `de-light` or `wall`.
 Every view in every language and theme, on the screens of a control desk, an office, an old panel and a telephone.
 """
 
@@ -47,7 +48,8 @@ def measured_station(folder: Path) -> Iterator[tuple[Station, ConsoleServer, Dev
     surface = folder / "ct.yaml"
     surface.write_text(CT_PLAN, encoding="utf-8")
     profile = profile_of(load_plan(files["blade.yaml"]))
-    ring = synthetic.scan(profile, np.linspace(0, profile.length_mm, 800, endpoint=False), np.zeros(800), RigidTransform.identity()).points_mm
+    station_mm = np.linspace(0, profile.length_mm, 800, endpoint=False)
+    ring = synthetic.scan(profile, station_mm, np.zeros(800), RigidTransform.identity()).points_mm
     write(folder / "blade.stl", binary_stl(tube(ring, np.array((0, 20)))))
     device = Device()
     records = PastRuns(folder / "records", lambda _: None, time.monotonic, lambda: datetime.now().astimezone())
