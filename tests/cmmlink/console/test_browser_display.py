@@ -60,7 +60,7 @@ def test_no_view_hinders_anybody_in_either_theme(make_bench: MakeBench, tmp_path
     page = measured_page(bench, locale="de-DE", viewport={"width": 1280, "height": 800})
     page.evaluate(AXE.read_text(encoding="utf-8"))
     page.keyboard.press("l")
-    found = {}
+    found: dict[str, object] = {}
     for theme in ("light", "dark"):
         page.emulate_media(color_scheme="dark" if theme == "dark" else "light")
         for view in (*VIEWS, "display", "wall"):
