@@ -43,9 +43,9 @@ tolerance: {{lower_mm: -0.05, upper_mm: 0.05}}
 probe: {{tip_radius_mm: {radius}}}
 device: {device}
 out: null
-discretisation: {{samples: 1000}}
+discretisation: {{samples: 500}}
 """
-FINELY = "discretisation: {samples: 1000}\n"
+FINELY = "discretisation: {samples: 300}\nout: null\n"
 PART = ["--tip-radius-mm", str(RADIUS_MM), "--form-error-mm", "0.02", "--unpaced"]
 EQUAL = ("verdict", "received", "judged", "rejected", "lost", "out_of_tolerance", "max_deviation_mm", "min_deviation_mm", "rms_mm")
 
@@ -60,7 +60,7 @@ def measured(
     before: Callable[[str], None] = lambda _: None,
 ) -> tuple[int, dict[str, Any], str]:
     """Exit status, result and messages of a run against a simulated device; the same options are the same part."""
-    np.savetxt(folder / "nominal.csv", PART_MM[::20], delimiter=",")
+    np.savetxt(folder / "nominal.csv", PART_MM[::40], delimiter=",")
     with simulated(
         name,
         "127.0.0.1:0",
@@ -252,7 +252,7 @@ def test_the_plan_of_the_page_of_machines_finds_the_part_that_is_simulated_witho
 
 
 def test_a_test_of_the_device_asks_the_machine_and_moves_nothing(tmp_path: Path) -> None:
-    np.savetxt(tmp_path / "nominal.csv", PART_MM[::20], delimiter=",")
+    np.savetxt(tmp_path / "nominal.csv", PART_MM[::40], delimiter=",")
     with simulated("dme", "127.0.0.1:0", tmp_path, *PART, path_mm=PART_MM) as machine:
         device = DME.format(address=machine.address)
         (tmp_path / "plan.yaml").write_text(PLAN.format(device=device, radius=RADIUS_MM), encoding="utf-8")
@@ -283,7 +283,7 @@ def test_a_course_that_no_single_line_holds_is_scanned_piece_by_piece(tmp_path: 
 @pytest.mark.parametrize("order", [1, -1])
 def test_an_open_profile_is_scanned_from_end_to_end(order: int, tmp_path: Path) -> None:
     half_mm = PART_MM[:2001]  # from the right end over the top to the left one, the material on its left
-    np.savetxt(tmp_path / "nominal.csv", half_mm[:: 20 * order], delimiter=",")
+    np.savetxt(tmp_path / "nominal.csv", half_mm[:: 40 * order], delimiter=",")
     with simulated("dme", "127.0.0.1:0", tmp_path, *PART, "--open", path_mm=half_mm, noise_mm=0.001) as machine:
         side = "left" if order == 1 else "right"
         plan = PLAN.format(device=DME.format(address=machine.address), radius=RADIUS_MM)
