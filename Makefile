@@ -7,7 +7,7 @@ INSTALL := $(PIP) --no-build-isolation --editable
 # The tests start a hundred processes; where Python may keep no compiled files, each of them compiles every file anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo install test checks compiled lowest lowest-compiled lowest-drivers platforms upgrade bench slower paper faults powercuts kills fuzz soak damage memory proofs stops laws audit supply-chain docs page-tools screenshots
+.PHONY: demo install test checks compiled lowest lowest-compiled lowest-drivers platforms upgrade bench slower paper faults powercuts kills fuzz soak damage memory proofs stops laws audit supply-chain docs bundle page-tools screenshots
 demo: .venv/installed
 	$(BIN)/cmmlink demo --out demo-result
 
@@ -103,6 +103,14 @@ docs: .venv/docs-installed
 	PYTHONPATH=. $(BIN)/python docs/api.py $(DOCS_IN)
 	@echo "$(DOCS_IN)/index.html"
 
+# A folder that installs cmmlink without a network, with a menu entry for the console: `make bundle SYSTEM=windows`.
+# SYSTEM: linux, linux-arm, windows, macos, macos-intel. EXTRAS: plain, or all. BUNDLE_PYTHON: the version that is installed there.
+SYSTEM ?= linux
+EXTRAS ?= plain
+BUNDLE_PYTHON ?= 3.12
+bundle: .venv/bundle-installed
+	.ci/bundle/make $(BIN) $(SYSTEM) $(BUNDLE_PYTHON) $(EXTRAS) build/cmmlink-$(SYSTEM)
+
 # Licences of all that is installed, and known vulnerabilities of what is pinned, as far as the package index can be asked.
 supply-chain: .venv/test-installed
 	.ci/supply-chain $(BIN)
@@ -166,6 +174,10 @@ paper: .venv/bench-installed
 
 .venv/test-installed: .venv/all-installed
 	$(INSTALL) '.[test]'
+	touch $@
+
+.venv/bundle-installed: .venv/installed
+	$(PIP) uv hatchling
 	touch $@
 
 .venv/docs-installed: .venv/all-installed
