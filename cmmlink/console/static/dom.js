@@ -33,6 +33,13 @@ export function elementOf(id, kind) {
 }
 
 /**
+ * All elements that a selector names.
+ * @param {string} selector
+ * @returns {NodeListOf<HTMLElement>}
+ */
+export const elementsOf = (selector) => document.querySelectorAll(selector);
+
+/**
  * The first part of an element that a selector names.
  * @param {Element} element
  * @param {string} selector

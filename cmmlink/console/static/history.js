@@ -3,10 +3,11 @@
 import { Chart } from "./chart.js";
 import { buttonOf, byId, put } from "./dom.js";
 import { count } from "./numbers.js";
+import { Order, RunSearch } from "./run_search.js";
 import { Table, cell, verdictCell, worstCells } from "./table.js";
 import { dated, gettext, ngettext, translate } from "./words.js";
 
-/** @import { RunRow } from "./protocol.js" */
+/** @import { Command, FoundRuns, RunRow } from "./protocol.js" */
 /** @typedef {"open" | "replay" | "export" | "report" | "compare"} Act */
 
 const SHOWN = 20;
@@ -17,9 +18,18 @@ export class History {
   /**
    * @param {Record<Act, (run: string) => void>} acts what can be done with a run
    * @param {() => void} onChoice hears that another run is chosen
+   * @param {(sought: Command) => void} look
    */
-  constructor(acts, onChoice) {
+  constructor(acts, onChoice, look) {
     this.acts = acts;
+    this.search = new RunSearch(look);
+    this.order = new Order(() => this.showRows());
+    /** @type {readonly RunRow[]} */
+    this.newest = [];
+    /** @type {FoundRuns} */
+    this.found = { runs: null, total: 0, type: "found" };
+    this.plan = ""; // the chosen one
+    this.shownChart = "";
     this.charts = [new Chart(byId("chart-large"), true), new Chart(byId("chart-small"), false)];
     /** @type {Table<RunRow>} */
     this.table = new Table(byId("runs"), rowOf, ({ run }) => acts.open(run), onChoice);
@@ -33,16 +43,56 @@ export class History {
 
   /** @param {readonly RunRow[]} runs newest first */
   show(runs) {
+    this.newest = runs;
     byId("no-runs").hidden = runs.length > 0;
-    byId("runs").hidden = !runs.length;
+    byId("run-search").hidden = !runs.length;
+    this.showRows();
+    this.showChart();
+  }
+
+  /** @param {FoundRuns} found */
+  showFound(found) {
+    this.found = found;
+    this.showRows();
+  }
+
+  /** Only parts of the chosen plan make a trend. @param {string} plan */
+  choosePlan(plan) {
+    if (plan === this.plan) return;
+    this.plan = plan;
+    this.showChart();
+  }
+
+  showRows() {
+    const runs = this.order.sorted(this.found.runs ?? this.newest), { at, chosen } = this.table;
+    byId("runs").hidden = !this.newest.length;
+    put("found-words", this.found.runs ? foundWords(this.found) : "");
     for (const act of ACTS) buttonOf(`${act}-run`).disabled = !runs.length;
-    const { at, chosen } = this.table, now = at ? runs.findIndex(({ run }) => run === chosen?.run) : 0;
-    this.table.show(runs, Math.max(now, 0)); // the choice stays with its run; at the top it stays with the newest
-    const last = runs.filter((run) => !run.section).slice(0, SHOWN); // sections of a surface are no parts
+    const staysAtTop = at === 0 && this.order.isByTime; // at the top the choice stays with the newest, else with its run
+    this.table.show(runs, staysAtTop ? 0 : Math.max(runs.findIndex(({ run }) => run === chosen?.run), 0));
+  }
+
+  showChart() {
+    const plan = this.plan || (this.newest[0]?.plan ?? "");
+    const last = this.newest.filter((run) => !run.section && run.plan === plan).slice(0, SHOWN); // sections of a surface are no parts
+    const shown = JSON.stringify([plan, last]);
+    if (shown === this.shownChart) return;
+    this.shownChart = shown;
     const entries = last.map((run) => ({ ...run, label: run.serial_number || run.run })).reverse();
     for (const chart of this.charts) chart.show(entries);
+    if (plan) {
+      put("chart-title", gettext("Worst deviation of the last 20 parts of {plan}", { plan }));
+      put("chart-small-title", gettext("Last 20 parts of {plan}", { plan }));
+    }
     put("chart-words", last.length ? chartWords(last) : "");
   }
+}
+
+/** @param {FoundRuns} found */
+export function foundWords({ runs, total }) {
+  const shown = runs?.length ?? 0;
+  if (shown < total) return gettext("{total} runs found, the newest {shown} are shown", { total: count(total), shown: count(shown) });
+  return ngettext("{count} run found", "{count} runs found", total);
 }
 
 /**
@@ -63,7 +113,7 @@ export function chartWords(runs) {
 /** @param {RunRow} run */
 function rowOf(run) {
   const part = run.section ? `${run.part}, ${translate(run.section)}` : run.part;
-  const words = [part, run.serial_number, dated(run.began), stateOf(run)];
+  const words = [part, run.serial_number, dated(run.began), run.operator, run.plan, stateOf(run)];
   const verdict = verdictCell(run.of ? `${translate(run.word)}: ${run.of}` : run.word, run.shape);
   return [verdict, ...words.map((word) => cell(word)), cell(count(run.received), "number"), ...worstCells(run)];
 }

@@ -32,7 +32,7 @@ const VIEWS = ["live", "part", "history", "ct", "registers", "wall"];
 const MOST_MAGNIFICATION = 5000;
 const SLIDER_STEPS = 1000;
 const SAID_MS = 8000; // so long the answer to a command stays
-const SILENT = ["enter", "devices", "keep map"]; // commands whose success is not worth a word
+const SILENT = ["enter", "devices", "keep map", "search"]; // commands whose success is not worth a word
 
 /** @type {Heard} */
 const heard = {
@@ -66,7 +66,7 @@ const history = new History({
   export: (run) => downloads.export(run),
   report: (run) => downloads.report(run),
   compare: (run) => downloads.compare(run),
-}, rewrite);
+}, rewrite, (sought) => ask(sought));
 const characteristics = new Characteristics(showChosen);
 /** @type {CharacteristicList} */
 let told = { rows: [], more: 0, uncertainty: [], final: false, type: "characteristics" };
@@ -85,6 +85,7 @@ function onMessage(message) {
   else if (message.type === "control") heard.control = message;
   else if (message.type === "alarms") [alarms, heard.hasFault] = [message.alarms, message.fault];
   else if (message.type === "history") history.show(message.runs);
+  else if (message.type === "found") history.showFound(message);
   else if (message.type === "ct") ctView.show((heard.surface = message));
   else if (message.type === "registers") registersView.show(message);
   else if (message.type === "alive") clock = { nowMs: message.now_ms, at: performance.now() };
@@ -196,6 +197,7 @@ function paintWords() {
   showAlarms(alarms, heard.run?.kind ?? "run");
   if (heard.station) {
     partView.show(heard.station);
+    history.choosePlan(heard.station.choice?.name ?? "");
     byId("new-device").hidden = !heard.station.can_make_plans;
     ctView.showPlans(heard.station.ct_plans, heard.station.running);
   }

@@ -45,7 +45,7 @@ INKED = """(drawing) => [...document.querySelectorAll(`${drawing} canvas`)].some
 
 def test_history_is_listed_opened_replayed_and_exported(make_bench: MakeBench, tmp_path: Path, keep: Keep) -> None:
     past = PastRuns(tmp_path / "records", lambda _: None, monotonic, lambda: datetime.now().astimezone())
-    bench = make_bench(records=past)
+    bench = make_bench(records=past, plans=("blade.yaml", "other.yaml"))
     page = bench.started()
     defects = (0.0, 0.12, -0.15, 0.0)
     for k, defect_mm in enumerate(defects):
@@ -66,6 +66,7 @@ def test_history_is_listed_opened_replayed_and_exported(make_bench: MakeBench, t
     expect(page.locator("#runs tbody td:first-child")).to_have_text(verdicts)
     expect(page.locator("#runs tbody td:nth-child(3)")).to_have_text(["B-0044", "B-0043", "B-0042", "B-0041"])
     expect(page.locator("#chart-words")).to_have_text("4 parts, 2 NOT CONFORM; newest at the right")
+    expect(page.locator("#chart-title")).to_have_text("Worst deviation of the last 20 parts of blade.yaml")
     keep(page, "history")
     expect(page.locator("#runs tr[aria-selected=true]")).to_contain_text("B-0041")  # chosen before the last two came
     page.locator("#runs").focus()
@@ -89,6 +90,46 @@ def test_history_is_listed_opened_replayed_and_exported(make_bench: MakeBench, t
     page.keyboard.press("r")
     expect(page.locator("#banners")).to_contain_text("identical to the recorded result, to the last bit")
     expect(page.locator("#verdict-word")).to_have_text("NOT CONFORM")
+
+
+def test_history_is_searched_and_sorted_and_its_chart_is_that_of_the_chosen_plan(make_bench: MakeBench, tmp_path: Path, keep: Keep) -> None:
+    past = PastRuns(tmp_path / "records", lambda _: None, monotonic, lambda: datetime.now().astimezone())
+    bench = make_bench(records=past, plans=("blade.yaml", "other.yaml"))
+    station = bench.station
+    for k, (plan, operator, defect_mm) in enumerate((("blade.yaml", "Ada", 0.0), ("other.yaml", "Bob", 0.12), ("blade.yaml", "Bob", 0.0))):
+        station.choose(plan)
+        station.enter(f"S-{9 + k}", operator)
+        points = batches(measured(bench.profile, 800, seed=k, defect_mm=defect_mm, at_mm=60.0), 400)
+        bench.device.source.put(opened(800), *points, CLOSED)
+        station.start()
+        assert station.wait(20.0)
+        bench.device.renew()
+    page, serials = bench.page(), "#runs tbody td:nth-child(3)"
+    page.keyboard.press("3")
+    expect(page.locator(serials)).to_have_text(["S-11", "S-10", "S-9"])
+    expect(page.locator("#chart-words")).to_contain_text("2 parts, 0 NOT CONFORM")
+    page.locator("#runs th button", has_text="Serial number").click()
+    expect(page.locator(serials)).to_have_text(["S-9", "S-10", "S-11"])
+    expect(page.locator("#runs th[aria-sort=ascending]")).to_have_text("Serial number")
+    page.locator("#runs th button", has_text="Worst").click()
+    page.locator("#runs th button", has_text="Worst").click()
+    expect(page.locator(serials).first).to_have_text("S-10")
+    page.locator("#sought-operator").fill("bob")
+    expect(page.locator("#found-words")).to_have_text("2 runs found")
+    page.locator("#sought-verdict").select_option("conform")
+    expect(page.locator(serials)).to_have_text(["S-11"])
+    keep(page, "history-search")
+    page.locator("#sought-verdict").select_option("nonconform")
+    page.locator("#sought-plan").fill("other")
+    page.locator("#sought-since").fill(f"{datetime.now():%Y-%m-%d}")
+    expect(page.locator(serials)).to_have_text(["S-10"])
+    page.locator("#sought-until").fill("2020-01-01")
+    expect(page.locator("#found-words")).to_have_text("0 runs found")
+    page.locator("#run-search button").click()
+    expect(page.locator(serials)).to_have_count(3)
+    station.choose("other.yaml")
+    expect(page.locator("#chart-title")).to_contain_text("other.yaml")
+    expect(page.locator("#chart-words")).to_contain_text("1 part, 1 NOT CONFORM")
 
 
 def check_report_while_measuring(bench: Bench, page: Page, folder: Path) -> None:
