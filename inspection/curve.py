@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from inspection.b_spline import evaluate_b_spline
 from inspection.errors import NominalError
 from inspection.first_use import OnFirstUse
-from inspection.kernels import spline_derivatives
+from inspection.kernels import Spline, spline_derivatives
 
 Array = NDArray[np.float64]
 
@@ -67,6 +67,11 @@ class NurbsCurve:
     def domain(self) -> tuple[float, float]:
         """First and last parameter of the curve."""
         return float(self.knots[self.degree]), float(self.knots[-self.degree - 1])
+
+    @property
+    def spline(self) -> Spline:
+        """The curve as compiled loops take it."""
+        return Spline(self.knots, self._homogeneous, self.degree)
 
     @property
     def length_mm(self) -> float:
@@ -123,7 +128,7 @@ class NurbsCurve:
     def few_derivatives(self, u: ArrayLike, order: int) -> Array:
         """The same to the last bit by a compiled loop, for searches that ask for few places again and again."""
         parameter = self._bring_inside(np.atleast_1d(np.asarray(u, dtype=np.float64)))
-        return spline_derivatives(self.knots, self._homogeneous, self.degree, parameter, order)
+        return spline_derivatives(self.spline, parameter, order)
 
     def curvature(self, u: ArrayLike) -> Array:
         """Signed curvature (m,) in 1/mm, positive where the curve turns left."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from inspection.characteristics.outline import AirfoilSection
 from inspection.errors import InspectionError
-from inspection.kernels import nearest_squared, smallest_touching
+from inspection.kernels import nearest_squared, settle_contacts, smallest_touching
 
 Array = NDArray[np.float64]
 
@@ -119,21 +119,9 @@ def _touch_other_side(section: AirfoilSection, place: Array, normal: Array) -> A
     parameter = section.parameter[side]
     best = smallest_touching(place, normal, section.points_mm[side])
     low, high = parameter[np.maximum(best - 1, 0)], parameter[np.minimum(best + 1, len(parameter) - 1)]
-    v = parameter[best]
-    for _ in range(_NEWTON_STEPS):
-        contact, first, second = section.derivatives(v, 2)
-        d = contact - place
-        square, facing_now = dot(d, d), dot(normal, d)
-        slope = 2 * dot(d, first) * facing_now - square * dot(normal, first)
-        bend = 2 * (dot(first, first) + dot(d, second)) * facing_now - square * dot(normal, second)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            step = np.where(bend > 0, -slope / bend, -np.sign(slope) * (high - low) / 4)
-        stepped = np.minimum(np.maximum(v + step, low), high)
-        moved = np.abs(stepped - v).max(initial=0.0)
-        v = stepped
-        if moved < _SETTLED * (section.last - section.first):
-            break
-    return np.asarray(v)
+    settled = _SETTLED * (section.last - section.first)
+    curve, start = section.curve, parameter[best]
+    return settle_contacts(curve.spline, curve.domain, place, normal, start, (low, high), _NEWTON_STEPS, settled)
 
 
 def find_camber_line(section: AirfoilSection) -> CamberLine:

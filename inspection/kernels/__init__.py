@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from inspection.kernels.projection import Turned, project, project_on_samples, project_outward
     from inspection.kernels.rows import JUDGED_AS, TALLY, Columns, Judgement, Places, judge_rows, take_in
     from inspection.kernels.side_by_side import fit_compiled_beside, is_fit_compiled
-    from inspection.kernels.splines import spline_derivatives
+    from inspection.kernels.splines import Spline, spline_derivatives
     from inspection.kernels.thinning import strides
-    from inspection.kernels.touching import nearest_squared, smallest_touching
+    from inspection.kernels.touching import nearest_squared, settle_contacts, smallest_touching
     from inspection.kernels.tree_growing import GrownTree, shortest_tree
 else:
     from inspection.front_door import load_on_use
@@ -45,9 +45,9 @@ else:
         "inspection.kernels.projection": ("Turned", "project", "project_on_samples", "project_outward"),
         "inspection.kernels.rows": ("JUDGED_AS", "TALLY", "Columns", "Judgement", "Places", "judge_rows", "take_in"),
         "inspection.kernels.side_by_side": ("fit_compiled_beside", "is_fit_compiled"),
-        "inspection.kernels.splines": ("spline_derivatives",),
+        "inspection.kernels.splines": ("Spline", "spline_derivatives"),
         "inspection.kernels.thinning": ("strides",),
-        "inspection.kernels.touching": ("nearest_squared", "smallest_touching"),
+        "inspection.kernels.touching": ("nearest_squared", "settle_contacts", "smallest_touching"),
         "inspection.kernels.tree_growing": ("GrownTree", "shortest_tree"),
     }
 
@@ -75,6 +75,7 @@ __all__ = [
     "PoseFit",
     "Room",
     "SampleTables",
+    "Spline",
     "Taken",
     "Turned",
     "compile_projection",
@@ -86,6 +87,7 @@ __all__ = [
     "project",
     "project_on_samples",
     "project_outward",
+    "settle_contacts",
     "shortest_tree",
     "smallest_touching",
     "spline_derivatives",

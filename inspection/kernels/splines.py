@@ -4,7 +4,7 @@ Every operation is that of `b_spline` and of `NurbsCurve.derivatives` on whole a
 the last bit. On a few hundred parameters the arrays cost ten times as much as what is worked out on them.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,15 +14,22 @@ from inspection.kernels.compiling import inner_kernel, kernel
 Array = NDArray[np.float64]
 
 
-def spline_derivatives(knots: Array, homogeneous: Array, degree: int, u: Array, order: int) -> Array:
-    """Point and derivatives by u up to `order`: (order + 1, m, 2).
+class Spline(NamedTuple):
+    """A rational B-spline.
 
     knots       : (k + degree + 1,) non-decreasing
     homogeneous : (k, 3) of w x, w y, w
-    u           : (m,) in the domain; NaN gives NaN
     """
+
+    knots: Array
+    homogeneous: Array
+    degree: int
+
+
+def spline_derivatives(spline: Spline, u: Array, order: int) -> Array:
+    """Point and derivatives by u (m,), which lies in the domain, up to `order`: (order + 1, m, 2). NaN gives NaN."""
     result = np.empty((order + 1, len(u), 2))
-    _derivatives(knots, homogeneous, degree, np.ascontiguousarray(u), result)
+    derive(spline.knots, spline.homogeneous, spline.degree, np.ascontiguousarray(u), result)
     return result
 
 
@@ -52,7 +59,8 @@ def _derive(knots: Any, degree: int, span: int, j: int, lower: Any, derived: Any
 
 
 @kernel
-def _derivatives(knots: Any, homogeneous: Any, degree: int, parameters: Any, result: Any) -> None:
+def derive(knots: Any, homogeneous: Any, degree: int, parameters: Any, result: Any) -> None:
+    """Fill in points and derivatives (orders, m, 2)."""
     orders, count = len(result), len(homogeneous)
     first = np.searchsorted(knots, knots[degree], side="right") - 1  # the first and the last span that have a length
     last = np.searchsorted(knots, knots[count], side="left") - 1
