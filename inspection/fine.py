@@ -16,7 +16,7 @@ from inspection.cloud import MANY, Cloud
 from inspection.coarse import check_cloud, contour_of, poses_of_contour, trimmed_mean_square
 from inspection.contour_order import Contour
 from inspection.gaps import weigh_by_station
-from inspection.kernels import AT_ONCE, OutlierLimit, PoseEstimate, PoseFit, project
+from inspection.kernels import AT_ONCE, OutlierFit, OutlierLimit, PoseEstimate, PoseFit, project
 from inspection.kernels.layout import OPEN_END
 from inspection.methods import Method, WeightName
 from inspection.nominal import NominalProfile
@@ -143,12 +143,15 @@ def register_fine(
         return _icp(points.few(len(points)), nominal, pose, method, tip_radius_mm + target_mm)
     if scheme != "gauss-newton":
         raise ValueError(f"scheme must be gauss-newton or icp, not {scheme!r}")
-    aimed_mm, outliers = tip_radius_mm + target_mm, no_outliers(len(points))
+    aimed_mm, outliers, near = tip_radius_mm + target_mm, no_outliers(len(points)), _pose_numbers(pose)
     if robust:
-        outliers = _find_outliers(points, nominal, method, aimed_mm, _pose_numbers(pose), gross_mm)
-        points = points.without(outliers)
+        search = _find_outliers(points, nominal, method, aimed_mm, near, gross_mm)
+        points, outliers = points.without(search.found), search.found
+        # It is closer to the least mean square of the others, and ends at the same one where that does not depend on the way there: which
+        # points lie beyond an open end does, and so does where a fit to the samples settles.
+        near = search.pose if search.settled and nominal.curve.closed and method == "exact" else near
     fit = _pose_fit(points, nominal, method, aimed_mm)
-    found = _settle(points, fit, _fit_to_few(points, nominal, method, aimed_mm), _pose_numbers(pose))
+    found = _settle(points, fit, _fit_to_few(points, nominal, method, aimed_mm), near)
     if weights == "arc-length":
         for _ in range(_WEIGHINGS):
             _weigh_by_arc_length(fit, points, found, nominal)
@@ -178,13 +181,13 @@ def _is_determined(near: PoseEstimate, fit: PoseFit) -> bool:
 
 def _find_outliers(
     points: Cloud, nominal: NominalProfile, method: Method, aimed_mm: float, pose: tuple[float, float, float], gross_mm: float
-) -> NDArray[np.bool_]:
-    """Which of the points (m,) are gross outliers."""
+) -> OutlierFit:
+    """Which of the points (m,) are gross outliers, and the pose at which they were found."""
     limit = OutlierLimit(_OUTLIER_MADS, float(gross_mm), _SETTLED_WEIGHTS_MM)
     few, fit = _fit_to_few(points, nominal, method, aimed_mm), _pose_fit(points, nominal, method, aimed_mm, MANY)
     near = few.find_outliers(pose, limit, _ROBUST_STEPS) if few and len(points) <= _HELD else None
     found = fit.find_outliers_nearby(near, limit) if near and near.settled else None
-    return (found or fit.find_outliers(pose, limit, _ROBUST_STEPS)).found
+    return found or fit.find_outliers(pose, limit, _ROBUST_STEPS)
 
 
 def _fit_to_few(points: Cloud, nominal: NominalProfile, method: Method, aimed_mm: float) -> PoseFit | None:

@@ -43,14 +43,17 @@ class Deviations:
     at_vertex: NDArray[np.bool_]
 
     def __post_init__(self) -> None:
-        m = len(self.deviation_mm)
-        for array in (self.deviation_mm, self.parameter, self.station_mm, self.curvature, self.beyond_end, self.at_vertex):
-            if array.shape != (m,):
+        values = self.deviation_mm, self.parameter, self.station_mm, self.curvature, self.beyond_end, self.at_vertex
+        pairs = self.foot_mm, self.normal
+        m = len(values[0])
+        one, two = (m,), (m, 2)
+        for array in values:
+            if array.shape != one:
                 raise ValueError(f"expected {m} values, got an array of shape {array.shape}")
             array.setflags(write=False)
-        for array in (self.foot_mm, self.normal):
-            if array.shape != (m, 2):
-                raise ValueError(f"expected an array of shape {(m, 2)}, got {array.shape}")
+        for array in pairs:
+            if array.shape != two:
+                raise ValueError(f"expected an array of shape {two}, got {array.shape}")
             array.setflags(write=False)
 
     def __len__(self) -> int:

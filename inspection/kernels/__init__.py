@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from inspection.kernels.growing import GrowingSums
     from inspection.kernels.layout import AT_ONCE, SAMPLE_METHODS
     from inspection.kernels.on_samples import SampleTables
-    from inspection.kernels.outliers import OutlierLimit
+    from inspection.kernels.outliers import OutlierFit, OutlierLimit
     from inspection.kernels.pose import NONE_LEFT_OUT, PoseEstimate, PoseFit
     from inspection.kernels.projection import Turned, project, project_on_samples, project_outward
     from inspection.kernels.rows import JUDGED_AS, TALLY, Columns, Judgement, Places, judge_rows, take_in
@@ -40,7 +40,7 @@ else:
         "inspection.kernels.growing": ("GrowingSums",),
         "inspection.kernels.layout": ("AT_ONCE", "SAMPLE_METHODS"),
         "inspection.kernels.on_samples": ("SampleTables",),
-        "inspection.kernels.outliers": ("OutlierLimit",),
+        "inspection.kernels.outliers": ("OutlierFit", "OutlierLimit"),
         "inspection.kernels.pose": ("NONE_LEFT_OUT", "PoseEstimate", "PoseFit"),
         "inspection.kernels.projection": ("Turned", "project", "project_on_samples", "project_outward"),
         "inspection.kernels.rows": ("JUDGED_AS", "TALLY", "Columns", "Judgement", "Places", "judge_rows", "take_in"),
@@ -69,6 +69,7 @@ __all__ = [
     "GrownTree",
     "Judgement",
     "Marks",
+    "OutlierFit",
     "OutlierLimit",
     "Places",
     "PoseEstimate",

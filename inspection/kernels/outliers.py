@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from inspection.kernels.compiling import inner_kernel, kernel
 from inspection.kernels.feet import feet_between
-from inspection.kernels.layout import OPEN_END, SUMS
+from inspection.kernels.layout import BLOCK, OPEN_END, SUMS
 from inspection.kernels.normal_equations import newton_step
 from inspection.kernels.on_samples import project_by
 from inspection.kernels.pose_sums import evaluate, move_pose, place_points, span_of
@@ -78,7 +78,7 @@ def mark_outliers(problem: Any, projection: Any, memory: Any, state: Any, wanted
     ended before the steps did.
     """
     weights = problem[2]
-    takes_part, _, moved, feet = memory
+    takes_part, weighed, moved, feet = memory
     m, sums, last = len(weights), np.empty(SUMS), np.inf
     span, pose, before = span_of(problem[0], problem[1], m), (state[0], state[1], state[2]), state[3]
     for _ in range(most_steps):
@@ -86,21 +86,14 @@ def mark_outliers(problem: Any, projection: Any, memory: Any, state: Any, wanted
         limit = np.inf
         if count > 0:
             limit = max(wanted.mads * _median(off, takes_part), wanted.least_mm, _LEAST_LIMIT_MM)
-        weight = root = 0.0
-        for i in range(m):
-            share = off[i] / limit
-            near = 1.0 - share * share if off[i] < limit else 0.0
-            weights[i] = near * near
-            found[i] = off[i] >= limit and takes_part[i] > 0
-            weight += weights[i]
-            root += near
-        evaluate(problem, projection, pose, span, moved, takes_part, takes_part, feet, _KNOWN, sums)
+        weight, root = _weigh(off, takes_part, limit, weights, found)
+        evaluate(problem, projection, pose, span, moved, takes_part, weighed, feet, _KNOWN, sums)
         step, share = newton_step(sums, span[2]), share_of_tukey(weight, root)
         pose = move_pose(pose, span, step, share)
         state[0], state[1], state[2] = pose
         state[3] = limit
         to_come = TO_COME * (share * step[3] + abs(limit - before)) if share * step[3] <= last / 2.0 else np.inf
-        if share * step[3] <= wanted.settled_mm or not _is_any_within(off, takes_part, limit, to_come):
+        if share * step[3] <= wanted.settled_mm or not _is_any_within(off, weighed, limit, to_come):
             return count > 0
         before, last = limit, share * step[3]
     return False
@@ -118,11 +111,30 @@ def share_of_tukey(weight: float, root: float) -> float:
 
 
 @inner_kernel
+def _weigh(off: Any, takes_part: Any, limit: float, weights: Any, found: Any) -> tuple[float, float]:
+    """Enter Tukey's weights, and which points are beyond the limit. Returns the sums of the weights and of their roots."""
+    near, weight, root = np.empty(BLOCK), 0.0, 0.0
+    for begin in range(0, len(off), BLOCK):
+        stop = min(begin + BLOCK, len(off))
+        here, part, weighed, beyond = off[begin:stop], takes_part[begin:stop], weights[begin:stop], found[begin:stop]
+        for j in range(stop - begin):  # by itself, so that it vectorises; sums are added up one after the other
+            share = here[j] / limit
+            rest = 1.0 - share * share
+            near[j] = rest if here[j] < limit else 0.0
+            beyond[j] = (here[j] >= limit) & (part[j] > 0)
+        for j in range(stop - begin):
+            weighed[j] = near[j] * near[j]
+            weight += weighed[j]
+            root += near[j]
+    return weight, root
+
+
+@inner_kernel
 def _is_any_within(off: Any, takes_part: Any, limit: float, reach: float) -> bool:
     """Whether a point that takes part is as close to the limit."""
     found = False
     for i in range(len(off)):
-        found |= takes_part[i] > 0 and abs(off[i] - limit) <= reach
+        found |= (takes_part[i] > 0) & (abs(off[i] - limit) <= reach)
     return found
 
 
@@ -135,10 +147,13 @@ def _look_at_distances(problem: Any, projection: Any, pose: Any, moved: Any, tak
         stop = min(begin + len(feet.vertex), m)
         row = place_points(points, left_out, row, stop - begin, pose, moved)
         project_by(projection, moved[: 2 * (stop - begin)], reals, integers, feet_between(feet, _FIRST_ROW, stop - begin))
+        distance, vertex, away, part = feet.distance_mm, feet.vertex, off[begin:stop], takes_part[begin:stop]
         for j in range(stop - begin):
-            off[begin + j] = abs(outward * feet.distance_mm[j] - tip)
-            takes_part[begin + j] = feet.vertex[j] != OPEN_END
-            count += takes_part[begin + j]
+            away[j] = abs(outward * distance[j] - tip)
+        for j in range(stop - begin):
+            part[j] = vertex[j] != OPEN_END
+        for j in range(stop - begin):
+            count += part[j]
     return count
 
 

@@ -82,7 +82,7 @@ class PoseFit:
         self._projection = projection_of(table, method)
         chunk = min(m, at_once)
         before, after = room((m,), np.uint8), room((m,), np.uint8)
-        before[:] = 1
+        before[:] = after[:] = 1
         self._room, self._memory = room, (before, after, np.empty(2 * chunk), empty_feet(chunk))
 
     @property
@@ -139,10 +139,10 @@ class PoseFit:
 
     def find_outliers_nearby(self, near: OutlierFit, limit: OutlierLimit) -> OutlierFit | None:
         """The same, on all threads, from a fit to some of the points; None where that takes more than a few steps."""
-        off, takes_part = np.empty(len(self.weights)), self._memory[0]
+        off, (before, here) = np.empty(len(self.weights)), self._memory[:2]
         pose, limit_mm, last_mm = near.pose, near.limit_mm, np.inf
         for _ in range(_WEIGHED_PASSES):
-            sums = self._pass(pose, takes_part, takes_part, limit_mm, off)
+            sums = self._pass(pose, before, here, limit_mm, off)
             share = share_of_tukey(float(self.weights.sum()), float(np.sqrt(self.weights).sum()))
             next_pose, moved_mm, _ = _next_pose(pose, self._span, sums, share)
             if not sums[COUNT] > 0.0 or not np.isfinite(moved_mm):
@@ -211,7 +211,7 @@ def _settle_pose(problem: Any, projection: Any, memory: Any, state: Any, covaria
     weights = problem[2]
     takes_part, new_part, moved, feet = memory
     span, pose, here, trial = span_of(problem[0], problem[1], len(weights)), (state[0], state[1], state[2]), np.empty(SUMS), np.empty(SUMS)
-    evaluate(problem, projection, pose, span, moved, takes_part, takes_part, feet, _NOT_KNOWN, here)
+    evaluate(problem, projection, pose, span, moved, new_part, takes_part, feet, _NOT_KNOWN, here)
     steps, settled, lower = 0, False, True
     while lower and not settled and steps < most_steps:
         steps += 1

@@ -96,7 +96,8 @@ def evaluate(
 ) -> None:
     """Add up the sums over the points at a pose, chunk by chunk and always in the same order.
 
-    They are added first for each place in a block, so that the loop vectorises, then in halves.
+    They are added first for each place in a block, so that the loop vectorises, then in halves. It does so where `before` and
+    `takes_part` are not the same array.
 
     known : the points were looked at there before, so that their feet are still known where one chunk holds them all
     """
@@ -219,17 +220,20 @@ def _add_point(
 
     H is the curvature of the distance field across its gradient.
     """
+    # Every value is loaded whatever comes of it: a load that depends on a condition would keep the loop from being vectorised.
+    bent, share, kind = curvature[j], weight[j], vertex[j]
     field = outward * distance[j]
     e = field - tip
     gx, gy = outward * gradient[2 * j], outward * gradient[2 * j + 1]
     ax, ay = points[2 * j] - x0, points[2 * j + 1] - y0
     turn, radial = ax * gy - ay * gx, ax * gx + ay * gy
-    at_corner = vertex[j] == CORNER
-    numerator = 1.0 if at_corner else -outward * curvature[j]
-    denominator = field if at_corner else max(1.0 - curvature[j] * distance[j], 1e-3)
-    bend = numerator / denominator if abs(denominator) > 1e-9 else 0.0
+    at_corner, turned_back = kind == CORNER, max(1.0 - bent * distance[j], 1e-3)
+    numerator = 1.0 if at_corner else -outward * bent
+    denominator = field if at_corner else turned_back
+    ratio = numerator / denominator
+    bend = ratio if abs(denominator) > 1e-9 else 0.0
     was_part = before[j]
-    u = 0.0 if vertex[j] == OPEN_END else weight[j]
+    u = 0.0 if kind == OPEN_END else share
     takes_part = 1.0 if u > 0.0 else 0.0
     part[j] = takes_part
     we = u * e
@@ -251,4 +255,4 @@ def _add_point(
     lanes[BLOCK * BENDING_TT + j] += across * radial * radial - we * radial
     lanes[BLOCK * SQUARE + j] += we * e
     lanes[BLOCK * COUNT + j] += takes_part
-    lanes[BLOCK * SQUARE_BEFORE + j] += was_part * weight[j] * e * e
+    lanes[BLOCK * SQUARE_BEFORE + j] += was_part * share * e * e

@@ -63,7 +63,8 @@ def project_outward(
     beyond_end, at_vertex = np.empty(m, dtype=np.bool_), np.empty(m, dtype=np.bool_)
     turned = (outward, tip_radius_mm, farthest_mm, beyond_end, at_vertex, found)
     feet = _feet_of(points_mm, grid, table, method, turned, None)
-    return Turned(feet, beyond_end, at_vertex, found[0] > 0, found[1] > 0)
+    far, first_or_last = found.tolist()
+    return Turned(feet, beyond_end, at_vertex, far > 0, first_or_last > 0)
 
 
 def _feet_of(points_mm: Array, grid: CurveTables, table: SampleTables | None, method: str, turned: Any, threads: int | None) -> Feet:
