@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Words = NDArray[np.uint32]  # four bytes of text each
 
+_WORD = 4  # bytes
 _ROWS = 2048  # laid out together: they stay in the cache
 _TOO_LARGE = 999_999.0  # from here on a number is left to the format: what it is rounded to may need seven digits
 _MILLION, _THOUSAND = 1_000_000, 1_000
@@ -51,9 +52,9 @@ def _lines(columns: Sequence[Column]) -> bytes:
     numbers = [column for column in columns if not isinstance(column, Texts) and column.dtype.kind == "f"]
     if any(np.any(np.abs(column) >= _TOO_LARGE) for column in numbers):
         return _formatted(columns)
-    fields = np.concatenate([_fields(column) for column in columns], axis=1)
-    signs = np.pad(fields.view(np.uint8), ((0, 0), (0, 1)))
-    signs[:, -2], signs[:, -1] = ord("\r"), ord("\n")  # in place of the last comma, and behind it
+    fields = [_fields(column) for column in columns]
+    signs = np.concatenate([*fields, np.full((len(fields[0]), 1), _LINE_END)], axis=1)
+    signs.view(np.uint8)[:, -_WORD - 1] = 0  # the last comma
     return signs.tobytes().translate(None, b"\0")
 
 
@@ -150,4 +151,5 @@ _SIGNED = _table("{0}", "-{0}")
 _BEFORE_POINT = _table("{1}.", "{1:03d}.")
 _WHOLE = _table("{0}", "{1:03d}")
 _WHOLE_END = _table("{1},", "{1:03d},")
+_LINE_END = np.frombuffer(b"\r\n\0\0", np.uint32)[0]
 _NO_NUMBER = np.frombuffer(b"\0" * 15 + b",", np.uint32)

@@ -152,9 +152,11 @@ def _cell_means(blocks: Callable[[], Iterable[Array]], step_mm: float) -> Array:
     )  # of each cell: number of points, sums of x and y
     for block in blocks():
         cells = np.floor((block - low) / step_mm).astype(np.int64)
-        own, which = np.unique(cells[:, 0] * across + cells[:, 1], return_inverse=True)
+        cell = cells[:, 0] * across + cells[:, 1]
+        begins = np.flatnonzero(np.diff(cell, prepend=-1))  # where points in the order of a scan leave one cell for the next
+        own, which = np.unique(cell[begins], return_inverse=True)
         grown = np.union1d(keys, own)
-        before, place = sums, np.searchsorted(grown, own)[which]
+        before, place = sums, np.repeat(np.searchsorted(grown, own)[which], np.diff(begins, append=len(cell)))
         sums = np.zeros((3, len(grown)))
         sums[:, np.searchsorted(grown, keys)] = before
         for total, values in zip(sums, (np.ones(len(block)), *(block - low).T), strict=True):

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from inspection.cloud import MANY, Cloud, few_of
+from inspection.cloud import MANY, Cloud, few_of, row_blocks
 from inspection.coarse import FEWEST_POINTS
 from inspection.contour_order import trace_contour
 from inspection.errors import NotMeasured
@@ -28,6 +28,7 @@ _FAR_STRAIGHTER = 0.1  # of the rms at the best fit
 _SIZES_APART = 1.25
 _SURELY_APART = _SIZES_APART * (1 - 1e-9)  # and rounding changes nothing
 _LOOKS = 16  # directions: what lies between two of them shows at least 99.5 % of its length
+_LOOKED_AT = 1 << 12  # points together
 _GROUPS_APART = 0.2  # of the size: no gap of a scan that still goes round is so wide
 _FACTOR_NEAR = 1.05
 _NEARLY_CLOSED = 3.0  # steps between the two ends of the line on which the points lie
@@ -193,7 +194,12 @@ def _are_as_wide(points_mm: Array, others_mm: Array) -> bool:
 def _bounds_across(points_mm: Array) -> tuple[float, float]:
     """Bounds of the largest distance between two of the points (m, 2): from right across all of it shows, from nearby nearly all."""
     turns = np.pi * np.arange(_LOOKS) / _LOOKS
-    widest = max(float(np.ptp(points_mm @ (np.cos(turn), np.sin(turn)))) for turn in turns)
+    looks = np.column_stack([np.cos(turns), np.sin(turns)])  # (k, 2)
+    low, high = np.full(_LOOKS, np.inf), np.full(_LOOKS, -np.inf)
+    for rows in row_blocks(len(points_mm), _LOOKED_AT):  # from all directions at once while the points are in the cache
+        along = looks @ points_mm[rows].T
+        low, high = np.minimum(low, along.min(axis=1)), np.maximum(high, along.max(axis=1))
+    widest = float((high - low).max())
     return widest, widest / float(np.cos(np.pi / (2 * _LOOKS)))
 
 

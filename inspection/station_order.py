@@ -65,15 +65,15 @@ def _sorted_share(station_mm: Array, members: Rows, room: Room, most: int) -> It
 
 def _shares(counts: Rows, most: int) -> Iterator[tuple[int, int]]:
     """Ranges of bins that hold no more than `most` points together, or one bin that holds more; none without points."""
+    before = np.concatenate([[0], np.cumsum(counts)])  # points in the bins below each
     filled = np.flatnonzero(counts)
-    first, held = 0, 0
-    for each in filled.tolist():
-        if held and held + counts[each] > most:
-            yield first, each
-            first, held = each, 0
-        held += int(counts[each])
-    if held:
-        yield first, len(counts)
+    first, begin = 0, 0
+    while begin < len(filled):
+        fit = int(np.searchsorted(before[filled + 1], before[first] + most, side="right"))
+        begin = max(fit, begin + 1)
+        stop = int(filled[begin]) if begin < len(filled) else len(counts)
+        yield first, stop
+        first = stop
 
 
 def extremes_of(station_mm: Array) -> tuple[float, float]:
