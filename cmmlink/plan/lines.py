@@ -44,7 +44,12 @@ class LineFormat(Settings):
             raise ValueError("end, points and pass_over only beside a pattern")
         if self.pattern is not None and self.result_set is not None:
             raise ValueError("result_set only beside language: g800")
-        decoder(self.name, unit="mm", **self.options)
+        if self.pattern is not None and self.end is None and self.points is None:
+            raise ValueError("end or points beside a pattern, so that the scan ends")
+        try:
+            decoder(self.name, unit="mm", **self.options)
+        except ValueError as error:
+            raise ValueError(f"lines that can be told apart: {error}") from None
         return self
 
     @property

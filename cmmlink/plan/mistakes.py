@@ -13,7 +13,7 @@ from cmmlink.plan.surface import CtPlan
 from cmmlink.plan.yaml_model import mistakes_in, texts_of
 from drivers import PointFileError, RegisterMap, read_text
 
-_FILES = ("nominal.file", "device.file", "mesh.file", "report.logo")
+_FILES = ("nominal.file", "device.file", "device.format.sample", "mesh.file", "report.logo")
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +52,8 @@ def _absent_files(text: str, folder: Path, model: type[BaseModel]) -> Iterator[t
     """Line and words for each file that a plan names, seen from its folder, and that is not there."""
     if model is RegisterMap:
         return
-    for key, (line, name) in texts_of(text).items():
-        if key in _FILES and name.strip() and not (folder / name.strip()).is_file():
+    texts = texts_of(text)
+    grows = texts.get("device.type", (0, ""))[1] == "lines"  # its file may come with the first line that is printed
+    for key, (line, name) in texts.items():
+        if key in _FILES and not (grows and key == "device.file") and name.strip() and not (folder / name.strip()).is_file():
             yield line, f"line {line}: {key}: {folder / name.strip()}: no such file", ""

@@ -230,3 +230,38 @@ def test_the_plan_of_the_page_of_machines_finds_the_part_that_is_simulated_witho
         (tmp_path / "plan.yaml").write_text(text.replace("127.0.0.1:9100", machine.address) + FINELY, encoding="utf-8")
         done = cmmlink("run", tmp_path / "plan.yaml", "--json", "--records", tmp_path / "records")
     assert (done.code, done.json()["verdict"]) == (0, "conform"), done.err
+
+
+@pytest.mark.parametrize(
+    ("keys", "told"),
+    [
+        ("address: COM3, file: prints.txt", "expected either an address or a file"),
+        ("unit: mm", "expected either an address or a file"),
+        ("address: COM3, listen: true", "expected listen beside an address host:port only"),
+        ("address: COM3, existing: true", "expected existing only beside a file"),
+        ("address: COM3, parity: N", "expected parity: E or O beside 7 data bits"),
+        ("address: COM3, format: {pattern: 'X(?P<x>.*)Y(?P<y>.*)'}", "expected end or points beside a pattern, so that the scan ends"),
+        (
+            "address: COM3, format: {pattern: 'X(?P<x>.*', end: M30}",
+            "expected lines that can be told apart: pattern 'X(?P<x>.*' is no regular",
+        ),
+        ("address: COM3, format: {language: g800, end: M30}", "expected end, points and pass_over only beside a pattern"),
+        ("address: COM3, format: {points: 3}", "expected either language or pattern"),
+        ("address: COM3, format: g801", "device.format.language is 'g801'"),
+        (
+            "address: COM3, reconnect_s: 5, format: {pattern: 'X(?P<x>.*)Y(?P<y>.*)', points: 3}",
+            "expected reconnect_s: 0 where the pattern",
+        ),
+    ],
+)
+def test_a_device_that_cannot_be_so_is_told_with_what_is_allowed(keys: str, told: str, tmp_path: Path) -> None:
+    plan = planned(tmp_path, f"{{type: lines, {keys}{', unit: mm' if 'unit' not in keys else ''}}}")
+    assert told in cmmlink("check", plan).refused()
+
+
+def test_a_lost_link_that_comes_back_costs_the_lines_that_were_lost_with_it(tmp_path: Path) -> None:
+    device = LINES.replace("unit", "reconnect_s: 20, unit")
+    code, facts, errors = measured(tmp_path, device, "--fault=unplug:0.1@100")
+    assert (code, facts["verdict"]) == (3, "uncertain"), errors
+    assert facts["judged"] + facts["rejected"] == facts["received"]
+    assert COUNT - facts["lost"] <= facts["received"] <= COUNT
