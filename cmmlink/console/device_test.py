@@ -50,4 +50,5 @@ def _listen(connected: Connected, clock: Callable[[], float]) -> str:
         return f"{device}: it answers; nothing was moved"
     if not points:
         return f"{device}: the link opened, but no point came within {_LONGEST_S:g} s"
-    return f"{device}: {points} points in {clock() - began_s:.1f} s"
+    taken = "The test took them out of the device's stream: they are in no run; start the device's scan anew before the part is measured."
+    return f"{device}: {points} points in {clock() - began_s:.1f} s. {taken}"

@@ -1,10 +1,13 @@
 // The alarms: the most urgent one at the foot of the page, all of them in a list.
 
 import { apart, byId, make, put, showSymbol, within } from "./dom.js";
+import { faultParts, showFault } from "./faults.js";
 import { count } from "./numbers.js";
 import { dated, gettext, translate } from "./words.js";
 
 /** @import { AlarmRow, RunState } from "./protocol.js" */
+
+let shownAlarms = "";
 
 /**
  * @param {readonly AlarmRow[]} alarms newest first
@@ -21,16 +24,20 @@ export function showAlarms(alarms, kind) {
   line.dataset.acknowledged = String(Boolean(first?.acknowledged));
   showSymbol(within(line, "svg"), first ? "lamp-fault" : "lamp-off");
   put("alarm-text", words ? words + more : gettext("No alarm"));
-  byId("alarm-text").title = words;
+  byId("alarm-text").title = first ? first.detail : "";
   byId("acknowledge").hidden = alarms.every((alarm) => alarm.acknowledged);
   byId("alarm-list-button").hidden = !alarms.length;
+  const shown = JSON.stringify(alarms);
+  if (shown === shownAlarms) return; // a fold that was opened stays open
+  shownAlarms = shown;
   within(byId("alarm-list"), "ul").replaceChildren(...alarms.map(itemOf));
 }
 
 /** @param {AlarmRow} alarm */
 function itemOf(alarm) {
   const marks = [alarm.active && gettext("still active"), alarm.acknowledged && gettext("acknowledged")].filter(Boolean);
-  const item = make("li", [whose(alarm), alarmWords(alarm), ...marks].join("  \u00b7 "));
+  const item = make("li", "");
+  showFault(item, [whose(alarm), ...marks, alarmTitle(alarm)].join("  \u00b7 "), alarm.detail);
   item.dataset.severity = alarm.current ? alarm.severity : "earlier";
   item.dataset.acknowledged = String(alarm.acknowledged && !alarm.active);
   return item;
@@ -46,8 +53,11 @@ export function whose({ run, since, current }) {
 
 /** @param {AlarmRow} alarm */
 export function alarmWords({ what, count: times, detail }) {
-  return `${translate(what)}${times > 1 ? ` (${count(times)})` : ""}: ${translate(detail)}`;
+  return alarmTitle({ what, count: times }) + translate(faultParts(detail).words);
 }
+
+/** @param {Pick<AlarmRow, "what" | "count">} alarm */
+const alarmTitle = ({ what, count: times }) => `${translate(what)}${times > 1 ? ` (${count(times)})` : ""}: `;
 
 export function toggleAlarmList() {
   const list = byId("alarm-list");

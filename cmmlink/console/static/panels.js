@@ -2,6 +2,7 @@
 
 import { cardOf } from "./card.js";
 import { buttonOf, byId, fillBar, make, put, putInto, showSymbol, styleOf, within } from "./dom.js";
+import { faultParts } from "./faults.js";
 import { count, digitsFor, fixed, flooredShare, signed } from "./numbers.js";
 import { toleranceUse } from "./points.js";
 import { POSE_MOVES } from "./protocol.js";
@@ -60,7 +61,7 @@ const cardKind = ({ kind }) => (kind === "replay" || kind === "recorded" ? "past
 
 /** @param {Card} shown */
 function showVerdict({ word: told, shape, final, of: whose, why: reason, phase }) {
-  const word = translate(told), of = translate(whose), why = translate(reason);
+  const word = translate(told), of = translate(whose), why = translate(faultParts(reason).words);
   const card = byId("verdict");
   document.body.dataset.verdict = shape;
   card.dataset.final = String(final);
@@ -71,7 +72,7 @@ function showVerdict({ word: told, shape, final, of: whose, why: reason, phase }
   put("verdict-of", of);
   byId("verdict-of").title = of; // a long one is cut
   put("verdict-why", why);
-  byId("verdict-why").title = why; // a long one is cut
+  byId("verdict-why").title = reason; // a long one is cut, and so is what the system said
   put("provisional", phase);
   byId("provisional").hidden = !phase;
 }

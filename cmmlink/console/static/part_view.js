@@ -1,6 +1,7 @@
 // The part view: choose a plan, see that it can be run, enter the part, test the device.
 
 import { buttonOf, byId, inputOf, make, put } from "./dom.js";
+import { showFault } from "./faults.js";
 import { List } from "./list.js";
 import { gettext, translate } from "./words.js";
 
@@ -19,7 +20,7 @@ export class PartView {
   constructor(ask, start) {
     this.ask = ask;
     this.list = new List(byId("plans"), (name) => this.choose(name));
-    this.shownChoice = "";
+    this.shownChoice = this.shownTest = "";
     /** @type {StationState | null} */
     this.station = null;
     /** The plan whose serial number is to be entered next, once the station has told it. */
@@ -80,10 +81,20 @@ export class PartView {
     byId("address-label").hidden = !choice?.has_address;
     const { state, message } = station.test;
     byId("test-result").dataset.state = state;
-    put("test-result", state === "none" ? "" : TEST_SIGNS[state] + translate(message));
+    this.showTest(state === "none" ? "" : TEST_SIGNS[state], message);
     buttonOf("test").disabled = running;
     buttonOf("start-part").disabled = !station.can_start;
     this.enterNext(station);
+  }
+
+  /**
+   * @param {string} sign
+   * @param {string} message
+   */
+  showTest(sign, message) {
+    if (this.shownTest === sign + message) return; // a fold that was opened stays open
+    this.shownTest = sign + message;
+    showFault(byId("test-result"), sign, message);
   }
 
   /**

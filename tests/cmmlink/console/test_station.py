@@ -159,6 +159,7 @@ def test_device_test_tells_what_it_heard_and_what_went_wrong(bench: Bench) -> No
     assert bench.station.wait(30.0)
     assert bench.station.state.test.state == "passed"
     assert bench.station.state.test.message.startswith("played scanner PL-7: 200 points in ")
+    assert "The test took them out of the device's stream: they are in no run" in bench.station.state.test.message
     bench.device.renew()
     bench.device.source.put(LinkError("COM3 cannot be opened"))
     bench.station.test_device()
