@@ -7,7 +7,7 @@ INSTALL := $(PIP) --no-build-isolation --editable
 # The tests start a hundred processes; where Python may keep no compiled files, each of them compiles every file anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo install test checks compiled lowest lowest-compiled lowest-drivers platforms upgrade bench slower paper faults powercuts kills fuzz soak damage memory proofs stops laws audit supply-chain docs bundle page-tools screenshots
+.PHONY: demo install test checks compiled lowest lowest-compiled lowest-drivers platforms upgrade bench slower paper faults powercuts kills fuzz soak damage memory proofs stops laws audit uncertainty supply-chain docs bundle page-tools screenshots
 demo: .venv/installed
 	$(BIN)/cmmlink demo --out demo-result
 
@@ -140,6 +140,10 @@ laws: .venv/test-installed
 # The audit of verdicts: live scans, minimum zones, partial scans and mirrored parts whose truth is known.
 audit: .venv/test-installed
 	$(BIN)/python -m tests.benchmarks.verdict_audit
+
+# The audit of U: ten numbers of four sections, measured anew with drawn errors; less may not be stated than they scatter by.
+uncertainty: .venv/test-installed
+	$(BIN)/python -m tests.benchmarks.uncertainty_audit 200
 
 # All that a user waits for, and the projection against the rivals of the package index; takes half an hour and wants a quiet machine.
 # A line is added to docs/performance-history.jsonl, docs/performance.md is written, and what got slower is named.

@@ -28,7 +28,8 @@ from tests.inspection import profiles
 Array = NDArray[np.float64]
 
 COUNT = 1500
-PAGE = (Path(__file__).resolve().parents[2] / "docs" / "characteristics.md").read_text(encoding="utf-8")
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+PAGE = (DOCS / "characteristics.md").read_text(encoding="utf-8")
 PLAN = PAGE.split("```yaml\n")[1].split("```")[0] + "discretisation: {samples: 1500}\nrecords: kept\n"
 MOVED_DEG, MOVED_MM = 0.05, np.array([0.03, -0.02])
 
@@ -337,6 +338,27 @@ def test_another_program_verifies_the_minimum_zone_and_finds_what_was_altered(wa
     ended = cmmlink("verify-zone", file, "--json")
     assert ended.code == 5
     assert ended.json()["zones"][0]["problem"] == "the points that hold the zone are not at its limits"
+
+
+def test_the_page_of_the_walk_shows_what_the_run_found(walk: Walk) -> None:
+    page = (DOCS / "walk.md").read_text(encoding="utf-8")
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in page.splitlines() if line.startswith("| ")][2:]
+    words = {"conform": "CONFORM", "nonconform": "NOT CONFORM"}
+    shown = [
+        [
+            one["name"],
+            f"{one['value']:.4f} {one['unit']}",
+            f"{one['deviation']:+.4f}",
+            f"{one['lower']:g} .. {one['upper']:g}",
+            words[one["verdict"]],
+        ]
+        for one in walk.facts["characteristics"]
+    ]
+    either = {"contour", "varying"}  # points at both limits hold these: which of them is told hangs on the last digit
+    assert [[cell.lstrip("+-") if row[0] in either else cell for cell in row[:5]] for row in rows] == [
+        [cell.lstrip("+-") if row[0] in either else cell for cell in row] for row in shown
+    ]
+    assert any(note == "the drawn section may mislead by 0.035 mm" for note in walk.found("camber")["notes"])
 
 
 def test_the_list_of_runs_names_the_characteristic_that_decides(walk: Walk) -> None:

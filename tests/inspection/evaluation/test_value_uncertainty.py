@@ -22,6 +22,7 @@ from inspection import (
     with_nominal,
 )
 from inspection.characteristics.error_fields import Sensitivities
+from tests.benchmarks.uncertainty_audit import SECTIONS, ratios
 from tests.inspection.profiles import Array
 from tests.inspection.reference_parts import nominal_of, reference_form, scan
 from tests.inspection.test_uncertainty import covariance_of_field
@@ -99,6 +100,14 @@ def test_numbers_measured_anew_with_drawn_errors_scatter_no_more_than_stated() -
     ratio = stated / drawn.std(axis=0, ddof=1)
     assert (ratio > 0.75).all(), ratio
     assert (ratio < 1.9).all(), ratio
+
+
+def test_what_is_stated_of_another_section_is_no_less_than_its_numbers_scatter() -> None:
+    """Six draws tell a scatter to a third; `make uncertainty` makes 200 of them for ten numbers of four sections."""
+    found = ratios(SECTIONS["naca 6409"](), 6, np.random.default_rng(5), ("edge-radius", "twist"))
+    assert len(found) == 2
+    assert min(found.values()) > 0.45, found
+    assert max(found.values()) < 4, found
 
 
 def test_growth_that_was_not_taken_out_is_added_in_full() -> None:
