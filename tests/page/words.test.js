@@ -80,7 +80,7 @@ test("a card without a run shows the worst point of its row, and never zeros for
   const zone = { lower_mm: -0.05, upper_mm: 0.05 };
   const row = { ...zone, worst_mm: -0.3919, worst_station_mm: 19.9, verdict: "nonconform" };
   const card = (chosen) => cardOf({ ...HEARD, view: "history", chosen });
-  assert.deepEqual(card(row).worst, { deviation: -0.3919, station: 19.9, zone, kind: "under" });
+  assert.deepEqual(card(row).worst, { deviation: -0.3919, station: 19.9, place: null, zone, kind: "under" });
   assert.equal(card({ ...row, verdict: "uncertain" }).worst.kind, "not-proven");
   assert.equal(card({ ...row, worst_mm: 0.01, verdict: "uncertain" }).worst.kind, "in");
   assert.equal(card({ ...row, worst_mm: null }).worst, null);

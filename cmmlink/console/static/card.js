@@ -9,7 +9,7 @@ import { dated, gettext, translate } from "./words.js";
 /** @import { LinkState } from "./link.js" */
 /** @import { PointClass } from "./points.js" */
 /** @typedef {{ lower_mm: number, upper_mm: number }} Zone */
-/** @typedef {{ deviation: number, station: number, kind: PointClass, zone: Zone }} Worst */
+/** @typedef {{ deviation: number, station: number, place: readonly [number, number] | null, kind: PointClass, zone: Zone }} Worst place: x, y */
 /**
  * What stands at the right of the page.
  * @typedef {object} Card
@@ -86,7 +86,7 @@ function cardOfRun(run, judged) {
   const { word, shape, final, of, why, reasons } = run.verdict;
   const badge = BADGES[run.kind](dated(began));
   const worst = run.worst && {
-    deviation: run.worst.deviation_mm, station: run.worst.station_mm, zone,
+    deviation: run.worst.deviation_mm, station: run.worst.station_mm, place: placeOf(run.worst.x_mm, run.worst.y_mm), zone,
     kind: classOf(run.worst.deviation_mm, CODE_OF[run.worst.verdict], zone),
   };
   return {
@@ -142,15 +142,24 @@ const useOf = (worst) => (worst ? toleranceUse(worst.deviation, worst.zone) : -1
 
 /**
  * The worst point of a run or a section as a table holds it; outside the zone it is out only where the verdict says so.
- * @param {Pick<RunRow | SectionRow, "worst_mm" | "worst_station_mm" | "lower_mm" | "upper_mm" | "verdict">} row
+ * @param {Pick<RunRow | SectionRow, "worst_mm" | "worst_station_mm" | "lower_mm" | "upper_mm" | "verdict">
+ *   & Partial<Pick<RunRow, "worst_x_mm" | "worst_y_mm">>} row
  * @returns {Worst | null}
  */
-function worstOf({ worst_mm: deviation, worst_station_mm: station, lower_mm, upper_mm, verdict }) {
+function worstOf({ worst_mm: deviation, worst_station_mm: station, worst_x_mm: x, worst_y_mm: y, lower_mm, upper_mm, verdict }) {
   if (deviation === null || station === null || lower_mm === null || upper_mm === null) return null;
   const zone = { lower_mm, upper_mm }, isOutside = deviation < lower_mm || deviation > upper_mm;
   const code = CODE_OF[verdict === "nonconform" ? "nonconform" : "uncertain"];
-  return { deviation, station, zone, kind: classOf(deviation, isOutside ? code : CODE_OF.conform, zone) };
+  return { deviation, station, place: placeOf(x, y), zone, kind: classOf(deviation, isOutside ? code : CODE_OF.conform, zone) };
 }
+
+/**
+ * A place in the coordinates of the nominal, where it is known.
+ * @param {number | null | undefined} x
+ * @param {number | null | undefined} y
+ * @returns {Worst["place"]}
+ */
+const placeOf = (x, y) => (typeof x === "number" && typeof y === "number" ? [x, y] : null);
 
 /**
  * What stands in the verdict's place before a run.

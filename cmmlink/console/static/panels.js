@@ -107,6 +107,7 @@ function showWorst({ worst, run }) {
   put("worst-value", worst ? signed(worst.deviation, digitsFor(worst.zone)) : NONE);
   const nowhere = run ? gettext("no point judged") : "";
   put("worst-where", worst ? gettext("at station {station} mm", { station: fixed(worst.station, 2) }) : nowhere);
+  put("worst-place", worst?.place ? gettext("x {x} mm, y {y} mm", { x: fixed(worst.place[0], 3), y: fixed(worst.place[1], 3) }) : "");
   const share = worst ? Math.round(100 * toleranceUse(worst.deviation, worst.zone)) : 0;
   put("worst-use", worst ? gettext("{share} % of the tolerance", { share }) : "");
 }

@@ -6,6 +6,7 @@ import { digitsFor, fixed, niceLength, signed } from "./numbers.js";
 import { CLASSES, classOf } from "./points.js";
 import { cut, drawPlaces, drawRegions, lanesOf, roomOf } from "./regions.js";
 import { INK, label, mark } from "./sheet.js";
+import { drawStations } from "./stations.js";
 import { gettext } from "./words.js";
 
 /** @import { CharacteristicRow, WorstPoint } from "./protocol.js" */
@@ -123,6 +124,7 @@ export class Profile extends Drawing {
     pen.strokeStyle = INK.line;
     pen.lineWidth = 1.75;
     pen.stroke(this.offset(0));
+    drawStations(pen, this);
     drawRegions(pen, this);
     this.drawRuler(pen);
   }

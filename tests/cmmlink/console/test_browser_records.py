@@ -118,6 +118,7 @@ def test_history_is_searched_and_sorted_and_its_chart_is_that_of_the_chosen_plan
     expect(page.locator("#found-words")).to_have_text("2 runs found")
     page.locator("#sought-verdict").select_option("conform")
     expect(page.locator(serials)).to_have_text(["S-11"])
+    expect(page.locator("#worst-place")).to_contain_text(re.compile(r"^x \S+ mm, y \S+ mm$"))
     keep(page, "history-search")
     page.locator("#sought-verdict").select_option("nonconform")
     page.locator("#sought-plan").fill("other")

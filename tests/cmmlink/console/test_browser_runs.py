@@ -81,6 +81,11 @@ def test_defect_turns_the_verdict_and_the_worst_point_is_named(bench: Bench, kee
     assert millimetres(page.locator("#worst-value").text_content()) == pytest.approx(outcome.deviation_mm[outcome.worst], abs=5.1e-5)
     assert outcome.deviation_mm[outcome.worst] == pytest.approx(0.12, abs=0.02)
     expect(page.locator("#worst-where")).to_have_text(f"at station {outcome.station_mm[outcome.worst]:.2f} mm")
+    profile, k = bench.profile, int(np.abs(bench.profile.station_mm - outcome.station_mm[outcome.worst]).argmin())
+    place = profile.points_mm[k] + outcome.deviation_mm[outcome.worst] * profile.outward * profile.normal[k]
+    told = re.fullmatch(r"x (\S+) mm, y (\S+) mm", (page.locator("#worst-place").text_content() or "").replace("\u2212", "-"))
+    assert told is not None
+    assert [float(told[1]), float(told[2])] == pytest.approx(place.tolist(), abs=0.05), "the spacing of the samples is 0.03 mm"
     assert outcome.station_mm[outcome.worst] == pytest.approx(60.0, abs=0.6)
     expect(page.locator("#worst-shape")).to_have_text("▲")
     assert page.locator("body").get_attribute("data-verdict") == "not-conform"
