@@ -9,7 +9,8 @@ import { dated, gettext, translate } from "./words.js";
 /** @import { LinkState } from "./link.js" */
 /** @import { PointClass } from "./points.js" */
 /** @typedef {{ lower_mm: number, upper_mm: number }} Zone */
-/** @typedef {{ deviation: number, station: number, place: readonly [number, number] | null, kind: PointClass, zone: Zone }} Worst place: x, y */
+/** @typedef {readonly [x: number, y: number]} Place */
+/** @typedef {{ deviation: number, station: number, place: Place | null, kind: PointClass, zone: Zone }} Worst */
 /**
  * What stands at the right of the page.
  * @typedef {object} Card
