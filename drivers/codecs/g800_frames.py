@@ -21,7 +21,7 @@ from collections.abc import Mapping
 from drivers.codecs.text_lines import FEATURES, NUMBER, TextLines, is_feature_print, number_of, unit_in_mm
 from drivers.codecs.touches import MODULUS, Touches
 from drivers.errors import ProtocolError
-from drivers.source import Arrival, ScanClosed, ScanOpened
+from drivers.source import Arrival, ScanOpened
 
 MOST_WAITING = 1024  # nominal points that wait for their measured one; of more the oldest counts as not touched
 NO_CONTACT = "nominal point without a measured one: the probe touched nothing"
@@ -74,6 +74,7 @@ class G800Decoder:
     def break_off(self) -> list[Arrival]:
         """Count the begun line, if any, as damaged."""
         self._lines.break_off()
+        self._touches.break_off()
         return self._touches.out.hand_over()
 
     def _begin(self) -> None:
@@ -95,7 +96,7 @@ class G800Decoder:
         elif line == "START":
             self._start()
         elif line == "END":
-            self._end()
+            self._end(size)
         elif is_feature_print(line) and not self._opened:
             raise ProtocolError(FEATURES)
         else:
@@ -115,14 +116,14 @@ class G800Decoder:
         self._forget_old_names()
         self._started = True
 
-    def _end(self) -> None:
+    def _end(self, size: int) -> None:
         """End the set. The end of one that is passed over, or whose beginning and points did not come, is not that of the scan."""
         self._end_stretch()
         is_it = self._opened or (self._started and not self._passed_over and self._is_wanted)
         self._begin()
         self._names_are_old = True
         if is_it:
-            self._touches.out.append(ScanClosed(None))
+            self._touches.close(size)
 
     def _end_stretch(self) -> None:
         """The numbers of a toolpath are over: what still waits was not touched."""

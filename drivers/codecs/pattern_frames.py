@@ -9,7 +9,7 @@ import re
 from drivers.codecs.text_lines import FEATURES, TextLines, is_feature_print, number_of, unit_in_mm
 from drivers.codecs.touches import Touches
 from drivers.errors import ProtocolError
-from drivers.source import Arrival, ScanClosed, ScanOpened
+from drivers.source import Arrival, ScanOpened
 
 LONGEST_PATTERN = 500
 _AXES = ("x", "y", "z")
@@ -79,13 +79,14 @@ class PatternDecoder:
     def break_off(self) -> list[Arrival]:
         """Count the begun line, if any, as damaged."""
         self._lines.break_off()
+        self._touches.break_off()
         return self._touches.out.hand_over()
 
     def _take_line(self, line: str, size: int) -> None:
         if found := self._pattern.fullmatch(line):
             self._take_point(found, line, size)
         elif self._end is not None and self._end.fullmatch(line):
-            self._touches.out.append(ScanClosed(None))
+            self._touches.close(size)
         elif self._pass_over is not None and self._pass_over.fullmatch(line):
             return
         elif is_feature_print(line) and not self._opened:
@@ -106,7 +107,7 @@ class PatternDecoder:
             self._touches.out.append(ScanOpened("", "", None))
         self._touches.take(int(number) if "seq" in fields else None, (x, y, z), hash(line))
         if self._points is not None and self._touches.count >= self._points:
-            self._touches.out.append(ScanClosed(None))
+            self._touches.close(size)
 
 
 DECODERS = {"pattern": PatternDecoder}

@@ -4,10 +4,11 @@ import numpy as np
 
 from drivers.codecs.outbox import Outbox
 from drivers.codecs.sequence import Place, SequenceCounter
-from drivers.source import ANOTHER_CONTENT, FRAME_REPEATED, Arrival, Damaged, PointBatch, Rejected
+from drivers.source import ANOTHER_CONTENT, FRAME_REPEATED, Arrival, Damaged, PointBatch, Rejected, ScanClosed
 
 Point = tuple[float, float, float]
 MODULUS = 1 << 40  # no control prints so large a number: nothing wraps
+UNKNOWN_LOSS = "end of a scan whose link was lost, with no number behind it that shows how many points were lost"
 GAP = "gap in the numbers of the points"
 
 
@@ -27,6 +28,7 @@ class Touches:
         self._first: int | None = None
         self._counter = SequenceCounter(MODULUS)
         self._beginning_seen = False
+        self._link_lost = self._loss_unknown = False
         self._sequence: list[int] = []
         self._points: list[Point] = []
 
@@ -36,7 +38,8 @@ class Touches:
         return self._before + (self._counter.expected - self._first if self._first is not None else 0)
 
     def begin_stretch(self) -> None:
-        """Take note that a stretch begins, whose numbers may begin anew."""
+        """Take note that a stretch begins, whose numbers may begin anew: they tell nothing of what was lost at the end of the last one."""
+        self._loss_unknown |= self._link_lost
         self._before, self._first = self.count, None
         self._beginning_seen = True
 
@@ -60,6 +63,16 @@ class Touches:
         if not place.repeated:
             self.out.append(Rejected(1, reason))
 
+    def break_off(self) -> None:
+        """Take note that the link was lost: the next number shows how many points were lost with it."""
+        self._link_lost = True
+
+    def close(self, size: int) -> None:
+        """End the scan, with its last line of so many bytes."""
+        if self._link_lost or self._loss_unknown:
+            self.damage(size, UNKNOWN_LOSS)
+        self.out.append(ScanClosed(None))
+
     def damage(self, byte_count: int, reason: str) -> None:
         """Count bytes that are no points."""
         self.out.append(Damaged(byte_count, reason))
@@ -69,6 +82,7 @@ class Touches:
         if self._first is None:
             self._first = number if number is not None and (self._beginning_seen or number < 1) else 0 if number is None else 1
             self._counter = SequenceCounter(MODULUS, self._first)
+        self._link_lost &= number is None
         place = self._counter.place(self._counter.expected if number is None else number, content=content)
         self.out.append_loss(place.lost, GAP)
         return Place(self._before + place.sequence - self._first, place.lost, place.repeated, place.same)

@@ -7,11 +7,11 @@ import pytest
 
 from drivers.codecs.g800_frames import MOST_WAITING, NO_CONTACT, NO_NOMINAL, OTHER_PLANE, G800Decoder
 from drivers.codecs.text_lines import LONGEST_LINE
-from drivers.codecs.touches import GAP
+from drivers.codecs.touches import GAP, UNKNOWN_LOSS
 from drivers.errors import ProtocolError
 from drivers.source import ANOTHER_CONTENT, FRAME_REPEATED, ScanClosed, ScanOpened
 from tests.drivers.codecs.g800_transcript import GOLDEN, INCHES, OPENING, PLANES, POINTS, PRINT_OUT, RADIUS_MM
-from tests.drivers.codecs.streams import any_cut_is_the_same, decoded, flipped, only_sent_points
+from tests.drivers.codecs.streams import account, any_cut_is_the_same, decoded, flipped, only_sent_points
 
 
 def mm(*, set_name: str = "", parity: str = "") -> G800Decoder:
@@ -213,3 +213,20 @@ def test_no_bit_that_turns_over_makes_a_wrong_point_where_parity_is_sent() -> No
     only_sent_points(book, sent, 1e-4)
     assert 1000 < len(book.points_mm) < count
     assert len(book.points_mm) + book.total("Rejected") + book.lost == pytest.approx(count, abs=3)
+
+
+@pytest.mark.parametrize(
+    ("behind", "counts"),
+    [
+        ([*pair(2)], {}),
+        ([*pair(4)], {("Lost", GAP): 2}),
+        ([], {("Damaged", UNKNOWN_LOSS): 4}),
+        (["TOOLPATHID 2", *pair(1)], {("Damaged", UNKNOWN_LOSS): 4}),
+    ],
+)
+def test_what_is_lost_with_the_link_is_counted_or_said_to_be_unknown(behind: list[str], counts: dict[tuple[str, str], int]) -> None:
+    made = mm()
+    arrivals = [*made.feed(set_of(*pair(1), end="")), *made.break_off(), *made.feed(set_of(*behind, opening=""))]
+    book = account(arrivals)
+    assert isinstance(book.others[-1], ScanClosed)
+    assert book.counts == counts
