@@ -10,6 +10,7 @@ const ISO_DATE = /\b(\d{4})-(\d\d)-(\d\d)\b/g;
 const BETWEEN = [[/(?<=[.!?]) (?=[A-Z\u00c0-\u00de0-9])/, " "], [/; /, "; "], [/: /, ": "], [/, /, ", "]];
 /** A whole number, with commas between its thousands, and decimals; no part of a name, a version or an address. */
 const NUMBER = /(?<![\w.,])(\d{1,3}(?:,\d{3})+|\d+)(?:\.(\d+))?(?!\w|[.,]\w)/g;
+const FEWEST_LETTERS = 5; // of a text that a sentence is looked for by: "at {time}" would find itself in everything
 const MOST_KEPT = 500; // sentences whose translation is remembered
 
 /** @type {Catalogue} */
@@ -25,7 +26,7 @@ export class Speech {
     this.point = new Intl.NumberFormat(locale).formatToParts(0.5).find(({ type }) => type === "decimal")?.value ?? ".";
     this.whole = new Intl.NumberFormat(locale);
     this.date = new Intl.DateTimeFormat(locale, { year: "numeric", month: "2-digit", day: "2-digit", timeZone: "UTC" });
-    const withPlaces = Object.keys(texts).filter((text) => text.includes("{")).sort(byFixedLetters);
+    const withPlaces = Object.keys(texts).filter((text) => text.includes("{") && lettersOf(text) >= FEWEST_LETTERS).sort(byFixedLetters);
     this.patterns = withPlaces.map((text) => ({ text, find: patternOf(text) }));
     /** @type {Map<string, string>} */
     this.kept = new Map();
@@ -102,13 +103,26 @@ export class Speech {
   }
 
   /**
+   * Whether a part of a sentence can stand in a translated one: half a sentence in another language is worse than none. Names can.
+   * @param {string} part
+   * @returns {boolean}
+   */
+  knows(part) {
+    if (!part.trim().includes(" ") || this.wholeOf(part) !== undefined) return true;
+    return BETWEEN.some(([between]) => {
+      const parts = part.split(between);
+      return parts.length > 1 && parts.every((one) => this.knows(one));
+    });
+  }
+
+  /**
    * Several sentences, or what names a place or a file and then says what is wrong, each part by itself.
    * @param {string} told
    */
   partsOf(told) {
     for (const [between, sign] of BETWEEN) {
       const parts = told.split(between);
-      if (parts.length > 1) return parts.map((part) => this.translate(part)).join(sign);
+      if (parts.length > 1 && parts.every((part) => this.knows(part))) return parts.map((part) => this.translate(part)).join(sign);
     }
     return this.figures(told);
   }
@@ -137,6 +151,9 @@ export class Speech {
  * @param {Places} values
  */
 const filled = (text, values) => text.replace(PLACE, (place, name) => String(values[name] ?? place));
+
+/** @param {string} text */
+const lettersOf = (text) => text.replace(PLACE, "").match(/\p{L}/gu)?.length ?? 0;
 
 /**
  * Texts that say more stand first: one that begins with a place would take the sentence of another.
