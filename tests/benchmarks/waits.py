@@ -43,7 +43,10 @@ LOADING = (
 DRAWING = "the same; pictures and report by another process, which loads matplotlib and reportlab meanwhile, 0.4, and then draws 0.5"
 MILLION = "loading 0.75, numpy reads the text 0.6, judging 1.0, then pictures and report 0.5 beside deviations.csv 0.4"
 MILLIONS = "all but loading goes with the points: numpy reads the text 0.6 a million, judging 1.0, deviations.csv 0.4"
-PICTURES = "100 pictures by matplotlib, 0.15 each, half of it to lay out text: 15 of the 22 that two cores share"
+PICTURES = (
+    "100 pictures by matplotlib, each drawn once and written as PNG and as SVG: six tenths of that to lay out and draw text anew "
+    "in either, a sixth to pack the PNG; without pictures the stack takes 4"
+)
 PASSES = (
     "three to four passes, 20 ns a point; of 100,000 points 1.1 ms on one core, 0.6 of them to draw every 25th, and 4 shared by all cores"
 )
