@@ -79,20 +79,7 @@ def _run(scanner: Callable[[], CounterParty], kind: str = "serial", more: str = 
 
 
 def _inspect(folder: Path, _: ExitStack) -> list[object]:
-    limits = ("--tolerance", -0.05, 0.05, "--fit", "none", "--coverage-min", 0)
-    nominal = _oval(folder)
-    return [
-        "inspect",
-        folder / "points.csv",
-        "--nominal",
-        nominal,
-        *limits,
-        "--json",
-        "--records",
-        folder / "records",
-        "--out",
-        folder / "out",
-    ]
+    return [*_inspected(folder, "records"), "--json", "--out", folder / "out"]
 
 
 def _recorded(*words: object) -> Callable[[Path, ExitStack], list[object]]:
@@ -118,6 +105,31 @@ def _backup(folder: Path, _: ExitStack) -> list[object]:
     return ["backup", folder / "kept.sqlite", "--replace", "--records", folder / "records"]
 
 
+def _restore(folder: Path, _: ExitStack) -> list[object]:
+    """Of a backup that has one run more than the records."""
+    if not (folder / "kept.sqlite").exists():
+        shutil.copytree(folder / "records", folder / "ahead")
+        _quietly(*_inspected(folder, "ahead"))
+        _quietly("backup", folder / "kept.sqlite", "--records", folder / "ahead")
+    return ["restore", folder / "kept.sqlite", "--records", folder / "records"]
+
+
+def _merge(folder: Path, _: ExitStack) -> list[object]:
+    if not (folder / "elsewhere").exists():
+        _quietly(*_inspected(folder, "elsewhere"))
+    return ["merge", folder / "elsewhere", "--records", folder / "records"]
+
+
+def _inspected(folder: Path, records: str) -> list[object]:
+    limits = ("--tolerance", -0.05, 0.05, "--fit", "none", "--coverage-min", 0)
+    return ["inspect", folder / "points.csv", "--nominal", _oval(folder), *limits, "--records", folder / records]
+
+
+def _quietly(*words: object) -> None:
+    ended = cmmlink(*words)
+    assert ended.code == 0, ended
+
+
 UNUSABLE, DEVICE, RECORD = 2, 4, 5
 OF_A_RUN = frozenset({UNUSABLE, 3, DEVICE, RECORD})
 COMMANDS = {
@@ -133,6 +145,8 @@ COMMANDS = {
         Command("show", _recorded("show", "last"), frozenset({UNUSABLE, RECORD})),
         Command("ct", _ct, frozenset({UNUSABLE, RECORD})),
         Command("backup", _backup, frozenset({UNUSABLE, RECORD})),
+        Command("restore", _restore, frozenset({UNUSABLE, RECORD})),
+        Command("merge", _merge, frozenset({UNUSABLE, RECORD})),
     )
 }
 
