@@ -11,7 +11,7 @@ const GERMAN = new Speech({ locale: "de", texts: {
   "{count} points": ["{count} Punkt", "{count} Punkte"],
   "all {points} within tolerance": "alle {points} innerhalb der Toleranz",
   "{points} points lie beyond {lower} mm.": "{points} Punkte liegen jenseits von {lower} mm.",
-  "{points}.": "nie", "at {time}": "um {time}", "the scan of {began}": "der Scan vom {began}",
+  "{points}.": "nie", "at {time}": "um {time}", "upper {limit}": "obere {limit}", "the scan of {began}": "der Scan vom {began}",
 } });
 
 test("what the catalogue lacks is said in English, with its places filled", () => {
@@ -39,6 +39,7 @@ test("a sentence of the station is translated with what stands in it, the text t
   assert.equal(GERMAN.translate("Link lost: the port is gone"), "Verbindung verloren: der Anschluss ist weg");
   assert.equal(GERMAN.translate("the scan of 2026-11-27 08:15:00 +0000"), "der Scan vom 27.11.2026 08:15:00 +0000");
   assert.equal(GERMAN.translate("it changes, at stations 5.5, Link lost"), "it changes, at stations 5,5, Link lost");
+  assert.equal(GERMAN.translate("upper side: Link lost"), "upper side: Verbindung verloren", "the name of a characteristic");
   assert.equal(GERMAN.translate("nobody knows this of 3.25 mm"), "nobody knows this of 3,25 mm");
 });
 

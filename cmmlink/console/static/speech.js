@@ -122,7 +122,9 @@ export class Speech {
   partsOf(told) {
     for (const [between, sign] of BETWEEN) {
       const parts = told.split(between);
-      if (parts.length > 1 && parts.every((part) => this.knows(part))) return parts.map((part) => this.translate(part)).join(sign);
+      if (parts.length < 2 || !parts.every((part) => this.knows(part))) continue;
+      const isName = (/** @type {string} */ part, /** @type {number} */ k) => sign === ": " && k === 0 && !(part in this.texts);
+      return parts.map((part, k) => (isName(part, k) ? part : this.translate(part))).join(sign); // a name stays as it was given
     }
     return this.figures(told);
   }
