@@ -10,7 +10,7 @@ const ISO_DATE = /\b(\d{4})-(\d\d)-(\d\d)\b/g;
 const BETWEEN = [[/(?<=[.!?]) (?=[A-Z\u00c0-\u00de0-9])/, " "], [/; /, "; "], [/: /, ": "], [/, /, ", "]];
 /** A whole number, with commas between its thousands, and decimals; no part of a name, a version or an address. */
 const NUMBER = /(?<![\w.,])(\d{1,3}(?:,\d{3})+|\d+)(?:\.(\d+))?(?!\w|[.,]\w)/g;
-const FEWEST_LETTERS = 5; // of a text that a sentence is looked for by: "at {time}" would find itself in everything
+const FEWEST_LETTERS = 6; // of a text that a sentence is looked for by: "at {time}" would find itself in everything
 const MOST_KEPT = 500; // sentences whose translation is remembered
 
 /** @type {Catalogue} */
@@ -26,7 +26,8 @@ export class Speech {
     this.point = new Intl.NumberFormat(locale).formatToParts(0.5).find(({ type }) => type === "decimal")?.value ?? ".";
     this.whole = new Intl.NumberFormat(locale);
     this.date = new Intl.DateTimeFormat(locale, { year: "numeric", month: "2-digit", day: "2-digit", timeZone: "UTC" });
-    const withPlaces = Object.keys(texts).filter((text) => text.includes("{") && lettersOf(text) >= FEWEST_LETTERS).sort(byFixedLetters);
+    const isTelling = (/** @type {string} */ text) => typeof texts[text] === "object" || lettersOf(text) >= FEWEST_LETTERS;
+    const withPlaces = Object.keys(texts).filter((text) => text.includes("{") && isTelling(text)).sort(byFixedLetters);
     this.patterns = withPlaces.map((text) => ({ text, find: patternOf(text) }));
     /** @type {Map<string, string>} */
     this.kept = new Map();
@@ -122,8 +123,8 @@ export class Speech {
   partsOf(told) {
     for (const [between, sign] of BETWEEN) {
       const parts = told.split(between);
-      if (parts.length < 2 || !parts.every((part) => this.knows(part))) continue;
       const isName = (/** @type {string} */ part, /** @type {number} */ k) => sign === ": " && k === 0 && !(part in this.texts);
+      if (parts.length < 2 || !parts.every((part, k) => isName(part, k) || this.knows(part))) continue;
       return parts.map((part, k) => (isName(part, k) ? part : this.translate(part))).join(sign); // a name stays as it was given
     }
     return this.figures(told);
