@@ -41,8 +41,8 @@ LOADING = (
     "the nominal 0.08, judging 0.05"
 )
 DRAWING = "the same; pictures and report by another process, which loads matplotlib and reportlab meanwhile, 0.4, and then draws 0.5"
-MILLION = "loading 0.75, numpy reads the text 0.6, judging 1.0, then pictures and report 0.5 beside deviations.csv 0.4"
-MILLIONS = "all but loading goes with the points: numpy reads the text 0.6 a million, judging 1.0, deviations.csv 0.4"
+MILLION = "loading 0.8, the nominal 0.13, reading 0.3, judging 0.9, then pictures and report 0.65 beside deviations.csv 0.4"
+MILLIONS = "all but loading goes with the points: reading 0.3 a million, judging 0.9, deviations.csv 0.4"
 PICTURES = (
     "100 pictures by matplotlib, each drawn once and written as PNG and as SVG: six tenths of that to lay out and draw text anew "
     "in either, a sixth to pack the PNG; without pictures the stack takes 4"
@@ -50,7 +50,9 @@ PICTURES = (
 PASSES = (
     "three to four passes, 20 ns a point; of 100,000 points 1.1 ms on one core, 0.6 of them to draw every 25th, and 4 shared by all cores"
 )
-COMPILER = "LLVM's optimiser, in two processes at once; `cmmlink prepare` does it beforehand"
+COMPILER = (
+    "107 compilations, 18 in two processes: numba's types and lowering 5.5, LLVM 8.5, loading 1.8; `cmmlink prepare` does it beforehand"
+)
 
 # Runs a command line in a process that tells at its end how much memory it held at most.
 MEASURED = """

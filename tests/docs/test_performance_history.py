@@ -3,7 +3,9 @@
 from dataclasses import replace
 from pathlib import Path
 
-from tests.benchmarks import history
+import pytest
+
+from tests.benchmarks import bench, history
 
 
 def run(date: str, *figures: history.Figure, processor: str = "a processor") -> history.Run:
@@ -38,6 +40,16 @@ def test_runs_are_compared_on_one_processor_only() -> None:
     first, other, last = run("2026-01-01"), run("2026-01-02", processor="another"), run("2026-01-03")
     assert history.previous(last, [first, other]) == first
     assert history.previous(other, [first]) is None
+
+
+def test_what_got_slower_is_said_of_a_history_of_two_lines(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    kept = [run("2026-01-01", figure(1.0, 0.1), figure(9.0, name="another"))]
+    monkeypatch.setattr(history, "runs", lambda: kept)
+    assert bench.say_what_got_slower() == 0
+    kept.append(run("2026-01-02", figure(1.5, 0.1), figure(9.0, name="another")))
+    capsys.readouterr()
+    assert bench.say_what_got_slower() == 1
+    assert capsys.readouterr().out == "a command: 1.5 s, 1 on 2026-01-01 (scatter 0.2)\n"
 
 
 def test_the_page_gets_the_table_between_its_marks_and_keeps_the_rest(tmp_path: Path) -> None:
