@@ -7,7 +7,6 @@ from cmmlink.devices import connect
 from cmmlink.errors import PlanError
 from cmmlink.from_plan import Problems, find_problems, notes_on_nominal, notes_on_temperature
 from cmmlink.plan import CtPlan, Plan, PlanMistake, find_mistakes, kind_of, load_ct_plan, load_plan
-from cmmlink.stack_check import check_stack
 from drivers import read_text
 from inspection import NominalProfile
 
@@ -48,9 +47,11 @@ def mistakes_of(plan_file: Path) -> tuple[PlanMistake, ...]:
     mistakes = find_mistakes(plan_file)
     if mistakes:
         return mistakes
-    of_surface = kind_of(read_text(plan_file)) is CtPlan
-    found = check_stack(load_ct_plan(plan_file), plan_file) if of_surface else check_scan(load_plan(plan_file), plan_file)
-    return as_mistakes(plan_file, found.problems)
+    if kind_of(read_text(plan_file)) is CtPlan:
+        from cmmlink.stack_check import check_stack  # noqa: PLC0415 - it loads what cuts surfaces, and the check of a scan needs none of it
+
+        return as_mistakes(plan_file, check_stack(load_ct_plan(plan_file), plan_file).problems)
+    return as_mistakes(plan_file, check_scan(load_plan(plan_file), plan_file).problems)
 
 
 def as_mistakes(plan_file: Path, problems: tuple[PlanError, ...]) -> tuple[PlanMistake, ...]:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cmmlink.demo.example import write_example
 from cmmlink.other_processes import processes_here
 from cmmlink.record.store import FILE_NAME
 from tests.cmmlink.commands.oval_files import TOLERANCE
@@ -15,10 +16,10 @@ from tests.cmmlink.recorded import Script, record, scan_arrivals
 
 ROOT = Path(__file__).resolve().parents[3]
 DEVICES, PAGE, PICTURES = {"pymodbus", "serial"}, {"starlette", "uvicorn", "websockets", "ssl", "asyncio"}, {"matplotlib", "reportlab"}
-CAD, BOOKS = {"ezdxf", "OCP"}, {"xlsxwriter"}
+CAD, BOOKS, SURFACES = {"ezdxf", "OCP"}, {"xlsxwriter"}, {"drivers.surface"}
 MATHS, PLANS, SPEECH = {"numpy", "scipy", "numba", "llvmlite"}, {"yaml", "cmmlink.plan.scan"}, {"rich"}
 SCIPY = {f"scipy.{part}" for part in ("interpolate", "linalg", "optimize", "sparse", "spatial", "special")}  # a third of a second together
-HEAVY = SCIPY | DEVICES | PAGE | PICTURES | MATHS | PLANS | SPEECH | CAD | BOOKS | {"simulators", "sqlite3"}
+HEAVY = SCIPY | DEVICES | PAGE | PICTURES | MATHS | PLANS | SPEECH | CAD | BOOKS | SURFACES | {"simulators", "sqlite3"}
 
 IN_ONE_PROCESS = """
 import contextlib, io, json, sys
@@ -79,3 +80,15 @@ def test_a_workbook_alone_loads_what_writes_workbooks(tmp_path: Path) -> None:
     assert (others[0], code) == (0, 0)
     watched = BOOKS | PICTURES | PAGE | DEVICES | CAD | {"simulators"}
     assert (others[2] & watched, book & watched) == (set(), BOOKS)
+
+
+def test_a_plan_of_a_file_or_a_serial_device_is_checked_without_surfaces_page_and_scipy(nominal: Path, tmp_path: Path) -> None:
+    write_example(tmp_path)
+    for plan in ("file-plan.yaml", "plan.yaml"):
+        text = (tmp_path / plan).read_text(encoding="utf-8")
+        assert "file: blade.dat" in text  # whose points scipy joins to a curve; an exact curve needs nothing of it
+        (tmp_path / plan).write_text(text.replace("file: blade.dat", f"file: {nominal.name}"), encoding="utf-8")
+    checked = loaded_by(*(("check", tmp_path / plan) for plan in ("file-plan.yaml", "plan.yaml")))
+    assert [(code, said) for code, said, _ in checked] == [(0, "")] * 2
+    unneeded = SCIPY | SURFACES | {"pymodbus"} | PAGE | PICTURES | CAD | BOOKS | {"simulators"}
+    assert [loaded & unneeded for _, _, loaded in checked] == [set()] * 2
