@@ -34,8 +34,8 @@ def tuple_of(*parts: types.Type) -> types.Type:
 
 _WIDEST = '"prefer-vector-width"="512"'
 
-REAL, INTEGER, SHORT, CODE, MARK = types.float64, types.int64, types.int32, types.int8, types.uint8
-REAL_ARRAY, INTEGER_ARRAY = REAL[::1], INTEGER[::1]  # that is written to
+REAL, INTEGER, SHORT, CODE, MARK, TRUTH = types.float64, types.int64, types.int32, types.int8, types.uint8, types.boolean
+REAL_ARRAY, INTEGER_ARRAY, MARK_ARRAY = REAL[::1], INTEGER[::1], MARK[::1]  # that is written to
 REAL_TABLE, INTEGER_TABLE, SHORT_TABLE = (types.Array(of, 1, "C", readonly=True) for of in (REAL, INTEGER, SHORT))
 
 

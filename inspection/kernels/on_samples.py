@@ -110,6 +110,7 @@ class SampleTables(Protocol):
 _TABLES = tuple_of(REAL_TABLE, INTEGER_TABLE, REAL_TABLE, INTEGER_TABLE, REAL_TABLE, REAL_TABLE, SHORT_TABLE, INTEGER)
 _ON_SAMPLES = (REAL_ARRAY, _TABLES, FEET, INTEGER_ARRAY)  # the types that `project_points_on_samples` takes
 _call_on_samples = call_of(*_ON_SAMPLES)
+BY_PROJECTION = tuple_of(_TABLES, tuple_of(INTEGER, INTEGER, INTEGER))  # the type of what `projection_of` gives
 # What stands in for the samples where a method needs none: of the same types, so that one compiled fit serves all methods.
 _NO_REALS, _NO_INTEGERS, _NO_SHORTS = np.empty(0), np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int32)
 for _empty in (_NO_REALS, _NO_INTEGERS, _NO_SHORTS):

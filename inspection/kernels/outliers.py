@@ -10,7 +10,7 @@ from inspection.kernels.feet import feet_between
 from inspection.kernels.layout import BLOCK, OPEN_END, SUMS
 from inspection.kernels.normal_equations import newton_step
 from inspection.kernels.on_samples import project_by
-from inspection.kernels.pose_sums import evaluate, move_pose, place_points, span_of
+from inspection.kernels.pose_sums import call_evaluation, move_pose, place_points, span_of
 
 Array = NDArray[np.float64]
 
@@ -71,11 +71,15 @@ def median_near(values: Array, guess: float) -> float:
 
 
 @kernel
-def mark_outliers(problem: Any, projection: Any, memory: Any, state: Any, wanted: Any, most_steps: int, found: Any, off: Any) -> bool:
+def mark_outliers(
+    problem: Any, projection: Any, evaluation: int, memory: Any, state: Any, wanted: Any, most_steps: int, found: Any, off: Any
+) -> bool:
     """Make weighted steps, the weights following from the deviations at every pose, and mark the points beyond the limit.
 
     It ends where no step to come can change which points these are. Moves the state (4,), a pose and the limit, and returns whether it
     ended before the steps did.
+
+    evaluation : `evaluation_code()`
     """
     weights = problem[2]
     takes_part, weighed, moved, feet = memory
@@ -87,7 +91,8 @@ def mark_outliers(problem: Any, projection: Any, memory: Any, state: Any, wanted
         if count > 0:
             limit = max(wanted.mads * _median(off, takes_part), wanted.least_mm, _LEAST_LIMIT_MM)
         weight, root = _weigh(off, takes_part, limit, weights, found)
-        evaluate(problem, projection, pose, span, moved, takes_part, weighed, feet, _KNOWN, sums)
+        which = (takes_part, weighed)
+        call_evaluation(evaluation, (problem, projection, pose, span, moved, *which, feet, _KNOWN, _FIRST_ROW, np.inf, off[:0], sums))
         step, share = newton_step(sums, span[2]), share_of_tukey(weight, root)
         pose = move_pose(pose, span, step, share)
         state[0], state[1], state[2] = pose

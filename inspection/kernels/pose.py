@@ -13,7 +13,7 @@ from inspection.kernels.layout import AT_ONCE, COUNT, SLOPE_TURN, SLOPE_X, SLOPE
 from inspection.kernels.normal_equations import fill_covariance, newton_step
 from inspection.kernels.on_samples import NO_PROJECTION, SampleTables, projection_of
 from inspection.kernels.outliers import MANY, TO_COME, OutlierFit, OutlierLimit, limit_of, mark_outliers, median_near, share_of_tukey
-from inspection.kernels.pose_sums import add_up, centre_of, evaluate, move_pose, span_of
+from inspection.kernels.pose_sums import add_up, call_evaluation, centre_of, evaluation_code, move_pose, span_of
 
 Array = NDArray[np.float64]
 Pose = tuple[float, float, float]  # rotation about the origin in rad, then shift in mm (x, y)
@@ -32,6 +32,7 @@ _WEIGHED_PASSES = 12
 # Not literals: to the compiler each of those has a type of its own, and what it is given to is compiled once more.
 _KNOWN: Any = np.bool_(True)
 _NOT_KNOWN: Any = np.bool_(False)
+_FIRST_ROW: Any = np.int64(0)
 
 
 class PoseEstimate(NamedTuple):
@@ -103,7 +104,7 @@ class PoseFit:
     def settle(self, pose: Pose, most_steps: int) -> PoseEstimate:
         """Go from a pose to the least mean square of the deviations, by at most so many steps."""
         state, covariance = np.array([*pose, 0.0, 0.0, 0.0]), np.empty((3, 3))
-        steps, settled = _settle_pose(self._problem, self._projection, self._memory, state, covariance, most_steps)
+        steps, settled = _settle_pose(self._problem, self._projection, evaluation_code(), self._memory, state, covariance, most_steps)
         return _estimate(state, covariance, steps, settled)
 
     def settle_nearby(self, pose: Pose) -> PoseEstimate | None:
@@ -134,7 +135,7 @@ class PoseFit:
         m = len(self.weights)
         found, off, state = self._room((m,), np.bool_), self._room((m,), np.float64), np.array([*pose, np.inf])
         found[:] = False
-        settled = mark_outliers(self._problem, self._projection, self._memory, state, limit, most_steps, found, off)
+        settled = mark_outliers(self._problem, self._projection, evaluation_code(), self._memory, state, limit, most_steps, found, off)
         return OutlierFit(found, tuple(state[:3].tolist()), float(state[3]), settled)
 
     def find_outliers_nearby(self, near: OutlierFit, limit: OutlierLimit) -> OutlierFit | None:
@@ -157,7 +158,7 @@ class PoseFit:
     def _pass(self, pose: Pose, before: Marks, here: Marks, limit_mm: float = 0.0, off: Array = _NO_WEIGHING) -> Array:
         """The sums over the points at a pose, chunk by chunk; `before` and `here` say who took part there and at the pose before."""
         sums = np.empty((len(self._first_rows), SUMS))
-        asked = (self._problem, self._projection, pose, self._span, (before, here), self._first_rows, (limit_mm, off))
+        asked = (self._problem, self._projection, evaluation_code(), pose, self._span, (before, here), self._first_rows, (limit_mm, off))
         share_out(lambda claimed: add_up(*asked, claimed, sums), len(self.weights), None)
         return np.asarray(np.add.reduce(sums, axis=0))
 
@@ -188,13 +189,24 @@ def compile_fit(outliers: bool = False) -> None:
     none, integers = np.empty(0), np.frombuffer(bytes(4), dtype=np.int32)
     problem = (none, NONE_LEFT_OUT, none, NO_PROJECTION[0][0], integers, 1.0, 0.0)
     memory, chunks = (NONE_LEFT_OUT, NONE_LEFT_OUT, none, empty_feet(1)), np.empty(0, dtype=np.int64)
-    _settle_pose(problem, NO_PROJECTION, memory, np.zeros(6), np.empty((3, 3)), 0)
+    _settle_pose(problem, NO_PROJECTION, evaluation_code(), memory, np.zeros(6), np.empty((3, 3)), 0)
     marks, tukey, span = (NONE_LEFT_OUT, NONE_LEFT_OUT), (0.0, _NO_WEIGHING), (0.0, 0.0, 1.0)
-    add_up(problem, NO_PROJECTION, (0.0, 0.0, 0.0), span, marks, chunks, tukey, np.zeros(1, dtype=np.int64), np.empty((0, SUMS)))
+    add_up(
+        problem,
+        NO_PROJECTION,
+        evaluation_code(),
+        (0.0, 0.0, 0.0),
+        span,
+        marks,
+        chunks,
+        tukey,
+        np.zeros(1, dtype=np.int64),
+        np.empty((0, SUMS)),
+    )
     _next_pose((0.0, 0.0, 0.0), span, np.zeros(SUMS), 1.0)
     if outliers:
         limit, found = OutlierLimit(1.0, 0.0, 0.0), np.empty(0, dtype=np.bool_)
-        mark_outliers(problem, NO_PROJECTION, memory, np.zeros(4), limit, 0, found, none)
+        mark_outliers(problem, NO_PROJECTION, evaluation_code(), memory, np.zeros(4), limit, 0, found, none)
 
 
 @kernel
@@ -206,12 +218,15 @@ def _next_pose(pose: Any, span: Any, sums: Any, share: float) -> tuple[Pose, flo
 
 
 @kernel
-def _settle_pose(problem: Any, projection: Any, memory: Any, state: Any, covariance: Any, most_steps: int) -> tuple[int, bool]:
+def _settle_pose(
+    problem: Any, projection: Any, evaluation: int, memory: Any, state: Any, covariance: Any, most_steps: int
+) -> tuple[int, bool]:
     """Make Newton steps, each halved until the mean square falls. Returns their number and whether the pose has settled."""
     weights = problem[2]
     takes_part, new_part, moved, feet = memory
     span, pose, here, trial = span_of(problem[0], problem[1], len(weights)), (state[0], state[1], state[2]), np.empty(SUMS), np.empty(SUMS)
-    evaluate(problem, projection, pose, span, moved, new_part, takes_part, feet, _NOT_KNOWN, here)
+    all_weights = (_FIRST_ROW, np.inf, weights[:0])
+    call_evaluation(evaluation, (problem, projection, pose, span, moved, new_part, takes_part, feet, _NOT_KNOWN, *all_weights, here))
     steps, settled, lower = 0, False, True
     while lower and not settled and steps < most_steps:
         steps += 1
@@ -222,14 +237,18 @@ def _settle_pose(problem: Any, projection: Any, memory: Any, state: Any, covaria
             settled = share * step[3] <= _STANDSTILL_MM and here[COUNT] > 0.0
             if settled:
                 break
-            evaluate(problem, projection, next_pose, span, moved, takes_part, new_part, feet, _NOT_KNOWN, trial)
+            call_evaluation(
+                evaluation, (problem, projection, next_pose, span, moved, takes_part, new_part, feet, _NOT_KNOWN, *all_weights, trial)
+            )
             lower = trial[SQUARE_BEFORE] <= here[SQUARE] * (1.0 + 1e-12)
             if lower:
                 break
             share *= 0.5
         if lower and steps >= _HOVERING_STEPS and share * step[3] < _HOVERING_MM and trial[COUNT] != here[COUNT]:
             _leave_out_hovering(weights, takes_part, new_part)
-            evaluate(problem, projection, next_pose, span, moved, takes_part, new_part, feet, _KNOWN, trial)
+            call_evaluation(
+                evaluation, (problem, projection, next_pose, span, moved, takes_part, new_part, feet, _KNOWN, *all_weights, trial)
+            )
         if lower:
             here, trial = trial, here
             takes_part, new_part = new_part, takes_part

@@ -12,7 +12,7 @@ import pytest
 
 from inspection.kernels import OutlierLimit, PoseFit, pose, side_by_side
 from inspection.kernels.outliers import mark_outliers
-from inspection.kernels.pose_sums import add_up
+from inspection.kernels.pose_sums import _evaluate_optimised_again, add_up
 from inspection.kernels.side_by_side import fit_compiled_beside, is_fit_compiled
 from tests.inspection import profiles
 
@@ -93,3 +93,5 @@ def test_nothing_is_left_to_compile_for_a_fit_once_it_was_compiled_without_a_poi
     fit.find_outliers_nearby(fit.find_outliers((0.0, 0.0, 0.0), limit, 5), limit)
     assert [len(kernel.signatures) for kernel in kernels] == compiled
     assert all(compiled)
+    shared: Any = _evaluate_optimised_again
+    assert len(shared.signatures) == 1, "what takes longest is compiled once for all that call it"
