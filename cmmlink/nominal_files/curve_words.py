@@ -20,9 +20,10 @@ def notes_of(check: CurveCheck) -> list[str]:
     """Notes of the changes of curvature and of the tightest hollow; none for a curve that is convex throughout."""
     changes = [f"{station:.6g}" for station in check.sign_changes_mm]
     notes = []
-    if changes:
-        times, stations = ("once", "station") if len(changes) == 1 else (f"{len(changes)} times", "stations")
-        notes.append(f"the curvature changes its sign {times}, at {stations} (mm) {_listed(changes)}")
+    if len(changes) == 1:
+        notes.append(f"the curvature changes its sign once, at station (mm) {changes[0]}")
+    elif changes:
+        notes.append(f"the curvature changes its sign {len(changes)} times, at stations (mm) {_listed(changes)}")
     if check.hollow:
         hollow = check.hollow
         place = f"station {hollow.station_mm:.6g} mm, ({hollow.x_mm:.6g}, {hollow.y_mm:.6g})"
