@@ -68,7 +68,7 @@ def measured_station(folder: Path) -> Iterator[tuple[Station, ConsoleServer, Dev
         points = batches(measured(profile, 2000, seed=seed, defect_mm=defect_mm, at_mm=60.0), 100)
         device.source.put(opened(2000), *points, *([Damaged(17, "checksum")] if defect_mm > 0.1 else []), CLOSED)
         station.start()
-        assert station.wait(30.0)
+        assert station.wait(120.0)  # the first one compiles the inspection where that was not done yet
     station.import_ct("ct.yaml")
     assert station.wait(30.0)
     station.choose("vane.yaml")
