@@ -70,7 +70,7 @@ def test_a_mistake_in_the_command_is_told_in_json_where_that_was_asked_for(words
 
 
 def test_what_the_system_refuses_is_told_in_json(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(*_: object) -> None:
+    def refuse(*_: object, **__: object) -> None:
         raise PermissionError(13, "Permission denied", "/records")
 
     monkeypatch.setattr("cmmlink.record.list_runs", refuse)
@@ -80,7 +80,8 @@ def test_what_the_system_refuses_is_told_in_json(monkeypatch: pytest.MonkeyPatch
 
 
 @pytest.mark.parametrize(
-    ("typed", "offered"), [("cmmlink re", ["report", "replay", "restore"]), ("cmmlink replay la", ["last"]), ("cmmlink replay x", [])]
+    ("typed", "offered"),
+    [("cmmlink re", ["registers", "report", "replay", "restore"]), ("cmmlink replay la", ["last"]), ("cmmlink replay x", [])],
 )
 def test_a_shell_is_offered_commands_and_runs(typed: str, offered: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in (("_CMMLINK_COMPLETE", "complete_bash"), ("COMP_WORDS", typed), ("COMP_CWORD", str(typed.count(" ")))):
