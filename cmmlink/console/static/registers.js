@@ -90,6 +90,7 @@ export class RegistersView {
     top.append(headLine);
     body.append(...lines);
     const table = document.createElement("table");
+    table.setAttribute("role", "grid");
     table.append(top, body);
     this.table.replaceChildren(table);
     byId("no-registers").hidden = rows.length > 0;

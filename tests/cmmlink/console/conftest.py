@@ -21,6 +21,7 @@ from inspection import NominalProfile, rehearse
 from .played import Device, setup_of, write_plan
 
 TOKEN = "token-of-this-test"
+AXE = Path(__file__).parents[2] / "page" / "node_modules" / "axe-core" / "axe.min.js"
 FLAGS = [
     "--headless",
     "--no-sandbox",
@@ -127,6 +128,14 @@ def make_bench(browser: Browser, tmp_path: Path) -> Iterator[MakeBench]:
 def bench(make_bench: MakeBench) -> Bench:
     """A station with one plan and no records."""
     return make_bench()
+
+
+@pytest.fixture
+def axe(request: pytest.FixtureRequest) -> None:
+    """The test needs axe-core."""
+    if not AXE.exists():
+        assert not request.config.getoption("--require-browser"), "tests/page/check installs axe-core"
+        pytest.skip("axe-core is not installed; tests/page/check installs it")
 
 
 @pytest.fixture

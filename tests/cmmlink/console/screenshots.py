@@ -28,16 +28,18 @@ from drivers.source import Damaged
 from inspection import RigidTransform, synthetic
 from tests.drivers.surface.meshes import binary_stl, tube, write
 from tests.inspection.profiles import AIRFOILS
+from tests.integration.simulated import simulated
 
 from . import test_browser_characteristics as characteristics
 from .conftest import FLAGS, TOKEN
 from .played import CLOSED, Device, batches, measured, opened, setup_of, write_plan
+from .seen import fill_new_plan, look_at_registers
 from .test_browser_records import CT_PLAN
 
 SIZES = ((1920, 1080), (1366, 768), (800, 600), (360, 740))
 LANGUAGES = ("en-GB", "de-DE")
 THEMES = ("light", "dark")
-VIEWS = ("part", "live", "history", "ct", "wall")
+VIEWS = ("part", "live", "history", "ct", "new-plan", "registers", "wall")
 
 
 @contextmanager
@@ -55,6 +57,7 @@ def measured_station(folder: Path) -> Iterator[tuple[Station, ConsoleServer, Dev
     records = PastRuns(folder / "records", lambda _: None, time.monotonic, lambda: datetime.now().astimezone())
     setup = replace(
         setup_of(files, device.connect, records),
+        folder=folder,
         ct_plans=lambda: {"ct.yaml": surface},
         inspect_surface=lambda file, stop, on_start, on_section: inspect_surface(folder / "records", file, stop, on_start, on_section),
     )
@@ -92,11 +95,23 @@ def pages(browser: Browser, server: ConsoleServer, languages: Sequence[str], the
             context.close()
 
 
-def show(page: Page, view: str) -> None:
-    """Bring a view of the page in front."""
+def show(page: Page, station: Station, view: str, modbus: str) -> None:
+    """Bring a view of the page in front; the registers are those of the device at this address."""
+    if station.running:  # the registers of the page before are read still
+        station.abort()
+        assert station.wait(10.0)
+    page.keyboard.press("Escape")  # closes a dialog
     if view == "wall":
         page.keyboard.press("1")
         page.goto(re.sub(r"[?#].*$", "", page.url) + "?wall")
+    elif view == "new-plan":
+        page.keyboard.press("2")
+        page.locator("#open-new-plan").click()
+        fill_new_plan(page)
+    elif view == "registers":
+        page.keyboard.press("2")
+        page.locator("#new-device").click()
+        look_at_registers(page, modbus)
     else:
         page.keyboard.press(str(("live", "part", "history", "ct").index(view) + 1))
 
@@ -104,14 +119,19 @@ def show(page: Page, view: str) -> None:
 def main(folder: Path, only: str = "") -> None:
     """Take every picture whose name holds a word."""
     folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory() as place, measured_station(Path(place)) as (_, server, _), sync_playwright() as playwright:
+    with (
+        tempfile.TemporaryDirectory() as place,
+        measured_station(Path(place)) as (station, server, _),
+        simulated("modbus-ring", "127.0.0.1:0", Path(place), count=10_000_000) as modbus,
+        sync_playwright() as playwright,
+    ):
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)
         for who, page in pages(browser, server, LANGUAGES, THEMES):
             for view in VIEWS:
                 wanted = [(width, height) for width, height in SIZES if only in f"{view}-{who}-{width}x{height}"]
                 if not wanted:
                     continue
-                show(page, view)
+                show(page, station, view, modbus.address)
                 for width, height in wanted:
                     page.set_viewport_size({"width": width, "height": height})
                     page.wait_for_timeout(300)  # until the drawings have taken their new size

@@ -2,11 +2,14 @@
 
 import re
 
-from playwright.sync_api import Page
+from playwright.sync_api import Page, expect
 
 from inspection import InspectionResult
 
-from .conftest import Bench
+from .conftest import AXE, Bench
+from .played import SECTION
+
+RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa"]
 
 
 def number(page: Page, name: str) -> int:
@@ -47,6 +50,21 @@ def focus(page: Page, name: str) -> None:
     raise AssertionError(f"{name} cannot be reached by the tab key")
 
 
+def hindrances(page: Page, view: str) -> dict[str, object]:
+    """What axe-core finds on the page as it stands, in either theme, by the rules of WCAG 2.2 at level AA; axe-core must be installed."""
+    if not page.evaluate("'axe' in window"):
+        page.evaluate(AXE.read_text(encoding="utf-8"))
+    found: dict[str, object] = {}
+    for theme in ("light", "dark"):
+        page.emulate_media(color_scheme="dark" if theme == "dark" else "light")
+        result = page.evaluate("rules => axe.run(document, { runOnly: rules, resultTypes: ['violations'] })", RULES)
+        found |= {
+            f"{theme} {view} {one['id']}": [(node["html"][:150], [check["message"] for check in node["any"]]) for node in one["nodes"][:4]]
+            for one in result["violations"]
+        }
+    return found
+
+
 def overflowing(page: Page) -> list[str]:
     """Elements of the result whose text does not fit into their box; the list of reasons and notes scrolls."""
     found: list[str] = page.evaluate(
@@ -56,3 +74,26 @@ def overflowing(page: Page) -> list[str]:
            .map(e => e.className + ' ' + e.id)"""
     )
     return found
+
+
+def fill_new_plan(page: Page) -> None:
+    """Hand a nominal and two wrong answers in to the dialog of a new plan, which stands open."""
+    page.locator("#nominal-file").set_input_files(
+        {"name": "section.yaml", "mimeType": "application/octet-stream", "buffer": SECTION.encode()}
+    )
+    expect(page.locator("#nominal-picture .arrow")).to_have_count(3)
+    page.locator("#nominal-read summary").click()
+    page.locator("#plan-tolerance").fill("tight")
+    page.locator("#plan-results").fill("../../elsewhere")
+    page.locator("#save-plan").click()
+    expect(page.locator("#mistake-tolerance")).not_to_be_empty()
+
+
+def look_at_registers(page: Page, address: str) -> None:
+    """Read twelve registers of a device and choose two of their numbers as x and y."""
+    for name, words in (("address", address), ("first", "100"), ("count", "12")):
+        page.locator(f"#look-{name}").fill(words)
+    page.locator("#look-button").click()
+    expect(page.locator("#register-table .changed").first).to_be_visible()
+    for register in (103, 105):
+        page.locator(f"#register-table tbody tr:nth-child({register - 99}) td:nth-child(8)").click()

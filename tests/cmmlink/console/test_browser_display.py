@@ -10,19 +10,18 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from cmmlink.console.past_runs import PastRuns
+from tests.integration.simulated import simulated
 
 from .conftest import Bench, MakeBench
 from .played import CLOSED, batches, measured, opened
-from .seen import drawn
+from .seen import drawn, fill_new_plan, hindrances, look_at_registers
 
-AXE = Path(__file__).parents[2] / "page" / "node_modules" / "axe-core" / "axe.min.js"
-RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa"]
 VIEWS = ("part", "live", "history", "ct")
 
 # Buttons, links and entries that stand on the page and that nobody can get at, also not by scrolling.
-OUT_OF_REACH = """() => {
+OUT_OF_REACH = """within => {
     const found = [];
-    for (const one of document.querySelectorAll('button, a, input, select, summary, [tabindex="0"]')) {
+    for (const one of document.querySelectorAll(`${within}:is(button, a, input, select, summary, [tabindex="0"])`)) {
         if (!one.checkVisibility()) continue;
         one.scrollIntoView({ block: 'center', inline: 'nearest' });
         const box = one.getBoundingClientRect(), x = box.left + box.width / 2, y = box.top + Math.min(box.height / 2, 8);
@@ -50,31 +49,40 @@ def measured_page(bench: Bench, **context: Any) -> Page:
     return page
 
 
-def test_no_view_hinders_anybody_in_either_theme(make_bench: MakeBench, tmp_path: Path, request: pytest.FixtureRequest) -> None:
+@pytest.mark.usefixtures("axe")
+def test_no_view_hinders_anybody_in_either_theme(make_bench: MakeBench, tmp_path: Path) -> None:
     """What axe-core finds by the rules of WCAG 2.2 at level AA: nothing."""
-    if not AXE.exists():
-        assert not request.config.getoption("--require-browser"), "tests/page/check installs axe-core"
-        pytest.skip("axe-core is not installed; tests/page/check installs it")
     records = PastRuns(tmp_path / "records", lambda _: None, monotonic, lambda: datetime.now().astimezone())
     bench = make_bench(records, surfaces={"ct.yaml": tmp_path / "ct.yaml"}, inspect=lambda *_: ("", ()))
     page = measured_page(bench, locale="de-DE", viewport={"width": 1280, "height": 800})
-    page.evaluate(AXE.read_text(encoding="utf-8"))
     page.keyboard.press("l")
-    found: dict[str, object] = {}
-    for theme in ("light", "dark"):
-        page.emulate_media(color_scheme="dark" if theme == "dark" else "light")
-        for view in (*VIEWS, "display", "wall"):
-            page.evaluate(
-                "view => view === 'display' ? document.querySelector('#display').open = true : document.body.dataset.view = view", view
-            )
-            result = page.evaluate("rules => axe.run(document, { runOnly: rules, resultTypes: ['violations'] })", RULES)
-            found |= {
-                f"{theme} {view} {one['id']}": [
-                    (node["html"][:150], [check["message"] for check in node["any"]]) for node in one["nodes"][:4]
-                ]
-                for one in result["violations"]
-            }
-    assert found == {}
+    for view in (*VIEWS, "display", "wall"):
+        page.evaluate(
+            "view => view === 'display' ? document.querySelector('#display').open = true : document.body.dataset.view = view", view
+        )
+        assert hindrances(page, view) == {}
+
+
+@pytest.mark.usefixtures("axe")
+def test_neither_a_new_plan_nor_a_new_device_hinders_anybody(make_bench: MakeBench, tmp_path: Path) -> None:
+    """With mistakes and a nominal in the one and registers that change in the other, in the longer language."""
+    bench = make_bench(folder=tmp_path)
+    page = bench.browser.new_context(locale="de-DE", viewport={"width": 800, "height": 600}).new_page()
+    page.goto(bench.server.new_address())
+    page.locator("#open-new-plan").click()
+    assert hindrances(page, "new plan") == {}
+    fill_new_plan(page)
+    assert hindrances(page, "new plan with mistakes") == {}
+    assert page.evaluate(OUT_OF_REACH, "#new-plan ") == []
+    page.keyboard.press("Escape")
+    expect(page.locator("#open-new-plan")).to_be_focused()
+    with simulated("modbus-ring", "127.0.0.1:0", tmp_path, count=100_000) as device:
+        page.locator("#new-device").click()
+        assert hindrances(page, "new device") == {}
+        look_at_registers(page, device.address)
+        assert hindrances(page, "registers") == {}
+        assert page.evaluate(OUT_OF_REACH, "") == []
+        assert page.evaluate("document.documentElement.scrollWidth") <= 800
 
 
 @pytest.mark.parametrize(("width", "height"), [(800, 600), (360, 740), (911, 512), (533, 400)], ids=["panel", "phone", "150", "panel 150"])
@@ -84,7 +92,7 @@ def test_no_control_is_out_of_reach(make_bench: MakeBench, tmp_path: Path, width
     page = measured_page(bench, locale="de-DE", viewport={"width": width, "height": height})
     for view in VIEWS:
         page.evaluate("view => document.querySelector(`[data-go=${view}]`).click()", view)
-        assert page.evaluate(OUT_OF_REACH) == [], view
+        assert page.evaluate(OUT_OF_REACH, "") == [], view
         assert page.evaluate("document.documentElement.scrollWidth") <= width, view
 
 
