@@ -84,8 +84,10 @@ def first_alteration(records: Iterable[Record], number: int, previous: bytes) ->
 
 
 def is_damaged(record: Record) -> bool:
-    """True when a body does not match its CRC. Quick, but no protection against intent."""
-    return not isinstance(record.body, bytes) or record.crc32 != crc32(record.body)  # tampering may have left text
+    """True when a body does not match its CRC, or a hash is none. Quick, but no protection against intent."""
+    if not (isinstance(record.body, bytes) and isinstance(record.sha256, bytes)):  # tampering may have left text
+        return True
+    return record.crc32 != crc32(record.body)
 
 
 def _problem(record: Record, previous: bytes) -> str:
