@@ -64,7 +64,7 @@ class CtImport:
         except StoreError as error:
             self.end(f"Record not kept: {error}", failed=True)
             raise_alarm("Record not kept", str(error))
-        except Exception as error:
+        except Exception as error:  # in a thread of its own nobody else would hear of a defect
             self.end(f"defect in the program ({type(error).__name__}): {error}", failed=True)
             raise_alarm("Defect in the program", repr(error))
 

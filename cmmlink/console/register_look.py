@@ -62,7 +62,7 @@ class RegisterLook:
                     break
         except DeviceError as error:
             self.state = replace(self.state, state="failed", message=without_folders(str(error)))
-        except Exception as error:
+        except Exception as error:  # in a thread of its own nobody else would hear of a defect
             self.state = replace(self.state, state="failed", message=f"defect in the program: {error!r}")
         else:
             self.state = replace(self.state, state="over", message=ending)

@@ -18,10 +18,10 @@ shows. How numbers run on from one toolpath to the next no description at hand s
 import re
 from collections.abc import Mapping
 
-from drivers.codecs.text_lines import FEATURES, NUMBER, TextLines, is_feature_print, number_of, unit_in_mm
-from drivers.codecs.touches import MODULUS, Touches
+from drivers.codecs.text_lines import FEATURES, NUMBER, is_feature_print, number_of, unit_in_mm
+from drivers.codecs.touches import MODULUS, TouchLines
 from drivers.errors import ProtocolError
-from drivers.source import Arrival, ScanOpened
+from drivers.source import ScanOpened
 
 MOST_WAITING = 1024  # nominal points that wait for their measured one; of more the oldest counts as not touched
 NO_CONTACT = "nominal point without a measured one: the probe touched nothing"
@@ -36,7 +36,7 @@ _NAMES = ("RESULTSFILE", "DOCUMENTID")
 _OF_NOMINALS = frozenset("IJKOUL")
 
 
-class G800Decoder:
+class G800Decoder(TouchLines):
     """Lines of the language to points in millimetres; one set is one scan."""
 
     def __init__(
@@ -52,30 +52,10 @@ class G800Decoder:
         self._mm_per_unit = unit_in_mm(unit)
         self._radius_mm, self._tolerance_mm = tip_radius_mm, radius_tolerance_mm
         self._wanted = set_name
-        self._touches = Touches(self._mm_per_unit)
-        self._lines = TextLines(self._damage, parity)
+        super().__init__(self._mm_per_unit, parity)
         self._names = dict[str, str]()
         self._names_are_old = False  # those of a set that has points
         self._begin()
-
-    def request(self) -> bytes:
-        """Controls are asked nothing."""
-        return b""
-
-    def feed(self, data: bytes) -> list[Arrival]:
-        """Decode the next bytes, up to the end of the set."""
-        if not self._touches.out.closed:
-            for line, size in self._lines.feed(data):
-                self._take_line(line, size)
-                if self._touches.out.closed:
-                    break
-        return self._touches.out.hand_over()
-
-    def break_off(self) -> list[Arrival]:
-        """Count the begun line, if any, as damaged."""
-        self._lines.break_off()
-        self._touches.break_off()
-        return self._touches.out.hand_over()
 
     def _begin(self) -> None:
         """Forget what was said of the set before."""

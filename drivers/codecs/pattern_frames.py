@@ -6,10 +6,10 @@ has no group for are 0. A machine that prints no numbers cannot show that a line
 
 import re
 
-from drivers.codecs.text_lines import FEATURES, TextLines, is_feature_print, number_of, unit_in_mm
-from drivers.codecs.touches import Touches
+from drivers.codecs.text_lines import FEATURES, is_feature_print, number_of, unit_in_mm
+from drivers.codecs.touches import TouchLines
 from drivers.errors import ProtocolError
-from drivers.source import Arrival, ScanOpened
+from drivers.source import ScanOpened
 
 LONGEST_PATTERN = 500
 _AXES = ("x", "y", "z")
@@ -36,7 +36,7 @@ def point_pattern(pattern: str) -> re.Pattern[str]:
     return found
 
 
-class PatternDecoder:
+class PatternDecoder(TouchLines):
     """Lines that a pattern describes to points in millimetres."""
 
     def __init__(
@@ -59,28 +59,8 @@ class PatternDecoder:
         self._end = None if end is None else compiled(end)
         self._pass_over = None if pass_over is None else compiled(pass_over)
         self._points = points
-        self._touches = Touches(unit_in_mm(unit))
-        self._lines = TextLines(self._touches.damage, parity)
+        super().__init__(unit_in_mm(unit), parity)
         self._opened = False
-
-    def request(self) -> bytes:
-        """Controls are asked nothing."""
-        return b""
-
-    def feed(self, data: bytes) -> list[Arrival]:
-        """Decode the next bytes, up to the end of the scan."""
-        if not self._touches.out.closed:
-            for line, size in self._lines.feed(data):
-                self._take_line(line, size)
-                if self._touches.out.closed:
-                    break
-        return self._touches.out.hand_over()
-
-    def break_off(self) -> list[Arrival]:
-        """Count the begun line, if any, as damaged."""
-        self._lines.break_off()
-        self._touches.break_off()
-        return self._touches.out.hand_over()
 
     def _take_line(self, line: str, size: int) -> None:
         if found := self._pattern.fullmatch(line):

@@ -1,9 +1,12 @@
 """Points that a machine touches one by one and prints as text: which of them are new, which are missing, and which cannot be told apart."""
 
+from abc import ABC, abstractmethod
+
 import numpy as np
 
 from drivers.codecs.outbox import Outbox
 from drivers.codecs.sequence import Place, SequenceCounter
+from drivers.codecs.text_lines import TextLines
 from drivers.source import ANOTHER_CONTENT, FRAME_REPEATED, Arrival, Damaged, PointBatch, Rejected, ScanClosed
 
 Point = tuple[float, float, float]
@@ -95,3 +98,39 @@ class Touches:
         points_mm = np.array(self._points, dtype=np.float64) * self._mm_per_unit
         self._sequence, self._points = [], []
         return PointBatch(sequence, np.zeros(len(sequence)), points_mm)
+
+
+class TouchLines(ABC):
+    """Lines of text that a control prints, decoded to touched points up to the end of a scan. A language says what a line means."""
+
+    def __init__(self, mm_per_unit: float, parity: str) -> None:
+        """`parity` is even or odd where the bytes carry it as their eighth bit; nothing where they carry none."""
+        self._touches = Touches(mm_per_unit)
+        self._lines = TextLines(self._damage, parity)
+
+    def request(self) -> bytes:
+        """Controls are asked nothing."""
+        return b""
+
+    def feed(self, data: bytes) -> list[Arrival]:
+        """Decode the next bytes, up to the end of the scan."""
+        if not self._touches.out.closed:
+            for line, size in self._lines.feed(data):
+                self._take_line(line, size)
+                if self._touches.out.closed:
+                    break
+        return self._touches.out.hand_over()
+
+    def break_off(self) -> list[Arrival]:
+        """Count the begun line, if any, as damaged."""
+        self._lines.break_off()
+        self._touches.break_off()
+        return self._touches.out.hand_over()
+
+    @abstractmethod
+    def _take_line(self, line: str, size: int) -> None:
+        """Take a line without its end, of so many bytes with it."""
+
+    def _damage(self, byte_count: int, reason: str) -> None:
+        """Count bytes that are no points."""
+        self._touches.damage(byte_count, reason)
