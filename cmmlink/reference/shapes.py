@@ -1,0 +1,99 @@
+"""The nominals of the reference set: curves by numbers of few digits, which every format holds as they are."""
+
+from collections.abc import Sequence
+from decimal import Decimal
+from functools import cache
+from typing import Literal
+
+from cmmlink.reference.exact_curve import ExactCurve
+from cmmlink.reference.exact_numbers import Number, Pair, total
+
+Places = Sequence[tuple[Number, Number]]
+
+
+def _pairs(places: Places) -> tuple[Pair, ...]:
+    return tuple((Decimal(x), Decimal(y)) for x, y in places)
+
+
+def clamped(degree: int, places: Places, weights: Sequence[Number] = (), closed: bool = False) -> ExactCurve:
+    """A curve on even whole-numbered knots, clamped at its ends."""
+    spans = len(places) - degree
+    knots = [0] * degree + list(range(spans + 1)) + [spans] * degree
+    ones = weights or [1] * len(places)
+    return ExactCurve(degree, tuple(map(Decimal, knots)), _pairs(places), tuple(map(Decimal, ones)), closed)
+
+
+def pieces(places: Places, weights: Sequence[Number] = (), closed: bool = True, material: Literal["left", "right"] = "left") -> ExactCurve:
+    """A curve of rational parabolas, each from one control point to the next but one: lines, arcs, and corners between them."""
+    count = (len(places) - 1) // 2
+    knots = [0] + [i for i in range(count + 1) for _ in range(2)] + [count]
+    ones = weights or [1] * len(places)
+    return ExactCurve(2, tuple(map(Decimal, knots)), _pairs(places), tuple(map(Decimal, ones)), closed, material)
+
+
+def closed_cubic(places: Places) -> ExactCurve:
+    """A smooth closed cubic by its periodic control points: multiples of 0.6, so that the clamped ones are decimal numbers of few digits.
+
+    In blossoms, the periodic points are f(i - 1, i, i + 1); those of the clamped form are f(0, 0, 0), f(0, 0, 1), f(0, 1, 2), and so on.
+    """
+    ring = _pairs(places)
+    k = len(ring)
+
+    def mixed(*shares: int) -> Pair:
+        """The points before, at and behind the seam, by shares."""
+        x, y = (total(share * ring[i - 1][axis] for i, share in enumerate(shares)) for axis in (0, 1))
+        return x / sum(shares), y / sum(shares)
+
+    seam = mixed(1, 4, 1)
+    points = (seam, mixed(0, 2, 1), *ring[1:], mixed(1, 2, 0), seam)
+    knots = [0] * 4 + list(range(1, k)) + [k] * 4
+    return ExactCurve(3, tuple(map(Decimal, knots)), points, (Decimal(1),) * len(points), True)
+
+
+QUARTERS = (1, 1, 2, 1, 1, 1, 2, 1, 1)  # weights of four exact quarters: x = (1 - t^2) / (1 + t^2), there and back
+
+
+@cache
+def ellipse(a: Number, b: Number) -> ExactCurve:
+    """An exact ellipse, counterclockwise from (a, 0)."""
+    ring = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1), (1, 0)]
+    return pieces([(x * Decimal(a), y * Decimal(b)) for x, y in ring], QUARTERS)
+
+
+@cache
+def stadium(half_length: Number, radius: Number) -> ExactCurve:
+    """Two straight parts and two exact half circles, counterclockwise from the lower left."""
+    h, r = Decimal(half_length), Decimal(radius)
+    right = [(h, -r), (h + r, -r), (h + r, Decimal(0)), (h + r, r), (h, r)]
+    left = [(-x, -y) for x, y in right]
+    lower, upper = (Decimal(0), -r), (Decimal(0), r)
+    return pieces([left[-1], lower, *right, upper, *left], (1, 1, 1, 1, 2, 1, 1, 1, 1, 1, 2, 1, 1))
+
+
+@cache
+def open_wave() -> ExactCurve:
+    """An open cubic with hollows."""
+    return clamped(3, [(0, 0), (12, 22), (30, 30), (48, 12), (66, -8), (86, 4), (100, 28), (122, 34), (140, 10)])
+
+
+@cache
+def rational_wave() -> ExactCurve:
+    """An open rational cubic."""
+    places = [(0, 0), (15, 26), (40, 34), (62, 12), (84, -4), (110, 12), (130, 40), (152, 30)]
+    return clamped(3, places, (1, 1, "1.25", 1, "0.8", 1, "1.3", 1))
+
+
+@cache
+def cam() -> ExactCurve:
+    """A smooth closed cubic with hollows and no symmetry."""
+    ring: list[tuple[Number, Number]] = [
+        (60, 0),
+        ("52.2", "26.4"),
+        (24, "34.2"),
+        ("-4.2", 30),
+        ("-34.2", 39),
+        ("-58.2", 18),
+        ("-51", "-8.4"),
+        ("-28.2", "-26.4"),
+    ]
+    return closed_cubic([*ring, (6, "-19.8"), ("38.4", -30)])
