@@ -124,6 +124,10 @@ class Replayed(Inspected):
     identical: bool | None = Field(
         description="whether all of the recorded result is found again to the last bit; null where none was recorded"
     )
+    result_sha256: str = Field(
+        description="the SHA-256 of the result and of every point's deviation, foot, station and verdict, to the last bit; where the "
+        "replay is identical it is the one that the run's end keeps"
+    )
     changed: list[Change] = Field(description="the settings and software that are not those of the recorded run")
     differs: list[Change] = Field(description="what of the result is not as recorded")
     derived: JudgementKept | None = Field(default=None, description="with `--reason`: where this judgement is kept")

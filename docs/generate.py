@@ -20,7 +20,7 @@ from cmmlink.exports import tables
 from cmmlink.plan.reference import Group, groups_of, table
 from cmmlink.plan.scan import Plan
 from cmmlink.plan.surface import CtPlan
-from cmmlink.record import export
+from cmmlink.record import evidence, export
 from cmmlink.record_keys import RecordsCopied
 from cmmlink.report import stack_folder
 from cmmlink.result_keys import (
@@ -174,7 +174,7 @@ TABLES: tuple[tuple[str, Mapping[str, str]], ...] = (
     ("Points in them: a line for every received point", tables.POINT_COLUMNS),
     ("`points.csv` and `points.npy` of `export`: a line for every point", export.POINT_COLUMNS),
     ("`wire.csv` of `export`: a line for every read", export.WIRE_COLUMNS),
-    ("`chain.csv` of `export`: a line for every record", export.CHAIN_COLUMNS),
+    ("`chain.csv` of `export`: a line for every record", evidence.CHAIN_COLUMNS),
 )
 
 

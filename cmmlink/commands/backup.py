@@ -55,7 +55,9 @@ def restore(
 
 
 def merge(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="The records of another station: a backup of them, or their folder.")],
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="The records of another station: a backup or their folder; or an exported run's folder.")
+    ],
     records: Records = None,
     as_json: Json = False,
 ) -> int:

@@ -61,6 +61,14 @@ RunName = Annotated[
         autocompletion=runs_like,
     ),
 ]
+RunOrFolder = Annotated[
+    str,
+    typer.Argument(
+        metavar="RUN|FOLDER",
+        help="A run: its id or the beginning, its counter, a serial number, last, or last~1; or the folder that a run was exported to.",
+        autocompletion=runs_like,
+    ),
+]
 Unit = Annotated[UnitName | None, typer.Option("--unit", help="Unit of the points, above what their file states.")]
 NominalUnit = Annotated[UnitName | None, typer.Option("--nominal-unit", help="Unit of the nominal file, in place of --scale.")]
 PlaneName = Literal["xy", "xz", "yz"]

@@ -1,7 +1,9 @@
 """Commands on what was recorded: list, show, judge again, verify."""
 
 import getpass
+import os
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
@@ -10,16 +12,16 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from cmmlink.commands.exit_codes import EXIT_OF, NO_RECORD, UNUSABLE, fail
-from cmmlink.commands.options import Json, Out, Records, RunName, records_folder
+from cmmlink.commands.options import Json, Out, Records, RunName, RunOrFolder, records_folder
 from cmmlink.commands.output import now, print_json, terminal
 from cmmlink.commands.progress import progress
-from cmmlink.errors import PlanError
+from cmmlink.errors import PlanError, RunError
 from cmmlink.version import RESULT_SCHEMA
 from cmmlink.words import headline_of, judgement_words, local_words, printable, section_words, utc_words
 from inspection import Method, Verdict
 
 if TYPE_CHECKING:
-    from cmmlink.record import Replay
+    from cmmlink.record import Evidence, Replay, Store
 
 VerdictSought = Literal["conform", "nonconform", "uncertain", "none"]
 SortKey = Literal["started", "part", "serial_number", "operator", "plan_file", "state", "verdict"]
@@ -128,7 +130,7 @@ def _say(text: str) -> None:
 
 
 def replay(
-    name: RunName,
+    name: RunOrFolder,
     tolerance: Annotated[tuple[float, float] | None, typer.Option(metavar="LO HI", help="Judge with another tolerance, mm.")] = None,
     method: Annotated[Method | None, typer.Option(help="Judge with another method.")] = None,
     settings: Annotated[
@@ -149,9 +151,12 @@ def replay(
 
     With --set, --tolerance or --method it is another judgement. The record of the run stays as it is; with a --reason, which --set asks
     for, the new judgement is added to the records with who, when and why, and `cmmlink show` tells it.
+
+    FOLDER is what `cmmlink export RUN --out FOLDER` wrote, on this computer or another. Its hashes are recomputed, and it needs no records
+    here: `cmmlink merge FOLDER` adds it to them.
     """
     from cmmlink.devices import decoder_of
-    from cmmlink.record import find_run, keep_judgement, open_to_read, open_to_record, recorded_run, replay_run
+    from cmmlink.record import keep_judgement, open_to_record, recorded_run, replay_run
 
     changes = _settings_in(settings or ())
     if changes and not (reason or "").strip():
@@ -159,8 +164,11 @@ def replay(
     if reason is not None and not (changes or tolerance or method):
         raise PlanError("--reason is for a judgement with something changed; expected --set, --tolerance or --method beside it")
     folder = records_folder(records)
-    with open_to_read(folder, now) as store:
-        recorded = recorded_run(store, find_run(store, name))
+    with ExitStack() as opened:
+        store, run, evidence = _run_or_evidence(opened, name, folder)
+        recorded = recorded_run(store, run)
+        if reason is not None and evidence is not None:
+            raise PlanError(f"{name}: a judgement with a --reason is kept in the records; add this run to them first: cmmlink merge {name}")
         if reason is not None and recorded.end is None:
             raise PlanError(f"run {recorded.run} has no end yet: it can be judged again when it has")
         with progress(f"judging run {recorded.run} again"):
@@ -171,11 +179,13 @@ def replay(
             kept = keep_judgement(store, recorded, again, who=operator or _user(), why=reason.strip(), now=now())
     document = {"schema": RESULT_SCHEMA, **again.result_json} | {
         "replay_of": recorded.run,
-        "chain_sha256": recorded.chain_sha256,
+        "chain_sha256": recorded.chain_sha256 if evidence is None else evidence.chain_sha256,
         "identical": again.identical,
+        "result_sha256": again.result_sha256,
     }
     document |= {"ending": again.outcome.ending, "measured_at": utc_words(datetime.fromisoformat(recorded.header["started"]))}
-    document |= {"notes": list(again.notes)}
+    notes = (*again.notes, *([] if evidence is None else [evidence.words]))
+    document |= {"notes": list(notes)}
     document |= {"changed": [asdict(change) for change in again.changed], "differs": [asdict(change) for change in again.differs]}
     document |= {"derived": kept}
     if out is not None:
@@ -187,12 +197,30 @@ def replay(
     if as_json:
         print_json(document)
     else:
-        _print_replay(again, recorded.run)
+        _print_replay(again, recorded.run, notes)
         if kept is not None:
             _say(f"kept as record {kept['record']}, chained to run {recorded.run}: {kept['who']}, {kept['why']}")
     if again.identical is False and not again.changed:
         return fail(f"run {recorded.run}: nothing was changed, yet the result is not the recorded one", NO_RECORD)
     return UNUSABLE if again.outcome.result is None else EXIT_OF[again.outcome.result.verdict]
+
+
+def _run_or_evidence(opened: ExitStack, name: str, folder: Path) -> tuple["Store", str, "Evidence | None"]:
+    """The records that hold the run of a name, its id, and what it was exported to where the name is that of a folder. Raises RunError.
+
+    A run of the records comes before a folder of the same name; what has a slash in it is a folder.
+    """
+    from cmmlink.record import find_run, open_evidence, open_to_read
+
+    if not any(sign in name for sign in (os.sep, os.altsep) if sign):
+        try:
+            store = opened.enter_context(open_to_read(folder, now))
+            return store, find_run(store, name), None
+        except RunError:
+            if not Path(name).is_dir():
+                raise
+    evidence = opened.enter_context(open_evidence(Path(name), now))
+    return evidence.store, evidence.run, evidence
 
 
 def _settings_in(texts: Sequence[str]) -> dict[str, str]:
@@ -216,11 +244,11 @@ def _user() -> str:
         raise PlanError("the system does not tell who you are; expected --operator O") from None
 
 
-def _print_replay(again: "Replay", run_id: str) -> None:
+def _print_replay(again: "Replay", run_id: str, notes: Sequence[str]) -> None:
     from cmmlink.report import print_summary
 
     heading = f"run {run_id}, judged again"
-    print_summary(terminal(), again.outcome.result, again.outcome.counts, heading, again.outcome.ending, again.notes)
+    print_summary(terminal(), again.outcome.result, again.outcome.counts, heading, again.outcome.ending, notes)
     for title, changes in (("changed", again.changed), ("differs", again.differs)):
         for change in changes:
             typer.echo(f"{title}: {change.key} {change.recorded} -> {change.replayed}")
@@ -228,6 +256,7 @@ def _print_replay(again: "Replay", run_id: str) -> None:
         typer.echo(f"run {run_id} has no recorded result to compare with")
     elif again.identical:
         typer.echo(f"identical to the recorded result of run {run_id}, to the last bit")
+        typer.echo(f"SHA-256 of the result and of every deviation: {again.result_sha256}")
 
 
 def verify(

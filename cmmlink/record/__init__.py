@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from cmmlink.record.bodies import unpack_judged
     from cmmlink.record.chain import Draft, Record
     from cmmlink.record.derived import Change, derived_of
+    from cmmlink.record.evidence import Evidence, is_evidence, open_evidence
     from cmmlink.record.export import export_run
     from cmmlink.record.origin import origin_of
     from cmmlink.record.reader import (
@@ -43,6 +44,7 @@ else:
         "cmmlink.record.bodies": ("unpack_judged",),
         "cmmlink.record.chain": ("Draft", "Record"),
         "cmmlink.record.derived": ("Change", "derived_of"),
+        "cmmlink.record.evidence": ("Evidence", "is_evidence", "open_evidence"),
         "cmmlink.record.export": ("export_run",),
         "cmmlink.record.origin": ("origin_of",),
         "cmmlink.record.reader": (
@@ -83,6 +85,7 @@ __all__ = [
     "Change",
     "Copied",
     "Draft",
+    "Evidence",
     "Record",
     "RecordReference",
     "RecordedRun",
@@ -104,10 +107,12 @@ __all__ = [
     "export_run",
     "find_run",
     "find_stack",
+    "is_evidence",
     "keep_judgement",
     "last_serial_number",
     "list_runs",
     "merge",
+    "open_evidence",
     "open_to_read",
     "open_to_record",
     "origin_of",

@@ -2,7 +2,7 @@
 
 A backup is one file of records, as a station has it, and holds what was acknowledged when it was begun: it can be made while a run is
 recorded. Restoring adds to a station what the backup has beyond it, or gives an empty folder all of it. Merging adds the runs of
-another station behind those that are there, each with its origin.
+another station, or a run that was exported, behind those that are there, each with its origin.
 """
 
 import hashlib
@@ -16,6 +16,7 @@ from pathlib import Path
 
 from cmmlink.errors import PlanError, RunError, StoreError
 from cmmlink.record.chain import GENESIS, Record
+from cmmlink.record.evidence import is_evidence, open_evidence
 from cmmlink.record.origin import Origin, origin_of
 from cmmlink.record.reader import open_to_record
 from cmmlink.record.station_lock import StationLock
@@ -96,12 +97,12 @@ def restore(file: Path, folder: Path, now: Now, *, replace: bool = False, tell: 
 
 
 def merge(file: Path, folder: Path, now: Now, tell: Tell = lambda share: None) -> Copied:
-    """Add the runs of another station's records, or of their backup, that are not there yet. Each keeps its id and its origin.
+    """Add the runs of another station's records, of their backup, or of an export, that are not there yet. Each keeps id and origin.
 
     A run without its end is left out: it can be merged once it has one. Raises StoreError where either file was altered, or where both
     have a run of one id with different contents: then nothing is added.
     """
-    with _open_given(file, now) as other:
+    with _runs_given(file, now) as other:
         _require_another(other, folder)
         _checked(other, of=file)
         with open_to_record(folder, now) as store:
@@ -205,6 +206,17 @@ def _open_given(file: Path, now: Now) -> Store:
         return _open(found, now)
     except StoreError as error:
         raise PlanError(f"{str(error).partition('; ')[0]}; {_EXPECTED}") from None
+
+
+@contextmanager
+def _runs_given(file: Path, now: Now) -> Iterator[Store]:
+    """The records of a file or a folder, or the run that was exported to a folder. Raises PlanError where there are none."""
+    if is_evidence(file):
+        with open_evidence(file, now) as evidence:
+            yield evidence.store
+    else:
+        with _open_given(file, now) as store:
+            yield store
 
 
 def _require_another(given: Store, folder: Path) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from cmmlink.deviations_csv import write_deviations
 from cmmlink.errors import PlanError, StoreError
 from cmmlink.record.bodies import unpack_judged
-from cmmlink.record.chain import GENESIS
+from cmmlink.record.evidence import write_chain
 from cmmlink.record.reader import arrivals_of, describe, event_document, points_of, reads_of, recorded_run
 from cmmlink.record.replay import recorded_plan, recorded_profile
 from cmmlink.record.shapes import plain_name
@@ -32,16 +32,6 @@ WIRE_COLUMNS = {
     "bytes": "how many they are",
 }
 
-CHAIN_COLUMNS = {
-    "number": "the place of the record in the station's chain",
-    "kind": "what it holds, like plan, points or result",
-    "time_s": "when it was written, in seconds since 1970 UTC",
-    "count": "how many reads, points or events it holds; 1 for a document",
-    "bytes": "how long its body is; the bodies lie one behind the other in records.bin",
-    "previous_sha256": "the hash of the record before it",
-    "sha256": "its own hash, over all that and its body",
-}
-
 
 def export_run(store: Store, run: str, folder: Path) -> list[Path]:
     """Write a run to a folder. Returns the files written; raises PlanError when the folder cannot be written.
@@ -57,7 +47,7 @@ def export_run(store: Store, run: str, folder: Path) -> list[Path]:
             _points(store, run, files)
             _wire(store, run, files)
             _result(store, run, files)
-            _chain(store, run, files)
+            write_chain(store, run, files)
         return [folder / name for name in files.names]
     except OSError as error:
         raise PlanError(f"{folder}: the run cannot be written there ({error.strerror}); choose another folder with --out") from None
@@ -110,21 +100,6 @@ def _result(store: Store, run: str, files: NewFiles) -> None:
         if zones is not None:
             _json(files("zone.json"), zones)
     _json(files("result.json"), recorded.result | ({} if ending == "complete" else {"ending": ending}))
-
-
-def _chain(store: Store, run: str, files: NewFiles) -> None:
-    bodies_path, table_path = files.together("records.bin", "chain.csv")
-    with bodies_path.open("wb") as bodies, table_path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(CHAIN_COLUMNS)
-        for record in store.records(run):
-            before = store.record_at(record.number - 1)
-            previous = before.sha256 if before is not None else GENESIS
-            if not (isinstance(previous, bytes) and isinstance(record.sha256, bytes)):  # a column may hold anything once a file was altered
-                raise StoreError(f"record {record.number} has no hash: it was altered. Run cmmlink verify, which names what was")
-            bodies.write(record.body)
-            place = (record.number, record.kind, repr(record.time_s), record.count, len(record.body))
-            writer.writerow((*place, previous.hex(), record.sha256.hex()))
 
 
 def _json(path: Path, document: Any) -> None:

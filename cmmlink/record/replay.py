@@ -57,6 +57,7 @@ class Replay:
     changed   : settings and software that are not those of the recorded run
     differs   : values of the result that are not as recorded
     identical : to the last bit of every deviation; None where the recorded run has no result to compare with
+    result_sha256 : the hash of all that was found, see `result_sha256` in the end of a run: where it is identical, that of the record
     notes     : what was assumed about nominal and points when they were recorded
     """
 
@@ -67,6 +68,7 @@ class Replay:
     changed: tuple[Change, ...]
     differs: tuple[Change, ...]
     identical: bool | None
+    result_sha256: str
     notes: tuple[str, ...]
 
 
@@ -120,12 +122,15 @@ def replay_run(
     reading.raise_failure(recorded.run, outcome)
     replayed = result_json(outcome.result, outcome.counts)
     changes = (*_settings_changed(plan, changed), *_software_changed(recorded.header["software"]))
-    identical, differs = _compare(recorded, replayed, (body for _, body in judged_bodies(outcome.result)))
+    differs = tuple(_differences_of(recorded.result, replayed)) if recorded.result is not None else ()
+    same = replayed if differs or recorded.result is None else recorded.result  # a later version tells more, which is no difference
+    sha256 = result_sha256(same, (body for _, body in judged_bodies(outcome.result)))
+    identical, differs = _compare(recorded, sha256, differs)
     notes = (
         *_notes_on(changed, plan, started.notes, recorded),
         *density_notes(density_of(stations_of(outcome.result), profile.length_mm), profile.length_mm),
     )
-    return Replay(changed, outcome, profile, replayed, changes, differs, identical, notes)
+    return Replay(changed, outcome, profile, replayed, changes, differs, identical, sha256, notes)
 
 
 class _Reading:
@@ -361,15 +366,14 @@ def _software_changed(recorded: Mapping[str, str]) -> Iterator[Change]:
     return _differences_of(dict(recorded), software(), "software.")
 
 
-def _compare(recorded: RecordedRun, replayed: Mapping[str, Any], rows: Iterator[bytes]) -> tuple[bool | None, tuple[Change, ...]]:
+def _compare(recorded: RecordedRun, sha256: str, differs: tuple[Change, ...]) -> tuple[bool | None, tuple[Change, ...]]:
     """Whether all that was recorded is found again to the last bit, and what is not. None where no result was recorded.
 
-    Deviations alone may differ without any of the summary showing it. What a later version of cmmlink tells as well is no difference.
+    Deviations alone may differ without any of the summary showing it.
     """
-    differs = tuple(_differences_of(recorded.result, replayed)) if recorded.result is not None else ()
     if recorded.end is None or not recorded.end["result_sha256"]:
         return None, differs
-    alike = result_sha256(recorded.result or replayed, rows) == recorded.end["result_sha256"]
+    alike = sha256 == recorded.end["result_sha256"]
     if not alike and not differs:
         differs = (Change("deviations", "as recorded", "differ in the last bits; nothing of the summary does"),)
     return alike and not differs, differs

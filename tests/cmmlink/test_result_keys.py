@@ -13,7 +13,8 @@ from pydantic import BaseModel
 from cmmlink import comparison_keys, inspection_keys, record_keys, result_keys
 from cmmlink.deviations_csv import COLUMNS
 from cmmlink.plan.reference import groups_of
-from cmmlink.record.export import CHAIN_COLUMNS, POINT_COLUMNS, WIRE_COLUMNS
+from cmmlink.record.evidence import CHAIN_COLUMNS
+from cmmlink.record.export import POINT_COLUMNS, WIRE_COLUMNS
 from cmmlink.report.stack_folder import CONTOUR_COLUMNS, SECTION_COLUMNS
 from cmmlink.result_keys import (
     Exported,

@@ -16,6 +16,7 @@ import pytest
 
 from cmmlink.demo import part_path
 from cmmlink.events import Arrived, Event, RunFinished
+from cmmlink.record.export import export_run
 from cmmlink.record.reader import open_to_read, recorded_run
 from cmmlink.record.recorder import result_sha256
 from cmmlink.record.replay import Replay, replay_run
@@ -52,7 +53,16 @@ FAULTS: list[list[str]] = [
     [*SCATTERED, "gap:30@300"],
     [*SCATTERED, "die@300"],
 ]
-OTHER_MACHINE = {"OPENBLAS_CORETYPE": "Nehalem", "OPENBLAS_NUM_THREADS": "1", "NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX512_ICL"}
+OTHER_MACHINE = {
+    "OPENBLAS_CORETYPE": "Nehalem",
+    "OPENBLAS_NUM_THREADS": "1",
+    "NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX512_ICL",
+    "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-FMA,-AVX2,-AVX512F",
+    "LC_ALL": "de_DE.UTF-8",
+    "LANG": "de_DE.UTF-8",
+    "TZ": "Pacific/Chatham",
+    "PYTHONHASHSEED": "19",
+}
 
 
 def recorded_scan(folder: Path, *faults: str, stop: threading.Event | None = None, abort_at: int | None = None) -> str:
@@ -188,14 +198,20 @@ def test_what_a_later_version_tells_as_well_is_no_difference(tmp_path: Path) -> 
 
 
 def test_replay_on_another_machine_is_identical(tmp_path: Path) -> None:
-    """The file alone, in another folder, on a processor without this one's vector instructions (as far as the libraries go)."""
+    """An export alone, in another folder of a station without records, elsewhere in the world, on a processor without this one's vector
+    instructions (as far as the libraries go)."""
     run = recorded_scan(tmp_path / "here", *SCATTERED, "lost-frames:0.1", "die@450")
-    (tmp_path / "there").mkdir()
-    shutil.copy(tmp_path / "here" / "station.sqlite", tmp_path / "there")
-    environment = os.environ | OTHER_MACHINE
-    command = [sys.executable, "-m", "cmmlink", "replay", run, "--records", str(tmp_path / "there"), "--json"]
-    ended = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, env=environment, check=False)
+    with open_to_read(tmp_path / "here", today) as store:
+        export_run(store, run, tmp_path / "there" / "evidence")
+        (end,) = store.records(run, "end")
+    shutil.rmtree(tmp_path / "here")
+    command = [sys.executable, "-m", "cmmlink", "replay", "./evidence", "--records", "none", "--json"]
+    environment = os.environ | OTHER_MACHINE | {"PYTHONPATH": str(ROOT)}
+    ended = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path / "there", env=environment, check=False)
     told = json.loads(ended.stdout)
     assert told["identical"] is True, told["differs"]
+    assert told["result_sha256"] == json.loads(end.body)["result_sha256"]
     assert told["changed"] == []
+    assert told["lost"] > 0
     assert np.isfinite(told["rms_mm"])
+    assert [file.name for file in (tmp_path / "there").iterdir()] == ["evidence"]
