@@ -24,6 +24,7 @@ from cmmlink.commands.plans import example, plan
 from cmmlink.commands.point_files import inspect
 from cmmlink.commands.proofs import verify_zone
 from cmmlink.commands.records import replay, runs, show, verify
+from cmmlink.commands.reference_set import reference
 from cmmlink.commands.registers import registers
 from cmmlink.commands.report import report
 from cmmlink.commands.setup import doctor, list_ports, nominal, prepare, simulate
@@ -64,6 +65,7 @@ app.command(short_help="Lay two scans of one profile over one another.")(compare
 app.command(short_help="Judge a recorded run again, also with another plan.")(replay)
 app.command(short_help="Show whether a record was altered.")(verify)
 app.command("verify-zone", short_help="Check the proofs of minimum zones and least consumptions.")(verify_zone)
+app.command(short_help="Write points and nominals whose truth is known.")(reference)
 app.command(short_help="Copy all records to one checked file.")(backup)
 app.command(short_help="Bring back what a backup holds.")(restore)
 app.command(short_help="Add the runs of another station.")(merge)

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
         Truth,
     )
     from cmmlink.reference.catalogue import reference_cases
+    from cmmlink.reference.scoring import Quantity, quantities, scoring_sheet
+    from cmmlink.reference.writing import plan_of, texts_of, write_reference
 else:
     from cmmlink.front_door import load_on_use
 
@@ -34,6 +36,8 @@ else:
             "Truth",
         ),
         "cmmlink.reference.catalogue": ("reference_cases",),
+        "cmmlink.reference.scoring": ("Quantity", "quantities", "scoring_sheet"),
+        "cmmlink.reference.writing": ("plan_of", "texts_of", "write_reference"),
     }
 
     __getattr__ = load_on_use(__name__, _PLACES)
@@ -46,8 +50,14 @@ __all__ = [
     "KnownPose",
     "KnownValue",
     "KnownWorst",
+    "Quantity",
     "ReferenceCase",
     "ReferenceNominal",
     "Truth",
+    "plan_of",
+    "quantities",
     "reference_cases",
+    "scoring_sheet",
+    "texts_of",
+    "write_reference",
 ]
