@@ -29,6 +29,9 @@ class Rejection(IntEnum):
     BEYOND_END = layout.BEYOND_END
     OUTLIER = layout.OUTLIER
     IN_HOLLOW = layout.IN_HOLLOW
+    OFF_SURFACE = layout.OFF_SURFACE
+    BEYOND_EDGE = layout.BEYOND_EDGE
+    OPPOSITE_FACE = layout.OPPOSITE_FACE
 
     @property
     def words(self) -> str:

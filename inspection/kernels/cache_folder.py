@@ -2,7 +2,8 @@
 
 When numba loads compiled code it looks for changes in the file of that one function, not in the files of what the function
 calls. So the folder is named after the content of every file of the package: any edit leads to another folder, and nothing
-stale is ever loaded.
+stale is ever loaded. A package within the package has a folder of its own, named after its files and those of the package around it:
+an edit of the inner one leaves the code of the outer one as it is.
 """
 
 import hashlib
@@ -18,9 +19,9 @@ _STAMP_DIGITS = 16  # of a sha256: 64 bits tell the versions of one package apar
 _IDLE_S = 3600.0  # an older version's folder in which nothing was written for so long is in nobody's use
 
 
-def stamp_of(package: Path) -> str:
-    """A text that changes with the name or content of any file of a package. Empty for a package without files, as in an archive."""
-    files = sorted(package.glob("*.py"))
+def stamp_of(*packages: Path) -> str:
+    """A text that changes with the name or content of any file of some packages. Empty where they have no files, as in an archive."""
+    files = [file for package in packages for file in sorted(package.glob("*.py"))]
     content = hashlib.sha256()
     for file in files:
         code = file.read_bytes()

@@ -32,6 +32,7 @@ def tuple_of(*parts: types.Type) -> types.Type:
     return types.Tuple(parts)
 
 
+_HERE = Path(__file__).parent
 _WIDEST = '"prefer-vector-width"="512"'
 
 REAL, INTEGER, SHORT, CODE, MARK, TRUTH = types.float64, types.int64, types.int32, types.int8, types.uint8, types.boolean
@@ -58,7 +59,7 @@ def kernel(function: _Function, **options: bool) -> _Function:
     options = {"nogil": True, "no_cfunc_wrapper": True} | options
     compiled = njit(error_model="numpy", **options)(function)
     try:
-        with _code_kept_in_stamped_folder():
+        with _code_kept_in_stamped_folder(Path(function.__code__.co_filename).parent):
             kept = _KeptCode(function)
     except RuntimeError:
         return cast(_Function, compiled)
@@ -126,13 +127,17 @@ def memory_of(kind: types.Type) -> Any:
 
 
 @contextmanager
-def _code_kept_in_stamped_folder() -> Iterator[None]:
-    """Let numba keep what is decorated meanwhile in the folder of this package's stamp. Raises RuntimeError where there is none."""
-    stamp, chosen = _stamp(), config.CACHE_DIR
+def _code_kept_in_stamped_folder(package: Path) -> Iterator[None]:
+    """Let numba keep what is decorated meanwhile in the folder of its package's stamp. Raises RuntimeError where there is none.
+
+    package : this one, or one within it
+    """
+    package = package if package.parent == _HERE else _HERE
+    stamp, chosen = _stamp(package), config.CACHE_DIR
     if not stamp:  # in an archive: numba's own stamp is that of the whole archive
         yield
         return
-    folder = _folder(stamp, chosen)
+    folder = _folder(package, stamp, chosen)
     if folder is None:
         raise RuntimeError("no folder for compiled code can be written")
     config.CACHE_DIR = str(folder)
@@ -144,17 +149,17 @@ def _code_kept_in_stamped_folder() -> Iterator[None]:
 
 def compiled_code_folder() -> Path | None:
     """Where compiled code is kept from one process to the next; None where it is not, and every process compiles anew."""
-    return _folder(_stamp(), config.CACHE_DIR) if _stamp() else None
+    return _folder(_HERE, _stamp(_HERE), config.CACHE_DIR) if _stamp(_HERE) else None
 
 
 @cache
-def _stamp() -> str:
-    return stamp_of(Path(__file__).parent)
+def _stamp(package: Path) -> str:
+    return stamp_of(*dict.fromkeys((_HERE, package)))
 
 
 @cache
-def _folder(stamp: str, chosen: str) -> Path | None:
-    return stamped_folder(stamp, places_for(Path(__file__).parent, chosen))
+def _folder(package: Path, stamp: str, chosen: str) -> Path | None:
+    return stamped_folder(stamp, places_for(package, chosen))
 
 
 def instructions(function: Callable[..., Any]) -> Any:

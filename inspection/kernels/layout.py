@@ -8,6 +8,7 @@ numbers from here. This file imports nothing of ours.
 
 INSIDE, CORNER, OPEN_END = range(3)  # what a foot is: inside the curve, at a corner, at an open end
 NOT_REJECTED, NOT_FINITE, OFF_SECTION, BEYOND_END, OUTLIER, IN_HOLLOW = range(6)  # why a point of a scan has no verdict
+OFF_SURFACE, BEYOND_EDGE, OPPOSITE_FACE, REJECTIONS = range(6, 10)  # the same for points in space; then how many reasons there are
 NOT_JUDGED, CONFORM, UNCERTAIN, NONCONFORM = range(-1, 3)  # the verdict on a point; the worse, the greater
 SAMPLE_METHODS = ("circle", "chord", "pcp", "veaw")  # those made at the nearest sample, in the order of their codes
 CIRCLE, CHORD, PCP, VEAW = range(4)

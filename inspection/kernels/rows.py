@@ -22,6 +22,7 @@ from inspection.kernels.layout import (
     PLANE_ORIGIN,
     PLANE_X_AXIS,
     PLANE_Y_AXIS,
+    REJECTIONS,
     UNCERTAIN,
 )
 
@@ -31,7 +32,7 @@ Columns = tuple[Array, Array, Codes, Codes, NDArray[np.int64], Array]  # plain t
 Places = tuple[Array, Array, Array]
 Judgement = tuple[float, float, float, float, float]
 
-JUDGED_AS = 8  # place in the tally of the verdict 0; before it come the rejections
+JUDGED_AS = REJECTIONS  # place in the tally of the verdict 0; before it come the rejections
 TALLY = JUDGED_AS + NONCONFORM + 1
 
 

@@ -37,18 +37,22 @@ def test_codes_of_the_loops_are_those_of_the_enumerations() -> None:
         "BEYOND_END": layout.BEYOND_END,
         "OUTLIER": layout.OUTLIER,
         "IN_HOLLOW": layout.IN_HOLLOW,
+        "OFF_SURFACE": layout.OFF_SURFACE,
+        "BEYOND_EDGE": layout.BEYOND_EDGE,
+        "OPPOSITE_FACE": layout.OPPOSITE_FACE,
     }
     assert {verdict.name: int(verdict) for verdict in Verdict} == {
         "CONFORM": layout.CONFORM,
         "UNCERTAIN": layout.UNCERTAIN,
         "NONCONFORM": layout.NONCONFORM,
     }
+    assert len(Rejection) == layout.REJECTIONS
     assert layout.NOT_JUDGED == NOT_JUDGED
     assert NOT_JUDGED not in list(Verdict)
 
 
 def test_codes_stay_as_they_are_written_in_records() -> None:
-    assert [int(reason) for reason in Rejection] == [0, 1, 2, 3, 4, 5]
+    assert [int(reason) for reason in Rejection] == list(range(9))
     assert (Verdict.CONFORM, Verdict.UNCERTAIN, Verdict.NONCONFORM, NOT_JUDGED) == (0, 1, 2, -1)
 
 

@@ -1,0 +1,23 @@
+"""The compiled inner loops of surfaces in space: closest points of triangles, of spline patches and of clouds.
+
+They compile by themselves, and are kept in a folder of their own: who inspects sections never waits for them. As in the package
+around it every point is worked out on its own: no result depends on the batch, the order or the thread that a point comes in.
+"""
+
+TYPE_CHECKING = False  # as type checkers read it
+
+if TYPE_CHECKING:
+    from inspection.kernels.surfaces.on_triangles import TriangleTables, project_on_triangles
+    from inspection.kernels.surfaces.space_feet import SpaceFeet
+else:
+    from inspection.front_door import load_on_use
+
+    _PLACES = {
+        "inspection.kernels.surfaces.on_triangles": ("TriangleTables", "project_on_triangles"),
+        "inspection.kernels.surfaces.space_feet": ("SpaceFeet",),
+    }
+
+    __getattr__ = load_on_use(__name__, _PLACES)
+
+
+__all__ = ["SpaceFeet", "TriangleTables", "project_on_triangles"]

@@ -1,0 +1,22 @@
+"""Whole surfaces against CAD, meshes and clouds: closest points with the right sign, poses in six freedoms.
+
+This is the front door, beside that of the package around it, which holds what both share: the tolerance zone, verdicts, rejections.
+"""
+
+TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer to load than all of this
+
+if TYPE_CHECKING:
+    from inspection.surface.feet import FootKind, NominalSurface, SurfaceFeet, rejections
+    from inspection.surface.triangles import TriangleSurface
+else:
+    from inspection.front_door import load_on_use
+
+    _PLACES = {
+        "inspection.surface.feet": ("FootKind", "NominalSurface", "SurfaceFeet", "rejections"),
+        "inspection.surface.triangles": ("TriangleSurface",),
+    }
+
+    __getattr__ = load_on_use(__name__, _PLACES)
+
+
+__all__ = ["FootKind", "NominalSurface", "SurfaceFeet", "TriangleSurface", "rejections"]
