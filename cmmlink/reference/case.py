@@ -112,9 +112,11 @@ class KnownValue:
 class Truth:
     """What is true of the written points against the written nominal. What a case is not about is None or empty.
 
-    pose        : from the points to the nominal: the known one, that of the best fit or of the minimum zone
+    pose        : from the points to the nominal: the known one, that of the best fit or of the minimum zone; None also where any
+                  rotation is as good, as of a circle
+    equal_poses : those that are as good because the nominal is symmetric
     deviation   : (m,) at the pose, positive out of material; of a ball centre less the radius of the ball. NaN for an outlier
-    worst       : the point that deviates most
+    worst       : the point that deviates most; None where several do by construction
     rms         : of the deviations at the pose
     zone        : the minimum zone
     consumption : the least consumption of the tolerance zone
@@ -126,6 +128,7 @@ class Truth:
 
     verdict: KnownVerdict
     pose: KnownPose | None = None
+    equal_poses: tuple[KnownPose, ...] = ()
     deviation: Array | None = None
     worst: KnownWorst | None = None
     rms: float | None = None

@@ -49,6 +49,22 @@ class ExactCurve:
         weights = None if all(weight == 1 for weight in self.weights) else as_array(self.weights)
         return ReferenceNominal(self.degree, as_array(self.knots), as_pairs(self.places), weights, self.closed, self.material)
 
+    def scaled(self, factor: Number) -> "ExactCurve":
+        """The same curve in another size."""
+        places = tuple((x * Decimal(factor), y * Decimal(factor)) for x, y in self.places)
+        return ExactCurve(self.degree, self.knots, places, self.weights, self.closed, self.material)
+
+    def reversed(self) -> "ExactCurve":
+        """The same curve from its end to its beginning, the material on the other side of it."""
+        knots = tuple(self.knots[0] + self.knots[-1] - knot for knot in self.knots[::-1])
+        side: Literal["left", "right"] = "right" if self.material == "left" else "left"
+        return ExactCurve(self.degree, knots, self.places[::-1], self.weights[::-1], self.closed, side)
+
+    @property
+    def arm(self) -> Decimal:
+        """Half the largest distance of a control point from the origin: a lever by which rotations are counted."""
+        return max((x * x + y * y).sqrt() for x, y in self.places) / 2
+
     @property
     def domain(self) -> Pair:
         """The first and the last parameter."""

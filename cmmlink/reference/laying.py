@@ -37,6 +37,11 @@ class Pose:
         """The pose as the datum of a plan; its lengths are in mm."""
         return {"rotation_deg": as_float(self.degrees), "translation_mm": [as_float(self.x), as_float(self.y)]}
 
+    @property
+    def half_turn(self) -> "Pose":
+        """The pose behind which a nominal that half a turn about the origin brings onto itself is met just as well."""
+        return Pose(self.degrees - 180 if self.degrees > 0 else self.degrees + 180, -self.x, -self.y)
+
     def apply(self, places: Sequence[Pair]) -> list[Pair]:
         """Places where the pose brings them."""
         c, s = cosine_and_sine(self.degrees * PI / 180)
@@ -106,7 +111,8 @@ def case_of(asked: Asked, curve: ExactCurve, laid: Laid, **more: Any) -> Referen
 
     more : what else is true of it, by the names of `Truth`
     """
-    truth = Truth(asked.verdict, laid.pose.known, as_array(laid.deviation), laid.worst, laid.rms)
+    deviation = as_array(laid.deviation)
+    truth = Truth(asked.verdict, pose=laid.pose.known, deviation=deviation, worst=laid.worst, rms=laid.rms)
     return ReferenceCase(
         asked.name,
         asked.kind,

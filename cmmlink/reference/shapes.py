@@ -71,6 +71,27 @@ def stadium(half_length: Number, radius: Number) -> ExactCurve:
 
 
 @cache
+def lens() -> ExactCurve:
+    """Two exact arcs of radius 50 that meet in two sharp edges, at (40, 0) and (-40, 0)."""
+    half = "53.3333333333333"  # both tangents meet at 40 * 4 / 3 above the middle, and the arcs turn by atan2(4, 3) to either side
+    return pieces([(40, 0), (0, half), (-40, 0), (0, f"-{half}"), (40, 0)], (1, "0.6", 1, "0.6", 1))
+
+
+@cache
+def angle_piece() -> ExactCurve:
+    """The outline of an angle section, straight from corner to corner, counterclockwise; one corner of six is hollow."""
+    corners = [(0, 0), (60, 0), (60, 20), (25, 20), (25, 50), (0, 50), (0, 0)]
+    knots = [0, *range(7), 6]
+    return ExactCurve(1, tuple(map(Decimal, knots)), _pairs(corners), (Decimal(1),) * 7, True)
+
+
+@cache
+def straight_line(length: Number) -> ExactCurve:
+    """A straight line along x from the origin, the material below it."""
+    return ExactCurve(1, tuple(map(Decimal, (0, 0, 1, 1))), _pairs([(0, 0), (length, 0)]), (Decimal(1),) * 2, False, "right")
+
+
+@cache
 def open_wave() -> ExactCurve:
     """An open cubic with hollows."""
     return clamped(3, [(0, 0), (12, 22), (30, 30), (48, 12), (66, -8), (86, 4), (100, 28), (122, 34), (140, 10)])

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmmlink.errors import PlanError
-from cmmlink.reference.case import KnownHold, ReferenceCase, Truth
+from cmmlink.reference.case import KnownHold, KnownPose, ReferenceCase, Truth
 from cmmlink.reference.dxf_text import dxf_text
 from cmmlink.reference.exact_numbers import as_float, with_fifty_digits
 from cmmlink.reference.iges_text import iges_text
@@ -117,7 +117,9 @@ def _truth_json(case: ReferenceCase) -> dict[str, Any]:
 def _known(truth: Truth) -> Iterator[tuple[str, Any]]:
     """What is known, without what a case is not about."""
     if truth.pose is not None:
-        yield "pose", {"rotation_deg": truth.pose.rotation_deg, "translation": list(truth.pose.translation)}
+        yield "pose", _pose_json(truth.pose)
+    if truth.equal_poses:
+        yield "equal_poses", [_pose_json(pose) for pose in truth.equal_poses]
     if truth.worst is not None:
         worst = truth.worst
         yield "worst", {"row": worst.row, "x": worst.x, "y": worst.y, "deviation": worst.deviation}
@@ -134,6 +136,10 @@ def _known(truth: Truth) -> Iterator[tuple[str, Any]]:
         yield "deviation", _list(truth.deviation)
     if truth.filtered:
         yield "filtered", [{"name": each.name, "cutoff": each.cutoff, "deviation": _list(each.deviation)} for each in truth.filtered]
+
+
+def _pose_json(pose: KnownPose) -> dict[str, Any]:
+    return {"rotation_deg": pose.rotation_deg, "translation": list(pose.translation)}
 
 
 def _hold_json(hold: KnownHold) -> dict[str, Any]:
