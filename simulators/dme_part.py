@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.motion import Motion, Walk, walk
+from simulators.motion import Motion, Walk, on_scales, walk
 
 Array = NDArray[np.float64]
 _FINE_MM = 0.02  # between two points of the surface that is touched
@@ -38,7 +38,7 @@ class PathPart:
         self.radius_mm = motion.tip_radius_mm
         self._path_mm, self._motion = path_mm, motion
         self._rng = np.random.default_rng([motion.seed, 1])
-        bare = replace(motion, noise_mm=0.0, tip_radius_mm=0.0, start_mm=0.0, backward=False)
+        bare = replace(motion, noise_mm=0.0, tip_radius_mm=0.0, start_mm=0.0, backward=False, resolution_mm=0.0)
         self._length_mm = _length(path_mm, motion.closed)
         count = int(np.ceil(self._length_mm / _FINE_MM))
         fine = replace(bare, count=count, speed_mm_s=self._length_mm / count * motion.rate_hz)
@@ -80,7 +80,7 @@ class PathPart:
 
     def _walked(self, moved: Motion, ends: Array, along: Array, step_mm: float, lost_mm: float) -> tuple[Array, Array, bool]:
         centres = self._walk(moved)
-        quiet = replace(moved, noise_mm=0.0)
+        quiet = replace(moved, noise_mm=0.0, resolution_mm=0.0)
         surface = self._walk(replace(quiet, tip_radius_mm=0.0))
         outward = self._walk(replace(quiet, tip_radius_mm=1.0)) - surface
         place = np.minimum(step_mm * np.arange(len(surface)), along[-1])
@@ -112,7 +112,7 @@ class PathPart:
 
     def _with_noise(self, centre: Array) -> Array:
         noise = self._rng.normal(0.0, self._motion.noise_mm, 2)
-        return np.asarray(centre + np.append(noise, 0.0))
+        return on_scales(np.asarray(centre + np.append(noise, 0.0)), self._motion)
 
 
 def _length(path_mm: Array, closed: bool) -> float:

@@ -23,6 +23,7 @@ class Motion:
     tip_radius_mm      0: surface points; otherwise ball centres, offset outward by it
     rotation_deg, translation_mm    where the part lies on the machine: about z first, then moved
     start_mm, backward where on the path the scan starts, and whether it runs against the path's order
+    resolution_mm      step of the scales by which the machine tells its positions; 0: none
     """
 
     speed_mm_s: float
@@ -38,6 +39,7 @@ class Motion:
     translation_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
     start_mm: float = 0.0
     backward: bool = False
+    resolution_mm: float = 0.0
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -45,6 +47,8 @@ class Motion:
             raise ValueError(f"speed {self.speed_mm_s} mm/s and rate {self.rate_hz} Hz must be positive")
         if self.count is not None and self.count < 1:
             raise ValueError(f"{self.count} points to scan; at least 1 is needed")
+        if not self.resolution_mm >= 0:
+            raise ValueError(f"a resolution of {self.resolution_mm} mm; it is 0 or more")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,7 +75,7 @@ def walk(path_mm: NDArray[np.float64], motion: Motion) -> Walk:
     height = motion.tip_radius_mm + _form_error(station / length, motion.form_error_mm, rng) + _defect(station, length, motion)
     points = surface + height[:, None] * outward
     points[:, :2] += rng.normal(0.0, motion.noise_mm, (len(points), 2))
-    return Walk(np.arange(len(points)) / motion.rate_hz, _pose(points, motion))
+    return Walk(np.arange(len(points)) / motion.rate_hz, on_scales(_pose(points, motion), motion))
 
 
 def feed_under(path_mm: NDArray[np.float64], motion: Motion) -> Walk:
@@ -87,7 +91,13 @@ def feed_under(path_mm: NDArray[np.float64], motion: Motion) -> Walk:
     along = motion.start_mm + step * np.arange(count, dtype=np.float64)
     height = _lowest(path_mm[:, :2], x[0] + along) + _form_error(along / (x[-1] - x[0]), motion.form_error_mm, rng)
     height += _defect(along, float(x[-1] - x[0]), replace(motion, closed=False)) + rng.normal(0.0, motion.noise_mm, count)
-    return Walk(np.arange(count) / motion.rate_hz, np.column_stack([x[0] + along, height, np.zeros(count)]))
+    return Walk(np.arange(count) / motion.rate_hz, on_scales(np.column_stack([x[0] + along, height, np.zeros(count)]), motion))
+
+
+def on_scales(points_mm: NDArray[np.float64], motion: Motion) -> NDArray[np.float64]:
+    """Return positions (..., 3) as the scales of the machine tell them."""
+    step_mm = motion.resolution_mm
+    return np.round(points_mm / step_mm) * step_mm if step_mm else points_mm
 
 
 def _lowest(path_mm: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:

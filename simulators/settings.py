@@ -29,6 +29,7 @@ class SimulatorSettings:
     path_mm    (k, 2) or (k, 3) points of the path on the part
     bound      end when standard input does
     paced      take points when they are due by `motion.rate_hz`; otherwise as fast as the client fetches them
+    line       what a machine prints of a point that prints lines of the user's own, like {number};{x:.4f};{y:.4f}; nothing: its own
     """
 
     address: str
@@ -37,6 +38,7 @@ class SimulatorSettings:
     faults: tuple[Fault, ...] = ()
     paced: bool = True
     bound: bool = False
+    line: str = ""
 
 
 Announce = Callable[[str], None]
@@ -59,7 +61,7 @@ def settings_from(
         motion = Motion(**{field.name: given[field.name] for field in fields(Motion) if field.name in given})
         faults = tuple(Fault.parse(text) for text in given["fault"])
         path_mm = default_path() if default_path is not None and "path" not in given else read_path(given["path"])
-        return SimulatorSettings(given["address"], path_mm, motion, faults, not given["unpaced"], given["until_stdin_ends"])
+        return SimulatorSettings(given["address"], path_mm, motion, faults, not given["unpaced"], given["until_stdin_ends"], given["line"])
     except FileNotFoundError:
         parser.error(f"{given['path']}: no such file")
     except (ValueError, OSError) as error:
@@ -67,6 +69,8 @@ def settings_from(
 
 
 _ADDRESS = "pty, or host:port (port 0: any free one); a machine tool takes to:host:port and file:PATH as well"
+
+_LINE = "the line that machine-tool-dprnt prints of a point, like '{number};{x:.4f};{y:.4f}'; END follows the last one [its own]"
 
 
 class _OneLine(argparse.ArgumentParser):
@@ -89,6 +93,7 @@ def _parser(program: str | None, *, needs_path: bool) -> argparse.ArgumentParser
     usual = "" if needs_path else " [the section of the demonstration]"
     parser.add_argument("--path", required=needs_path, type=Path, metavar="POINTS", help=f"points of the path on the part, mm{usual}")
     parser.add_argument("--fault", action="append", default=[], metavar="NAME[:VALUE][@POINT[-STOP]]", help="may be given several times")
+    parser.add_argument("--line", default="", metavar="TEXT", help=_LINE)
     parser.add_argument("--until-stdin-ends", action="store_true", help="end when standard input does: with whoever started it")
     parser.add_argument("--unpaced", action="store_true", help="as fast as the client takes the points")
     parser.add_argument("--rate", dest="rate_hz", type=float, default=1000.0, metavar="HZ", help="points per second [%(default)g]")
@@ -112,6 +117,7 @@ _MILLIMETRES: Mapping[str, str] = MappingProxyType(
         "defect": "height of a local defect",
         "defect-station": "where along the path the defect is",
         "start": "where along the path the scan begins",
+        "resolution": "step of the scales by which the machine tells its positions",
     }
 )
 

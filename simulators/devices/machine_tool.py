@@ -1,7 +1,8 @@
 """Simulated machine tools that probe a part on their table and print each touched point as lines of text.
 
-`machine-tool` prints the language of inspection (G800 nominal, G801 measured), `machine-tool-dprnt` one line of DPRNT a point. Numbers are
-printed as controls do: DPRNT shows leading zeros as blanks, the posts of CAM systems leave them out.
+`machine-tool` prints the language of inspection (G800 nominal, G801 measured), `machine-tool-dprnt` one line of DPRNT a point, or
+a line of the user's own, as cameras and line scanners send. Numbers are printed as controls do: DPRNT shows leading zeros as blanks, the
+posts of CAM systems leave them out.
 """
 
 from collections.abc import Sequence
@@ -138,13 +139,44 @@ class PrintingControl(InspectingControl):
         return self._quirks.bytes_of("M30" + _DC4) if self._quirks.closes else b""
 
 
+class OwnLines(PrintingControl):
+    """Prints lines of the user's own, as a camera or a line scanner sends them; the last one is END."""
+
+    def __init__(self, line: str, quirks: Quirks, injector: Injector) -> None:
+        """Take the line of a point with the fields number, x, y and z. Raises ValueError for one that cannot be filled in."""
+        nobody = np.zeros((0, 3))
+        super().__init__(nobody, nobody, 0.0, quirks, injector)
+        self._line = line
+        try:
+            self.point_line(0, (0.0, 0.0, 0.0)).encode("ascii")
+        except (KeyError, IndexError, AttributeError, TypeError, ValueError) as error:
+            raise ValueError(f"line {line!r}: expected ASCII with the fields number, x, y and z, like {{x:.4f}} ({error!r})") from None
+
+    def opening(self, count: int) -> bytes:
+        """A camera says nothing before its first point."""
+        return b""
+
+    def point_line(self, index: int, centre_mm: Sequence[float]) -> str:
+        """One point in the line of the user's own."""
+        x, y, z = self._quirks.own(np.array(centre_mm)).tolist()
+        return self._line.format(number=index + 1, x=x, y=y, z=z)
+
+    def closing(self, count: int) -> bytes:
+        """Say that this was the last point."""
+        return self._quirks.bytes_of("END") if self._quirks.closes else b""
+
+
 def serve(settings: SimulatorSettings, announce: Announce, control: type[InspectingControl]) -> None:
     """Probe a part and print it; the address may also be `to:host:port` or `file:PATH`."""
     injector = Injector(settings.faults, settings.motion.seed)
-    ideal = replace(settings.motion, noise_mm=0.0, form_error_mm=0.0, defect_mm=0.0, tip_radius_mm=0.0)
+    quirks = Quirks.asked_for(injector)
+    if control is PrintingControl and settings.line:
+        stream(settings, OwnLines(settings.line, quirks, injector), announce, open_line=open_line_of_control)
+        return
+    ideal = replace(settings.motion, noise_mm=0.0, form_error_mm=0.0, defect_mm=0.0, tip_radius_mm=0.0, resolution_mm=0.0)
     nominal_mm = walk(settings.path_mm, ideal).points_mm
     outward = walk(settings.path_mm, replace(ideal, tip_radius_mm=1.0)).points_mm - nominal_mm
-    made = control(nominal_mm, outward, settings.motion.tip_radius_mm, Quirks.asked_for(injector), injector)
+    made = control(nominal_mm, outward, settings.motion.tip_radius_mm, quirks, injector)
     stream(settings, made, announce, open_line=open_line_of_control)
 
 

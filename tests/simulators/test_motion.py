@@ -1,5 +1,6 @@
 """The walk against closed forms of a circle and a square."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -103,3 +104,12 @@ def test_files_that_are_no_path_are_refused(tmp_path: Path, text: str) -> None:
     file.write_text(text)
     with pytest.raises(ValueError, match=r"path\.csv"):
         read_path(file)
+
+
+def test_scales_tell_whole_steps_and_nothing_else_changes() -> None:
+    fine = Motion(speed_mm_s=10.0, rate_hz=100.0, noise_mm=0.01, rotation_deg=30.0)
+    read = walk(CIRCLE_MM, replace(fine, resolution_mm=0.005)).points_mm
+    np.testing.assert_allclose(read / 0.005, np.round(read / 0.005), atol=1e-9)
+    assert 0.002 < np.abs(read - walk(CIRCLE_MM, fine).points_mm).max() <= 0.0025 + 1e-12
+    with pytest.raises(ValueError, match="a resolution of -1 mm"):
+        replace(fine, resolution_mm=-1)

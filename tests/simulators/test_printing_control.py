@@ -1,8 +1,9 @@
 """What a simulated machine tool prints, byte for byte as the transcripts of the language say."""
 
 import numpy as np
+import pytest
 
-from simulators.devices.machine_tool import InspectingControl, PrintingControl, Quirks, bare, dprnt, short
+from simulators.devices.machine_tool import InspectingControl, OwnLines, PrintingControl, Quirks, bare, dprnt, short
 from simulators.faults import Fault, Injector
 from simulators.stream import Sample
 from tests.drivers.codecs.g800_transcript import INCHES, POINTS, RADIUS_MM
@@ -43,3 +44,15 @@ def test_every_quirk_shows_in_the_bytes() -> None:
     with_parity = control(Quirks(parity=True)).closing(1)
     assert all(byte.bit_count() % 2 == 0 for byte in with_parity)
     assert bytes(byte & 0x7F for byte in with_parity) == b"END\x14\r\n"
+
+
+def test_a_camera_sends_the_lines_that_it_was_told() -> None:
+    made = OwnLines("{number:04d};{x:+.3f};{y:.2f}", Quirks(), Injector([], 0))
+    assert made.opening(1) + made.frame(SAMPLES[:1]) + made.closing(1) == b"0001;-10.635;12.80\r\nEND\r\n"
+    assert OwnLines("{z}", Quirks(), Injector([Fault.parse("no-contact:1")], 0)).frame(SAMPLES[:1]) == b""
+
+
+@pytest.mark.parametrize("line", ["{a}", "{}", "{x.real.y}", "{x:q}", "{x", "\u00b5{x}"])
+def test_a_line_that_cannot_be_filled_in_is_refused(line: str) -> None:
+    with pytest.raises(ValueError, match="expected ASCII with the fields number, x, y and z"):
+        OwnLines(line, Quirks(), Injector([], 0))

@@ -15,15 +15,28 @@ def path(tmp_path: Path) -> str:
 
 def test_every_option_arrives_where_it_belongs(path: str) -> None:
     motion = ["--rate", "500", "--speed", "20", "--count", "7", "--open", "--backward", "--seed", "3", "--start-mm", "9"]
-    part = ["--noise-mm", "0.01", "--defect-mm", "0.2", "--rotation-deg", "30", "--translation-mm", "1", "2", "3"]
-    found = settings_from(["--address", "pty", "--path", path, *motion, *part, "--fault", "gap:5@3", "--unpaced"])
+    part = [
+        "--noise-mm",
+        "0.01",
+        "--resolution-mm",
+        "0.001",
+        "--defect-mm",
+        "0.2",
+        "--rotation-deg",
+        "30",
+        "--translation-mm",
+        "1",
+        "2",
+        "3",
+    ]
+    found = settings_from(["--address", "pty", "--path", path, *motion, *part, "--fault", "gap:5@3", "--unpaced", "--line", "{x}"])
     assert isinstance(found, SimulatorSettings)
-    assert (found.address, found.paced, found.faults) == ("pty", False, (Fault("gap", 5.0, 3),))
+    assert (found.address, found.paced, found.faults, found.line) == ("pty", False, (Fault("gap", 5.0, 3),), "{x}")
     np.testing.assert_array_equal(found.path_mm, [[0, 0], [10, 0]])
     taken = found.motion
     assert (taken.rate_hz, taken.speed_mm_s, taken.count, taken.closed, taken.backward, taken.seed) == (500.0, 20.0, 7, False, True, 3)
     assert (taken.start_mm, taken.noise_mm, taken.defect_mm, taken.rotation_deg) == (9.0, 0.01, 0.2, 30.0)
-    assert taken.translation_mm == (1.0, 2.0, 3.0)
+    assert (taken.translation_mm, taken.resolution_mm) == ((1.0, 2.0, 3.0), 0.001)
 
 
 @pytest.mark.parametrize(
