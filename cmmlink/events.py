@@ -52,7 +52,12 @@ class Counts:
 
 @dataclass(frozen=True, slots=True)
 class RunStarted:
-    """A run begins. `simulated` says that no real device is measured; `notes` are what was assumed about nominal and points."""
+    """A run begins.
+
+    simulated     : no real device is measured
+    notes         : what was assumed about nominal and points
+    qualification : the last one of the installation, as results name it; None where none was made
+    """
 
     part: str
     serial_number: str
@@ -60,6 +65,7 @@ class RunStarted:
     device: str
     simulated: bool
     notes: tuple[str, ...] = ()
+    qualification: Mapping[str, Any] | None = None
 
     @classmethod
     def from_header(cls, header: Mapping[str, Any]) -> "RunStarted":

@@ -13,6 +13,7 @@ import numpy as np
 from cmmlink.characteristics import Builder, base_of, known_pose, pose_of
 from cmmlink.errors import PlanError
 from cmmlink.events import RunStarted
+from cmmlink.last_qualification import qualification_here
 from cmmlink.line_sample import check_sample
 from cmmlink.nominal_files import NominalFile, load_nominal, material_side
 from cmmlink.plan import CtPlan, Discretisation, LinesDevice, Nominal, Plan, Section, place_of
@@ -291,6 +292,8 @@ def _fitting(plan: Plan) -> _Fitting:
 
 
 def run_started(plan: Plan | CtPlan, device: str, simulated: bool, notes: tuple[str, ...] = ()) -> RunStarted:
-    """The event that begins a run of a plan."""
+    """The event that begins a run of a plan. What is to be warned of about the qualification of the installation stands in its notes."""
     operator = plan.operator if isinstance(plan, Plan) else None
-    return RunStarted(plan.part.name, plan.part.serial_number or "", operator or "", device, simulated, notes)
+    qualification, warning = qualification_here()
+    told = tuple(dict.fromkeys([*notes, warning])) if warning else notes
+    return RunStarted(plan.part.name, plan.part.serial_number or "", operator or "", device, simulated, told, qualification)

@@ -16,6 +16,16 @@ class JsonObject(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
 
+class QualificationNamed(JsonObject):
+    """The last qualification of the installation (`cmmlink qualify`), as it was when the part was measured."""
+
+    date: str = Field(description="when it was made, in UTC")
+    result: Literal["passed", "failed"] = Field(description="what came of it")
+    certificate_sha256: str = Field(description="the hash of what its certificate says")
+    same_installation: bool = Field(description="whether the installation was still as it was then, to the bit")
+    words: str = Field(description="the same as a sentence, with what changed since")
+
+
 class Worst(JsonObject):
     """The point farthest from the middle of the tolerance zone."""
 

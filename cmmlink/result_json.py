@@ -114,6 +114,7 @@ def identity_json(started: RunStarted) -> dict[str, Any]:
         "operator": started.operator or None,
         "device": started.device,
         "simulated": started.simulated,
+        "qualification": None if started.qualification is None else dict(started.qualification),
         "notes": list(started.notes),
     }
 

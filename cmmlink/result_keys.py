@@ -9,7 +9,18 @@ from typing import Any, Literal
 from pydantic import ConfigDict, Field
 
 from cmmlink.events import Ending
-from cmmlink.inspection_keys import Characterised, JsonObject, LargestGap, OutStretch, Registered, Uncertainty, VerdictReason, Worst, Zone
+from cmmlink.inspection_keys import (
+    Characterised,
+    JsonObject,
+    LargestGap,
+    OutStretch,
+    QualificationNamed,
+    Registered,
+    Uncertainty,
+    VerdictReason,
+    Worst,
+    Zone,
+)
 from cmmlink.record_keys import JudgedAgain, JudgementKept, RunOrigin
 from cmmlink.version import ResultSchema
 from cmmlink.words import VerdictName
@@ -68,6 +79,7 @@ class Measured(Inspected):
     operator: str | None = Field(description="who measured")
     device: str = Field(description="the device or file that the points came from")
     simulated: bool = Field(description="whether the device was a simulated one: no real part was measured")
+    qualification: QualificationNamed | None = Field(description="the last qualification of the installation; null where none was made")
     notes: list[str] = Field(description="what was assumed about the nominal and the points: unit, columns, gaps, rows left out, density")
 
 
@@ -190,6 +202,7 @@ class StackInspected(JsonObject):
     out_of_tolerance: int = Field(description="the sum over the sections")
     slices: list[SectionInspected] = Field(description="the sections in the order of the plan")
     characteristics: list[StackCharacterised] = Field(description="every characteristic of the stack, in the order of the plan")
+    qualification: QualificationNamed | None = Field(description="the last qualification of the installation; null where none was made")
     notes: list[str] = Field(description="what holds for all sections")
 
 
@@ -311,6 +324,9 @@ class Shown(JsonObject):
     plan_file: str | None = Field(default=None, description="the name of the plan's file; records of earlier versions have none")
     device: str = Field(description="the device that the points came from")
     simulated: bool = Field(description="whether the device was a simulated one")
+    qualification: QualificationNamed | None = Field(
+        default=None, description="the last qualification of the installation; null where none was made, and in records of earlier versions"
+    )
     notes: list[str] = Field(
         default=[], description="what was assumed about the nominal and the points; records of earlier versions have none"
     )

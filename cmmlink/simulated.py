@@ -1,4 +1,4 @@
-"""The demonstration's simulated device: a process of its own that walks along the nominal with form error, noise and a pose."""
+"""Simulated devices as processes of their own; that of the demonstration walks along the nominal with form error, noise and a pose."""
 
 import subprocess
 import sys
@@ -26,7 +26,7 @@ def connect_demo_device(plan: Plan, profile: NominalProfile, seed: int, defect: 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "path.csv"
         write_part_path(profile.curve, path)
-        with _simulator("serial", ["--path", str(path), *_motion(plan, profile, seed, defect)]) as address:
+        with simulated_device("serial", ["--path", str(path), *_motion(plan, profile, seed, defect)]) as address:
             plan = plan.with_address(address)
             yield Connected(source_of(plan), words_of(plan.device), simulated=True)
 
@@ -52,7 +52,7 @@ def _motion(plan: Plan, profile: NominalProfile, seed: int, defect: tuple[float,
 
 
 @contextmanager
-def _simulator(device: str, arguments: Sequence[str]) -> Iterator[str]:
+def simulated_device(device: str, arguments: Sequence[str]) -> Iterator[str]:
     """Run a simulated device as a process of its own and yield the address that it serves."""
     address = "127.0.0.1:0" if sys.platform == "win32" else "pty"
     command = [

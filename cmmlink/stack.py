@@ -6,7 +6,7 @@ Contours beside it are counted and reported, never judged.
 
 import logging
 import threading
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from datetime import datetime
@@ -22,6 +22,7 @@ from cmmlink.from_plan import (
     notes_on_temperature,
     run_started,
 )
+from cmmlink.last_qualification import qualification_here
 from cmmlink.outline import outline_of
 from cmmlink.pipeline import RunOutcome
 from cmmlink.plan import CtPlan, Plan
@@ -131,6 +132,11 @@ class StackOutcome:
         return len(self.sections) == self.asked and all(section.run.ending == "complete" for section in self.sections)
 
     @property
+    def qualification(self) -> Mapping[str, Any] | None:
+        """The last qualification of the installation, as every section of the stack names it."""
+        return self.sections[0].started.qualification if self.sections else None
+
+    @property
     def ending(self) -> Ending:
         """How the inspection of the whole stack ended."""
         return "complete" if self.complete else "aborted"
@@ -162,6 +168,7 @@ class StackOutcome:
             **{key: sum(section[key] for section in slices) for key in ("received", "judged", "rejected", "lost", "out_of_tolerance")},
             "slices": slices,
             "characteristics": [stack_characteristic_json(one) for one in self.characteristics],
+            "qualification": self.qualification,
             "notes": list(self.notes),
         }
 
@@ -213,6 +220,7 @@ def inspect_stack(
         foresight.expect(len(heights), len(plan.characteristics) + max(numbers))
         read_in = [f"{plan.mesh.file.name}: read in {plan.mesh.unit}, as asked"] if plan.mesh.unit else []
         notes = [*read_in, *mesh.warnings, *profiles.notes, *notes_on_temperature(plan), *notes_on_zone(plan)]
+        notes += [warning for _, warning in [qualification_here()] if warning]
         sections: list[SectionOutcome] = []
         slices: Iterator[SurfaceSection] = opened.enter_context(closing(_slices(plan, mesh, heights, open3d, notes, profiles.shortest_mm)))
         if plan.stack_fit == "common":

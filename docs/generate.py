@@ -20,6 +20,8 @@ from cmmlink.exports import tables
 from cmmlink.plan.reference import Group, groups_of, table
 from cmmlink.plan.scan import Plan
 from cmmlink.plan.surface import CtPlan
+from cmmlink.qualification import QUANTITIES
+from cmmlink.qualification_keys import Qualified
 from cmmlink.record import evidence, export
 from cmmlink.record_keys import RecordsCopied
 from cmmlink.report import stack_folder
@@ -157,6 +159,7 @@ OBJECTS: tuple[tuple[str, type[BaseModel], type[BaseModel] | None], ...] = (
     ("`compare`", Compared, None),
     ("`verify`", Verified, None),
     ("`verify-zone`", ZonesVerified, None),
+    ("`qualify`, and its certificate", Qualified, None),
     ("`backup`, `restore` and `merge`", RecordsCopied, None),
 )
 
@@ -262,6 +265,17 @@ def _register_map() -> str:
     return "\n".join([page(REGISTER_MAP, RegisterMap), named("The four patterns", PATTERNS), *fields])
 
 
+def qualification() -> str:
+    """The page with the table of limits written anew."""
+    head, _, rest = (DOCS / "qualification.md").read_text(encoding="utf-8").partition("| --- |\n")
+    _, _, tail = rest.partition("\n\n")
+    rows = [
+        f"| {one.kind} | {one.name} | {one.limit:g}{' ' * bool(one.limit)}{one.unit * bool(one.limit)} | {one.reason} |"
+        for one in QUANTITIES
+    ]
+    return f"{head}| --- |\n" + "\n".join(rows) + f"\n\n{tail}"
+
+
 def gallery() -> str:
     """Every example with its docstring as the text, and its code; a test runs each and holds it to what it says that it prints."""
     scripts = sorted([*EXAMPLES.glob("[0-9]*.py"), *EXAMPLES.glob("[0-9]*/*.py")], key=lambda script: script.relative_to(EXAMPLES).parts)
@@ -297,6 +311,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "result.schema.json": result_schema,
     "python.md": front_doors,
     "gallery.md": gallery,
+    "qualification.md": qualification,
 }
 
 if __name__ == "__main__":

@@ -23,6 +23,7 @@ from cmmlink.commands.measure import demo, run
 from cmmlink.commands.plans import example, plan
 from cmmlink.commands.point_files import inspect
 from cmmlink.commands.proofs import verify_zone
+from cmmlink.commands.qualification import qualify
 from cmmlink.commands.records import replay, runs, show, verify
 from cmmlink.commands.reference_set import reference
 from cmmlink.commands.registers import registers
@@ -54,6 +55,7 @@ app.command()(check)
 app.command("console", short_help="Serve the operator console in a browser.")(serve_console)
 app.command(short_help="Compile the inspection, once after an installation.")(prepare)
 app.command(short_help="Look at what cmmlink needs of this computer.")(doctor)
+app.command(short_help="Judge parts whose truth is known, and write a certificate.")(qualify)
 app.command("ports")(list_ports)
 app.command(short_help="Show what a Modbus device's registers hold, and write a register map.")(registers)
 app.command(add_help_option=False, context_settings={"allow_extra_args": True, "ignore_unknown_options": True})(simulate)

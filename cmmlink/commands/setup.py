@@ -172,10 +172,24 @@ def _look_after_all(say: Callable[[str], None], records: Path | None) -> int:
     say(f"records: {folder}" + ("" if writable else f" cannot be written: choose another folder with --records ({nearest})"))
     if writable:
         say(f"records in {words_of_room(folder)}")
+    say(f"qualification: {_words_on_qualification()}")
     say(f"serial ports: {', '.join(name for name, _ in serial_ports()) or 'none found'}")
     say(words_on_kernel())
     whole = look_after_open3d(say)
     return 0 if whole and writable else UNUSABLE
+
+
+def _words_on_qualification() -> str:
+    """What came of the last qualification, and whether it still holds: of every file of the installation, which is read anew."""
+    from cmmlink.installation import read_installation, station_folder
+    from cmmlink.last_qualification import last_qualification
+
+    last = last_qualification(station_folder())
+    if last is None:
+        return "none was made; `cmmlink qualify` makes one in about a minute"
+    changes = last.changes(read_installation(station_folder()))
+    anew = "; `cmmlink qualify` makes a new one" if last.warning(changes) else ""
+    return f"{last.words(changes)} (certificate {last.certificate}){anew}"
 
 
 def list_ports() -> int:

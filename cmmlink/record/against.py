@@ -71,6 +71,7 @@ def _expected(recorded: RecordedRun) -> dict[str, Any]:
     told: dict[str, Any] = dict(recorded.result or {})
     told |= {key: header[key] for key in ("part", "device", "simulated", "software")}
     told |= {key: header[key] or None for key in ("serial_number", "operator")}
+    told |= {key: header[key] for key in ("qualification",) if key in header}  # which earlier versions did not name
     told["ending"] = end["state"]
     told["plan_sha256"] = hashlib.sha256(recorded.plan.encode()).hexdigest()
     told["nominal_sha256"] = hashlib.sha256(recorded.nominal).hexdigest()

@@ -51,6 +51,7 @@ class Header(_Document):
     device: str
     simulated: bool
     notes: list[str] = []
+    qualification: dict[str, Any] | None = None
     software: dict[str, str | None]
     nominal: str
     plan_file: str = ""

@@ -6,6 +6,7 @@ Pictures are drawn by matplotlib, which is loaded when the first one is.
 TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer to load than all of this
 
 if TYPE_CHECKING:
+    from cmmlink.report.certificate_pdf import write_certificate
     from cmmlink.report.comparison_picture import write_comparison_picture
     from cmmlink.report.curves_picture import write_curves_picture
     from cmmlink.report.folder import prepare, write_results, write_run
@@ -28,6 +29,7 @@ else:
     from cmmlink.front_door import load_on_use
 
     _PLACES = {
+        "cmmlink.report.certificate_pdf": ("write_certificate",),
         "cmmlink.report.comparison_picture": ("write_comparison_picture",),
         "cmmlink.report.folder": ("prepare", "write_results", "write_run"),
         "cmmlink.report.judged_scan": ("JudgedScan", "scan_of", "scan_on_record"),
@@ -73,6 +75,7 @@ __all__ = [
     "stack_on_record",
     "text_picture",
     "with_settings",
+    "write_certificate",
     "write_comparison_picture",
     "write_curves_picture",
     "write_nominal_picture",

@@ -185,11 +185,21 @@ def _conditions(report: ReportInput, say: Speech) -> Iterator[tuple[str, str]]:
     for reason, count in document["rejected_by_reason"].items():
         yield say("Rejected"), f"{count}: {say.sentence(reason)}"
     yield say("Measured at"), moment_words(document.get("measured_at")) or ""
+    yield say("Qualification"), qualification_words(document, say)
     yield say("Software"), ", ".join(f"{name} {version}" for name, version in sorted((document.get("software") or {}).items()) if version)
     for name, key in (("Record (SHA-256)", "chain_sha256"), ("Plan (SHA-256)", "plan_sha256"), ("Nominal (SHA-256)", "nominal_sha256")):
         yield say(name), document.get(key) or ""
     if say.language != "en":
         yield say("Language"), say("Sentences of the inspection that are not translated stand as the record has them.")
+
+
+def qualification_words(document: Mapping[str, Any], say: Speech) -> str:
+    """The last qualification of the installation when the part was measured, and the certificate that tells more."""
+    named = document.get("qualification")
+    if named is None:
+        return say("none was made") if "qualification" in document else ""
+    words = say.sentence(named["words"])
+    return say("{words}; certificate {sha256}", words=words, sha256=named["certificate_sha256"])
 
 
 def _pose_words(pose: Mapping[str, Any], say: Speech) -> str:

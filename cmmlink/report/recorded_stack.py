@@ -55,6 +55,7 @@ def stack_on_record(store: Store, runs: Sequence[str]) -> StackInput:
         "measured_at": utc_words(datetime.fromisoformat(recorded[0].header["started"])),
         "run": runs_words([one.run for one in recorded]),
         "software": recorded[0].header["software"],
+        **{key: recorded[0].header[key] for key in ("qualification",) if key in recorded[0].header},
     }
     return StackInput(plan, document, sheets, asked, (*shared, *told), of_stack)
 

@@ -102,7 +102,7 @@ def input_of_stack(stack: StackOutcome, plan: CtPlan) -> StackInput:
     found = stack.result_json()
     evidence = [section.evidence for section in stack.sections if section.evidence]
     document = {
-        **{name: found[name] for name in ("verdict", "ending", "measured_at")},
+        **{name: found[name] for name in ("verdict", "ending", "measured_at", "qualification")},
         "run": runs_words([one.run for one in evidence]),
         "software": dict(evidence[0].software) if evidence else None,
     }

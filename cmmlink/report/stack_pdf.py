@@ -9,7 +9,7 @@ from reportlab.platypus import Flowable, PageBreak, Spacer
 
 from cmmlink.plan import CtPlan
 from cmmlink.report.first_page import drawings, facts_table, identity_block, verdict_block
-from cmmlink.report.further_pages import SHAPES, characteristics_part
+from cmmlink.report.further_pages import SHAPES, characteristics_part, qualification_words
 from cmmlink.report.page_parts import NUMBER, SMALL, TITLE, Sign, grid, headed, text
 from cmmlink.report.pdf import build_pages
 from cmmlink.report.pdf_figure import DrawnFigure
@@ -111,9 +111,12 @@ def _signs(found: Mapping[str, Any], names: list[str]) -> Iterator[Any]:
 
 
 def _notes(stack: StackInput, say: Speech, width: float) -> Iterator[Flowable]:
-    if stack.notes:
+    told = [(say("Assumed"), note) for note in stack.notes]
+    if qualified := qualification_words(stack.document, say):
+        told.append((say("Qualification"), qualified))
+    if told:
         yield text(say("Conditions"), TITLE)
-        yield grid([[text(say("Assumed"), SMALL), text(note)] for note in stack.notes], [110, width - 110], head=0)
+        yield grid([[text(name, SMALL), text(words)] for name, words in told], [110, width - 110], head=0)
 
 
 def _section_pages(stack: StackInput, say: Speech, width: float) -> Iterator[Flowable]:

@@ -95,7 +95,7 @@ def test_a_summary_is_strict_json_also_when_nothing_was_judged(profile: NominalP
 def test_the_identity_of_a_run_stands_beside_its_numbers() -> None:
     facts = identity_json(RunStarted("blade", "0012", "", "serial COM3", True, ("decimal commas",)))
     identity = {"part": "blade", "serial_number": "0012", "operator": None, "device": "serial COM3", "simulated": True}
-    assert facts == identity | {"notes": ["decimal commas"]}
+    assert facts == identity | {"qualification": None, "notes": ["decimal commas"]}
     assert not set(facts) & (set(PROMISED) | FURTHER)
 
 
