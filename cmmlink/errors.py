@@ -5,6 +5,7 @@ YamlError     a YAML text is not what its reader expects; it knows the line, its
 StoreError    the record of a run could not be kept or read
   StationBusyError another process records at this station just now
 RunError      no such run is recorded
+AnswerError   the machine that asked for a verdict cannot be told it
 
 A message says what, where (file, line, key), what was found and what is allowed.
 """
@@ -28,3 +29,7 @@ class StationBusyError(StoreError):
 
 class RunError(ValueError):
     """No such run is recorded."""
+
+
+class AnswerError(Exception):
+    """The machine that asked for a verdict cannot be told it."""

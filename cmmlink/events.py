@@ -3,11 +3,13 @@
 `RunStarted` comes first and `RunFinished` last; between them every arrival from the source, and after points their verdicts.
 Once it is proven in mid-scan that the part will fail, `ProvenOut` says so; a run that somebody looks at tells its characteristics so
 far by `Evaluated`. When these come depends on how busy the machine is.
+Where a machine tool waits for the verdict, `Answered` says behind the end of the run whether it was told.
 A sink is any function that takes an event; it is called in the thread of the run and may stop the run by raising.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
+from datetime import datetime
 from typing import TYPE_CHECKING, Any, Literal
 
 from drivers import Arrival
@@ -122,5 +124,18 @@ class RunFinished:
     message: str
 
 
-Event = RunStarted | Arrived | Judged | ProvenOut | Evaluated | RunFinished
+@dataclass(frozen=True, slots=True)
+class Answered:
+    """Whether a machine was told the verdict that it asked for, when, and why not; or that an earlier answer still stands as a run begins.
+
+    request : the number of its request; None where it told none
+    """
+
+    state: Literal["sent", "not sent", "not withdrawn"]
+    request: int | None
+    at: datetime
+    problem: str
+
+
+Event = RunStarted | Arrived | Judged | ProvenOut | Evaluated | RunFinished | Answered
 Sink = Callable[[Event], None]

@@ -68,6 +68,15 @@ class Inspected(JsonObject):
     damaged_bytes: int = Field(description="the bytes on the wire that were no valid frame")
 
 
+class MachineTold(JsonObject):
+    """Whether the machine was told the verdict that it asked for."""
+
+    request: int | None = Field(description="the number of its request; null where it told none")
+    sent: bool = Field(description="whether the answer stands in its file, read back; it changes no verdict")
+    at: str = Field(description="when it was sent, or could not be, in UTC")
+    problem: str | None = Field(description="why it was not sent; null where it was")
+
+
 class Measured(Inspected):
     """The result of a run that was not recorded (`--no-record`): also how the run ended, what was measured, by whom and with what."""
 
@@ -81,6 +90,7 @@ class Measured(Inspected):
     simulated: bool = Field(description="whether the device was a simulated one: no real part was measured")
     qualification: QualificationNamed | None = Field(description="the last qualification of the installation; null where none was made")
     notes: list[str] = Field(description="what was assumed about the nominal and the points: unit, columns, gaps, rows left out, density")
+    answer: MachineTold | None = Field(default=None, description="the answer to the machine, where the plan names a file for it (`answer`)")
 
 
 class Recorded(Measured):

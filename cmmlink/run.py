@@ -1,7 +1,8 @@
 """One run of a plan, from a device made ready to a finished run with its record: the same for command line, page and files.
 
 The walk: compile what the inspection needs, open the record, hand the device's source to the pipeline, keep what ties the
-result to the record. Nothing is printed, shown or written but the record; whoever wants to follow the run gives sinks.
+result to the record, tell the machine that asked for the verdict. Nothing else is printed, shown or written; whoever wants to follow the
+run gives sinks.
 """
 
 import logging
@@ -13,12 +14,13 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from cmmlink.answer import MachineAnswer
 from cmmlink.characteristics import notes_on_zone
 from cmmlink.devices import Connected
-from cmmlink.events import RunStarted, Sink
+from cmmlink.events import Answered, Event, RunStarted, Sink
 from cmmlink.from_plan import inspection_of, notes_on_datum, notes_on_nominal, notes_on_temperature, run_started, with_section, zone_of
 from cmmlink.pipeline import RunOutcome, run_inspection
-from cmmlink.plan import FileDevice, Plan
+from cmmlink.plan import FileDevice, LinesDevice, Plan
 from cmmlink.record import PATIENCE_S, QUEUE_BYTES, Recorder, RecordReference, RunInputs, open_to_record
 from cmmlink.result_folder import folder_of
 from cmmlink.result_json import density_notes, density_of, result_json, run_document, stations_of
@@ -35,7 +37,8 @@ _log = logging.getLogger(__name__)
 class FinishedRun:
     """A run that is over: what was measured, against what, and what came of it. `evidence` is None where nothing was recorded.
 
-    began : date and time of day, with its zone
+    began  : date and time of day, with its zone
+    answer : whether the machine was told the verdict; None where it asks for none
     """
 
     plan: Plan
@@ -44,6 +47,7 @@ class FinishedRun:
     outcome: RunOutcome
     evidence: RecordReference | None
     began: datetime
+    answer: Answered | None = None
 
     def __repr__(self) -> str:
         found = "no result" if self.outcome.result is None else repr(self.outcome.result)
@@ -84,7 +88,8 @@ class FinishedRun:
         """The run as `--json` and result.json hold it."""
         evidence = asdict(self.evidence) if self.evidence else {}
         found = result_json(self.outcome.result, self.outcome.counts)
-        return run_document(found, self.started, self.notes, self.outcome.ending, utc_words(self.began), evidence)
+        document = run_document(found, self.started, self.notes, self.outcome.ending, utc_words(self.began), evidence)
+        return document if self.answer is None else {**document, "answer": _answer_json(self.answer)}
 
     def folder_of(self, pattern: Path) -> Path:
         """The folder of this run's results, its placeholders filled in; without a record the run is named by when it began."""
@@ -136,7 +141,8 @@ def carry_out(
             queue_bytes = QUEUE_BYTES if followed else _FILE_BYTES
             recorder = stack.enter_context(Recorder(store, RunInputs.of(plan), clock=clock, now=now, queue_bytes=queue_bytes))
         began = recorder.began if recorder else now()
-        listeners: list[Sink] = [*([recorder] if recorder else []), *sinks, log_event]
+        answer = _answer_of(plan, [*sinks, log_event], now)
+        listeners: list[Sink] = [*([recorder] if recorder else []), *sinks, log_event, *([answer] if answer else [])]
         outcome = run_inspection(
             device.source,
             live,
@@ -153,7 +159,29 @@ def carry_out(
     evidence = recorder.evidence if recorder else None
     if evidence is not None:
         _log.info("recorded in %s as run %s, chain %s, plan %s", records, evidence.run, evidence.chain_sha256, evidence.plan_sha256)
-    return FinishedRun(plan, profile, started, outcome, evidence, began)
+    answered = answer.deliver(outcome, evidence.run if evidence else "") if answer else None
+    return FinishedRun(plan, profile, started, outcome, evidence, began, answered)
+
+
+def _answer_of(plan: Plan, followers: Sequence[Sink], now: Callable[[], datetime]) -> MachineAnswer | None:
+    """What tells the machine the verdict; None where the plan names no file for it."""
+
+    def tell(event: Event) -> None:
+        for follower in followers:
+            follower(event)
+
+    if plan.answer is None or not isinstance(plan.device, LinesDevice):
+        return None
+    return MachineAnswer(plan.answer, plan.device.unit, tell, now)
+
+
+def _answer_json(answer: Answered) -> dict[str, Any]:
+    return {
+        "request": answer.request,
+        "sent": answer.state == "sent",
+        "at": utc_words(answer.at),
+        "problem": answer.problem or None,
+    }
 
 
 def _notes_on_end(plan: Plan) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 import logging
 
-from cmmlink.events import Arrived, Event, RunFinished, RunStarted
+from cmmlink.events import Answered, Arrived, Event, RunFinished, RunStarted
 from drivers import LinkDown, LinkUp, ScanClosed, ScanOpened
 
 _TOLD = ScanOpened | ScanClosed | LinkDown | LinkUp  # of what arrives: a few lines a run, never one a point or a frame
@@ -17,6 +17,8 @@ def log_event(event: Event) -> None:
     elif isinstance(event, Arrived):
         if isinstance(event.arrival, _TOLD):
             _log.log(logging.WARNING if isinstance(event.arrival, LinkDown) else logging.INFO, "link: %s", event.arrival)
+    elif isinstance(event, Answered):
+        _log.log(logging.INFO if event.state == "sent" else logging.ERROR, "answer to the machine: %s", event)
     elif isinstance(event, RunFinished):
         _log.info(
             "run %s, %s: %s. %s", event.ending, event.result.verdict.word if event.result else "no result", event.counts, event.message

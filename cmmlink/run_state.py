@@ -58,6 +58,16 @@ class ZoneLimits:
 
 
 @dataclass(frozen=True, slots=True)
+class AnswerState:
+    """Whether the machine that waits for the verdict was told it: when, ms since 1970, to which of its requests, and why not."""
+
+    state: Literal["awaited", "sent", "not sent"]
+    at_ms: float | None = None
+    request: int | None = None
+    problem: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class RunState:
     """Everything that is shown of a run in numbers and words, as it was at one moment.
 
@@ -71,6 +81,7 @@ class RunState:
     expected      : number of points the device announced
     latency_s     : how long the newest judged point waited for its verdict
     verdict_at_ms : when the newest verdict was given, ms since 1970
+    answer        : null where no machine waits for the verdict
     """
 
     number: str
@@ -113,5 +124,6 @@ class RunState:
     out_of_tolerance: int
     worst: WorstPoint | None
     verdict: VerdictState
+    answer: AnswerState | None
     length_mm: float
     zone: ZoneLimits

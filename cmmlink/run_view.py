@@ -17,12 +17,12 @@ from cmmlink.arrival_rate import ArrivalRate
 from cmmlink.characteristic_rows import Characteristics, characteristics_at_end, characteristics_so_far, names_of, worst_words
 from cmmlink.characteristics import base_row
 from cmmlink.endings import Ended, count_words, reasons_of
-from cmmlink.events import Arrived, Counts, Evaluated, Event, Judged, ProvenOut, RunStarted
+from cmmlink.events import Answered, Arrived, Counts, Evaluated, Event, Judged, ProvenOut, RunStarted
 from cmmlink.extremes import DEVIATION, FOOT_X, NORMAL_X, STATION, VERDICT, ChangedBins, Extremes, PointsVersion
 from cmmlink.from_plan import zone_of
 from cmmlink.plan import Plan
 from cmmlink.result_json import density_notes, density_of, number, result_json
-from cmmlink.run_state import LinkPhase, Phase, RegistrationState, RunKind, RunState, VerdictState, WorstPoint, ZoneLimits
+from cmmlink.run_state import AnswerState, LinkPhase, Phase, RegistrationState, RunKind, RunState, VerdictState, WorstPoint, ZoneLimits
 from cmmlink.words import LOOKS_OUT, NOT_MEASURED, VERDICT_NAMES, Headline, headline_of, local_words
 from drivers import Heartbeat, LinkDown, LinkUp, PointBatch, Rejected, ScanClosed, ScanOpened
 from inspection import LiveUpdate, NominalProfile, ToleranceZone, Verdict, coverage
@@ -38,6 +38,7 @@ class RunContext:
     """What is known of a run before it begins: its number or title, its plan, and what the points are judged by.
 
     base : the place of the characteristic that fails wherever a point is proven to be out of the zone; None where none need fail
+    answers : a machine waits for the verdict
     """
 
     number: str
@@ -49,12 +50,14 @@ class RunContext:
     began: datetime
     kind: RunKind = "run"
     base: int | None = 0
+    answers: bool = False
 
     @classmethod
     def of(cls, plan: Plan, profile: NominalProfile, began: datetime, number: str, plan_name: str, kind: RunKind = "run") -> "RunContext":
         """What a plan says of a run that begins, or began, at a time of day."""
         zone, coverage_min = zone_of(plan, profile), plan.registration.coverage_min
-        return cls(number, plan_name, profile, zone, coverage_min, plan.buffer_points, began, kind, base_row(plan))
+        answers = plan.answer is not None and kind == "run"
+        return cls(number, plan_name, profile, zone, coverage_min, plan.buffer_points, began, kind, base_row(plan), answers)
 
 
 class RunView:
@@ -94,6 +97,7 @@ class RunView:
         self._ended: Ended | None = None
         self._notes: tuple[str, ...] = ()
         self._failure = self._remark = self._run = ""
+        self._answer = AnswerState("awaited") if context.answers else None
         self._published = self._state()
 
     def __call__(self, event: Event) -> None:
@@ -108,6 +112,8 @@ class RunView:
             self._take_proof(event)
         elif isinstance(event, Evaluated):
             self._take_characteristics(event)
+        elif isinstance(event, Answered):
+            self._take_answer(event)
         else:
             blocks = event.result.blocks if event.result is not None else None
             self._end(Ended(event.ending, event.message, result_json(event.result, event.counts), blocks), event.counts)
@@ -130,6 +136,8 @@ class RunView:
         covered = coverage(self._extremes.stations_mm, self.context.profile)
         with self._lock:
             self._failure, self._phase, self._link, self._coverage = message, "finished", "closed", covered
+            if self._answer is not None:
+                self._answer = AnswerState("not sent", problem="the run broke off")
             self._counts = self._counts.broken_off(self._arrived)
             self._publish()
 
@@ -262,6 +270,13 @@ class RunView:
             self._characteristics = self._characteristics_so_far()
             self._publish()
 
+    def _take_answer(self, event: Answered) -> None:
+        if event.state == "not withdrawn":
+            return  # an alarm says so; the answer to this run is still awaited
+        with self._lock:
+            self._answer = AnswerState(event.state, event.at.timestamp() * 1e3, event.request, event.problem)
+            self._publish()
+
     def _characteristics_so_far(self) -> Characteristics:
         return characteristics_so_far(self._evaluated, None if self._proven_at is None else self.context.base)
 
@@ -335,6 +350,7 @@ class RunView:
             out_of_tolerance=self._out,
             worst=_worst_point(self._extremes.worst),
             verdict=self._verdict(),
+            answer=self._answer,
             length_mm=context.profile.length_mm,
             zone=ZoneLimits(zone.lower_mm, zone.upper_mm, zone.guard_mm, zone.decision_rule),
         )

@@ -32,11 +32,15 @@ class WireBytes:
 
 @dataclass(frozen=True, slots=True)
 class ScanOpened:
-    """The device opened a scan. `expected` is its announced number of points, if it announces one."""
+    """The device opened a scan. `expected` is its announced number of points, if it announces one.
+
+    request : the number by which the device asks for a verdict on this scan, if it told one
+    """
 
     device: str
     serial_number: str
     expected: int | None
+    request: int | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

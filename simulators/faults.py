@@ -14,17 +14,20 @@ from typing import Literal
 import numpy as np
 
 Only = Literal["", "registers", "dme", "lines"]
-"""The one kind of devices that a fault can strike: Modbus registers, measuring machines, machine tools; nothing where it strikes others."""
+"""A kind of devices that some faults strike alone: Modbus registers, measuring machines, machine tools; nothing for all others."""
 
 
 @dataclass(frozen=True, slots=True)
 class FaultKind:
-    """One entry of the catalogue: what the value means and what it is if not given; `once` acts at its point only."""
+    """One entry of the catalogue: what the value means and what it is if not given; `once` acts at its point only.
+
+    only : the kinds of devices that it can strike; empty: all
+    """
 
     meaning: str
     default: float
     once: bool = False
-    only: Only = ""
+    only: tuple[Only, ...] = ()
 
 
 CATALOGUE: Mapping[str, FaultKind] = MappingProxyType(
@@ -42,30 +45,30 @@ CATALOGUE: Mapping[str, FaultKind] = MappingProxyType(
         "silence": FaultKind("seconds without any byte", math.inf, once=True),
         "unplug": FaultKind("seconds for which the line is gone", 0.5, once=True),
         "restart": FaultKind("seconds for which the device is gone before it begins its scan anew", 0.5, once=True),
-        "slow": FaultKind("seconds that each Modbus answer takes from then on", 0.3, only="registers"),
-        "word-swap": FaultKind("1: the halves of 32-bit numbers in Modbus registers come swapped", 1, only="registers"),
-        "sentinel": FaultKind("share of points whose registers hold the value for none", 0.01, only="registers"),
-        "overflow": FaultKind("number of points that a full Modbus buffer costs; its flag stays set", 20, once=True, only="registers"),
-        "torn-line": FaultKind("largest number of bytes that the network carries in one piece", 7, only="dme"),
-        "split-points": FaultKind("share of I++ lines whose last point goes on in the next line", 0.1, only="dme"),
-        "wrong-tag": FaultKind("share of I++ data lines under the tag of another command", 0.01, only="dme"),
-        "lone-lf": FaultKind("share of I++ data lines that end with line feed alone", 0.01, only="dme"),
-        "early-data": FaultKind("1: data of an I++ scan come before its acknowledgement", 1, once=True, only="dme"),
-        "no-complete": FaultKind("1: the I++ server does not say that its scan is complete", 1, once=True, only="dme"),
-        "jog-key": FaultKind("1: somebody presses a key of the jog box while the machine scans", 1, once=True, only="dme"),
-        "emergency-stop": FaultKind("1: somebody presses the emergency stop while the machine scans", 1, once=True, only="dme"),
-        "tool-change": FaultKind("1: somebody changes the tool by hand while the machine scans", 1, once=True, only="dme"),
-        "no-surface": FaultKind("1: the probe of the machine finds no surface any more", 1, once=True, only="dme"),
-        "cut-line": FaultKind("1: the link is cut in the middle of an I++ line", 1, once=True, only="dme"),
-        "bare-cause": FaultKind("1: the causes of I++ errors come without quotes", 1, only="dme"),
-        "not-homed": FaultKind("1: the machine does not know where it is before it is sent home", 1, only="dme"),
-        "no-contact": FaultKind("share of nominal points that the probe of a machine tool does not touch", 0.01, only="lines"),
-        "mislabelled": FaultKind("share of nominal points that a machine tool labels as measured", 0.01, only="lines"),
-        "old-set": FaultKind("1: the results of another part stand before those of this one", 1, only="lines"),
-        "no-end": FaultKind("1: the machine tool does not print the end of its results", 1, only="lines"),
-        "cr-only": FaultKind("1: lines end with carriage return alone", 1, only="lines"),
-        "inch": FaultKind("1: the control measures in inches", 1, only="lines"),
-        "parity": FaultKind("1: every byte carries its even parity as its eighth bit, as a line of seven data bits does", 1, only="lines"),
+        "slow": FaultKind("seconds that each Modbus answer takes from then on", 0.3, only=("registers",)),
+        "word-swap": FaultKind("1: the halves of 32-bit numbers in Modbus registers come swapped", 1, only=("registers",)),
+        "sentinel": FaultKind("share of points whose registers hold the value for none", 0.01, only=("registers",)),
+        "overflow": FaultKind("number of points that a full Modbus buffer costs; its flag stays set", 20, once=True, only=("registers",)),
+        "torn-line": FaultKind("largest number of bytes that the network carries in one piece", 7, only=("dme",)),
+        "split-points": FaultKind("share of I++ lines whose last point goes on in the next line", 0.1, only=("dme",)),
+        "wrong-tag": FaultKind("share of I++ data lines under the tag of another command", 0.01, only=("dme",)),
+        "lone-lf": FaultKind("share of I++ data lines that end with line feed alone", 0.01, only=("dme",)),
+        "early-data": FaultKind("1: data of an I++ scan come before its acknowledgement", 1, once=True, only=("dme",)),
+        "no-complete": FaultKind("1: the I++ server does not say that its scan is complete", 1, once=True, only=("dme",)),
+        "jog-key": FaultKind("1: somebody presses a key of the jog box while the machine scans", 1, once=True, only=("dme",)),
+        "emergency-stop": FaultKind("1: somebody presses the emergency stop while the machine scans", 1, once=True, only=("dme", "lines")),
+        "tool-change": FaultKind("1: somebody changes the tool by hand while the machine scans", 1, once=True, only=("dme", "lines")),
+        "no-surface": FaultKind("1: the probe of the machine finds no surface any more", 1, once=True, only=("dme",)),
+        "cut-line": FaultKind("1: the link is cut in the middle of an I++ line", 1, once=True, only=("dme",)),
+        "bare-cause": FaultKind("1: the causes of I++ errors come without quotes", 1, only=("dme",)),
+        "not-homed": FaultKind("1: the machine does not know where it is before it is sent home", 1, only=("dme",)),
+        "no-contact": FaultKind("share of nominal points that the probe of a machine tool does not touch", 0.01, only=("lines",)),
+        "mislabelled": FaultKind("share of nominal points that a machine tool labels as measured", 0.01, only=("lines",)),
+        "old-set": FaultKind("1: the results of another part stand before those of this one", 1, only=("lines",)),
+        "no-end": FaultKind("1: the machine tool does not print the end of its results", 1, only=("lines",)),
+        "cr-only": FaultKind("1: lines end with carriage return alone", 1, only=("lines",)),
+        "inch": FaultKind("1: the control measures in inches", 1, only=("lines",)),
+        "parity": FaultKind("1: every byte carries its even parity as its eighth bit, as on a line of seven data bits", 1, only=("lines",)),
         "die": FaultKind("exit status with which the device ends at once", 9, once=True),
     }
 )
@@ -101,11 +104,11 @@ class Fault:
 
 def refuse_others(faults: Sequence[Fault], kind: Only) -> None:
     """Raise ValueError for a fault that cannot strike a device of this kind."""
-    names = {"registers": "Modbus devices", "dme": "measuring machines", "lines": "machine tools"}
+    names: Mapping[Only, str] = {"registers": "Modbus devices", "dme": "measuring machines", "lines": "machine tools"}
     for fault in faults:
         only = CATALOGUE[fault.name].only
-        if only and only != kind:
-            raise ValueError(f"fault {fault.name!r} strikes {names[only]} only")
+        if only and kind not in only:
+            raise ValueError(f"fault {fault.name!r} strikes {' and '.join(names[one] for one in only)} only")
 
 
 class Injector:

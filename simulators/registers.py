@@ -28,7 +28,7 @@ from pymodbus.simulator import DataType, SimData, SimDevice
 from simulators.faults import Injector, refuse_others
 from simulators.line import PtyLine, host_and_port
 from simulators.motion import Walk, walk
-from simulators.settings import Announce, SimulatorSettings
+from simulators.settings import Announce, SimulatorSettings, refuse_answer
 
 if sys.platform != "win32":
     import tty
@@ -84,6 +84,7 @@ Maker = Callable[[Walk, Injector, bool], RegisterDevice]
 def serve_registers(settings: SimulatorSettings, announce: Announce, make: Maker, move: Callable[..., Walk] = walk) -> None:
     """Serve one scan of a device made by `make(walk, injector, swapped)`."""
     refuse_others(settings.faults, "registers")
+    refuse_answer(settings)
     logging.getLogger("pymodbus").addHandler(logging.NullHandler())
     asyncio.run(RegisterService(settings, announce, make, move(settings.path_mm, settings.motion)).run())
 

@@ -19,6 +19,7 @@ from simulators.faults import CATALOGUE, Fault
 from simulators.motion import Motion, read_path
 
 _ENDS_WITHIN_S = 0.5
+LAST_REQUEST = 9_999_999  # a variable of a control holds seven digits exactly
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +28,9 @@ class SimulatorSettings:
 
     address    `pty` or `host:port`; port 0 takes any free one
     path_mm    (k, 2) or (k, 3) points of the path on the part
+    answer     the file in which a machine tool finds the verdict that it asks for
+    request    the number by which it asks; None: another one each time, where it asks
+    answer_s   how long it waits for the answer
     bound      end when standard input does
     paced      take points when they are due by `motion.rate_hz`; otherwise as fast as the client fetches them
     line       what a machine prints of a point that prints lines of the user's own, like {number};{x:.4f};{y:.4f}; nothing: its own
@@ -39,6 +43,9 @@ class SimulatorSettings:
     paced: bool = True
     bound: bool = False
     line: str = ""
+    answer: Path | None = None
+    request: int | None = None
+    answer_s: float = 60.0
 
 
 Announce = Callable[[str], None]
@@ -61,7 +68,8 @@ def settings_from(
         motion = Motion(**{field.name: given[field.name] for field in fields(Motion) if field.name in given})
         faults = tuple(Fault.parse(text) for text in given["fault"])
         path_mm = default_path() if default_path is not None and "path" not in given else read_path(given["path"])
-        return SimulatorSettings(given["address"], path_mm, motion, faults, not given["unpaced"], given["until_stdin_ends"], given["line"])
+        asked = {name: given[name] for name in ("line", "answer", "request", "answer_s") if name in given}
+        return SimulatorSettings(given["address"], path_mm, motion, faults, not given["unpaced"], given["until_stdin_ends"], **asked)
     except FileNotFoundError:
         parser.error(f"{given['path']}: no such file")
     except (ValueError, OSError) as error:
@@ -102,11 +110,21 @@ def _parser(program: str | None, *, needs_path: bool) -> argparse.ArgumentParser
     parser.add_argument("--open", dest="closed", action="store_false", help="the path is open")
     parser.add_argument("--backward", action="store_true", help="against the order of the path")
     parser.add_argument("--seed", type=int, metavar="N", help="of form error, noise and faults [0]")
+    parser.add_argument("--answer", type=Path, metavar="FILE", help="a machine tool asks for the verdict, and waits for it in this file")
+    parser.add_argument("--request", type=_request, metavar="N", help="the number by which it asks [another one each time]")
+    parser.add_argument("--answer-within", dest="answer_s", type=float, metavar="S", help="how long it waits for the answer [60]")
     for name, meaning in _MILLIMETRES.items():
         parser.add_argument(f"--{name}-mm", type=float, metavar="MM", help=meaning)
     parser.add_argument("--rotation-deg", type=float, metavar="DEG", help="how the part is turned on the machine")
     parser.add_argument("--translation-mm", type=float, nargs=3, metavar=("X", "Y", "Z"), help="where the part lies on the machine")
     return parser
+
+
+def _request(text: str) -> int:
+    number = int(text)
+    if not 1 <= number <= LAST_REQUEST:
+        raise argparse.ArgumentTypeError(f"expected a number from 1 to {LAST_REQUEST}")
+    return number
 
 
 _MILLIMETRES: Mapping[str, str] = MappingProxyType(
@@ -120,6 +138,12 @@ _MILLIMETRES: Mapping[str, str] = MappingProxyType(
         "resolution": "step of the scales by which the machine tells its positions",
     }
 )
+
+
+def refuse_answer(settings: SimulatorSettings) -> None:
+    """Raise ValueError where a device that asks for no verdict is to do so."""
+    if settings.answer is not None or settings.request is not None:
+        raise ValueError("--answer and --request are for machine tools, which ask for a verdict")
 
 
 def end_with_stdin() -> None:

@@ -17,7 +17,7 @@ import numpy as np
 from simulators.faults import Injector, Only, refuse_others
 from simulators.line import Line, open_line
 from simulators.motion import Walk, walk
-from simulators.settings import Announce, SimulatorSettings
+from simulators.settings import Announce, SimulatorSettings, refuse_answer
 
 HEARTBEAT_S = 0.5
 IMPATIENCE_S = 2.0
@@ -81,6 +81,8 @@ def stream(
 ) -> None:
     """Serve one scan of any streaming device; `move` moves the probe along the path, `open_line` opens its address."""
     refuse_others(settings.faults, device.kind)
+    if device.kind != "lines":
+        refuse_answer(settings)
     scan = move(settings.path_mm, settings.motion)
     injector = Injector(settings.faults, settings.motion.seed)
     line = open_line(settings.address)

@@ -21,6 +21,7 @@ from inspection import NotMeasured
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from cmmlink.events import Answered
     from cmmlink.report import Pictures
     from cmmlink.run import FinishedRun
 
@@ -99,9 +100,19 @@ def report_outcome(run: "FinishedRun", output: Output, pictures: "Pictures | Non
         typer.echo(f"results in {folder}: {', '.join(written)}")
     if evidence is not None and not output.as_json:
         typer.echo(f"recorded as run {evidence.run}")
+    if run.answer is not None:
+        _say_answer(run.answer, output)
     if outcome.failure is not None:
         return NO_RECORD if isinstance(outcome.failure, StoreError) else DEVICE_FAILED
     return UNUSABLE if outcome.result is None else EXIT_OF[run.verdict]
+
+
+def _say_answer(answer: "Answered", output: Output) -> None:
+    """Say whether the machine was told the verdict. That it was not is no reason for another exit status: the verdict stands."""
+    if answer.state != "sent":
+        say(f"NOT SENT to the machine: {answer.problem}")
+    elif not output.as_json:
+        typer.echo(f"sent to the machine at {answer.at:%H:%M:%S}, request {answer.request}")
 
 
 @contextmanager

@@ -9,13 +9,14 @@ from itertools import islice
 
 from cmmlink.console.protocol import AlarmList, AlarmRow, Severity
 from cmmlink.console.refused import without_folders
-from cmmlink.events import Arrived, Event, Judged, RunFinished, RunStarted
+from cmmlink.events import Answered, Arrived, Event, Judged, RunFinished, RunStarted
 from drivers import Damaged, LinkDown, LinkUp, Lost, Rejected
 
 _log = logging.getLogger(__name__)
 
 _MOST_KEPT = 200  # the oldest acknowledged ones go first
 _MOST_SHOWN = 50
+_NOT_ANSWERED = {"not sent": "Not sent to the machine", "not withdrawn": "Earlier answer to the machine not withdrawn"}
 
 
 class Alarms:
@@ -42,6 +43,8 @@ class Alarms:
                 self._stalls = event.counts.stalls
         elif isinstance(event, RunFinished):
             self._take_end(event)
+        elif isinstance(event, Answered) and event.problem:
+            self.raise_alarm("fault", _NOT_ANSWERED[event.state], event.problem)
 
     @property
     def shown(self) -> AlarmList:

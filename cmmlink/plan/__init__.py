@@ -3,6 +3,7 @@
 TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer to load than all of this
 
 if TYPE_CHECKING:
+    from cmmlink.plan.answer import Answer
     from cmmlink.plan.characteristics import AskedCharacteristic, AskedDatum, AskedFilter, AskedProfile, Place
     from cmmlink.plan.cutters import CutterName
     from cmmlink.plan.datum import Datum
@@ -42,6 +43,7 @@ else:
     from cmmlink.front_door import load_on_use
 
     _PLACES = {
+        "cmmlink.plan.answer": ("Answer",),
         "cmmlink.plan.deciding": ("PROFILE", "Deciding"),
         "cmmlink.plan.given": ("plan_given_by",),
         "cmmlink.plan.key_search": ("KeyEntry", "all_keys", "keys_named"),
@@ -85,6 +87,7 @@ else:
 __all__ = [
     "NO_RESULTS",
     "PROFILE",
+    "Answer",
     "AskedCharacteristic",
     "AskedDatum",
     "AskedFilter",

@@ -138,6 +138,13 @@ device:
   radius_tolerance_mm: 0.002
   silence_s: 300
   reconnect_s: 60
+answer:
+  file: //dnc/mill-3/O9100.nc
+  program: 9100
+  variables: {verdict: 150, worst: 151, request: 152}
+  characteristics: {chord: 160}
+characteristics:
+  - {name: chord, type: chord, lower_mm: -0.1, upper_mm: 0.1}
 registration: {datum: {rotation_deg: 0, translation_mm: [0, 0]}}
 """
 
@@ -150,7 +157,8 @@ device:
   file: prints/blade.txt
   existing: true
   unit: inch
-  format: {pattern: "X(?P<x>[-+ .0-9]+)Y(?P<y>[-+ .0-9]+)", end: M30, points: 200, pass_over: "O[0-9]+", sample: sample.txt}
+  format: {pattern: "X(?P<x>[-+ .0-9]+)Y(?P<y>[-+ .0-9]+)", end: M30, points: 200, pass_over: "O[0-9]+", sample: sample.txt,
+    request: "REQUEST(?P<number>[ 0-9]+)"}
 """
 
 _PRINTED_LINE = """

@@ -32,6 +32,11 @@ class LineFormat(Settings):
     pass_over: Text | None = Field(
         default=None, description="a regular expression for lines that mean nothing, beside a pattern; every other line is damage"
     )
+    request: Text | None = Field(
+        default=None,
+        description="a regular expression for the line with the number by which the machine asks for a verdict (answer), beside a pattern, "
+        "with the group number, like REQUEST(?P<number>[ 0-9]+)",
+    )
     sample: Path | None = Field(
         default=None, description="a file with lines as the machine prints them, on which cmmlink check tries the format"
     )
@@ -40,8 +45,8 @@ class LineFormat(Settings):
     def _can_be_read(self) -> "LineFormat":
         if (self.language is None) == (self.pattern is None):
             raise ValueError("either language or pattern")
-        if self.language is not None and (self.end, self.points, self.pass_over) != (None, None, None):
-            raise ValueError("end, points and pass_over only beside a pattern")
+        if self.language is not None and (self.end, self.points, self.pass_over, self.request) != (None,) * 4:
+            raise ValueError("end, points, pass_over and request only beside a pattern")
         if self.pattern is not None and self.result_set is not None:
             raise ValueError("result_set only beside language: g800")
         if self.pattern is not None and self.end is None and self.points is None:
@@ -58,9 +63,15 @@ class LineFormat(Settings):
         return self.language or "pattern"
 
     @property
+    def tells_request(self) -> bool:
+        """Whether the lines may hold the number by which the machine asks for a verdict."""
+        return self.language is not None or self.request is not None
+
+    @property
     def options(self) -> dict[str, Any]:
         """The options of the format as drivers take them."""
-        given = {"set_name": self.result_set, "pattern": self.pattern, "end": self.end, "points": self.points, "pass_over": self.pass_over}
+        names = ("pattern", "end", "points", "pass_over", "request")
+        given = {"set_name": self.result_set, **{name: getattr(self, name) for name in names}}
         return {name: value for name, value in given.items() if value is not None}
 
 

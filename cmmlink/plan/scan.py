@@ -16,8 +16,9 @@ from pydantic import AfterValidator, Field, TypeAdapter, ValidationError, Valida
 
 from cmmlink.buffer import CAPACITY_POINTS
 from cmmlink.errors import PlanError, YamlError
+from cmmlink.plan.answer import ANSWER, Answer
 from cmmlink.plan.datum import Datum
-from cmmlink.plan.deciding import Deciding
+from cmmlink.plan.deciding import PROFILE, Deciding
 from cmmlink.plan.dme import DmeSettings
 from cmmlink.plan.lines import LinesSettings
 from cmmlink.plan.report import REPORT, ReportSettings
@@ -306,6 +307,7 @@ class Plan(Deciding):
     discretisation: Discretisation = Field(default=Discretisation(), description="how finely the nominal is sampled")
     buffer_points: int = Field(default=CAPACITY_POINTS, ge=1, description="how many points may wait between the device and the inspection")
     out: ResultsOrFolder = Field(default=Results(), description=OUT)
+    answer: Answer | None = Field(default=None, description=ANSWER)
     report: ReportSettings = Field(default=ReportSettings(), description=REPORT)
     records: Path | None = Field(default=None, description=RECORDS)
 
@@ -316,6 +318,21 @@ class Plan(Deciding):
         if asked is not None and part is not None and part.serial_number and (problem := asked.problem_with(part.serial_number)):
             raise ValueError(f"a pattern that part.serial_number has: {problem}")
         return asked
+
+    @field_validator("answer")
+    @classmethod
+    def _can_be_asked_for(cls, answer: Answer | None, info: ValidationInfo) -> Answer | None:
+        device: Device | None = info.data.get("device")
+        if answer is None or device is None:
+            return answer
+        if not isinstance(device, LinesDevice):
+            raise ValueError("an answer only beside a device of type lines: no other tells which request it answers")
+        if not device.format.tells_request:
+            raise ValueError("device.format.request beside a pattern, so that the machine can tell an answer from an earlier one")
+        known = [*([PROFILE] if info.data.get("tolerance") else []), *(asked.name for asked in info.data.get("characteristics", ()))]
+        if unknown := [name for name in answer.characteristics if name not in known]:
+            raise ValueError(f"characteristics of this plan; {unknown[0]} is none of {', '.join(known)}")
+        return answer
 
     def with_part(self, serial_number: str, operator: str | None = None) -> "Plan":
         """Give the same plan for one part, and who measures it. Raises PlanError for a serial number that it does not allow.
@@ -413,6 +430,7 @@ def _with_paths_from(folder: Path, plan: Plan) -> Plan:
             "nominal": plan.nominal.model_copy(update={"file": folder / plan.nominal.file}),
             "device": device,
             "out": plan.out.with_path_from(folder),
+            "answer": None if plan.answer is None else plan.answer.model_copy(update={"file": folder / plan.answer.file}),
             "records": folder / plan.records if plan.records else None,
             "report": plan.report.with_path_from(folder),
         }

@@ -3,6 +3,7 @@ r"""The language of inspection on machine tools (G800 and G801 lines, "MSR"), wh
     START                           opens a set; a stream or a file may hold several
     RESULTSFILE name                each of these may miss, and their order varies; RESULTSFILE stands before START, too
     DOCUMENTID ..  MODELVERSION ..  TIMESTAMP ..  TOOLPATHID ..  TOOLPATH ..
+    REQUEST 42                      the number by which the control asks for a verdict, where its program prints one; it begins a set, too
     G331 N.. A.. B.. C.. X.. Y.. Z..          the plane of the model
     G330 N.. A.. B.. C.. X.. Y.. Z.. I.. R..  the work plane
     G800 N1 X.. Y.. Z.. I.. J.. K.. O.. U.. L..   a nominal point, the direction out of the material, offset, tolerance
@@ -18,7 +19,7 @@ shows. How numbers run on from one toolpath to the next no description at hand s
 import re
 from collections.abc import Mapping
 
-from drivers.codecs.text_lines import FEATURES, NUMBER, is_feature_print, number_of, unit_in_mm
+from drivers.codecs.text_lines import FEATURES, NO_REQUEST, NUMBER, is_feature_print, number_of, request_in, unit_in_mm
 from drivers.codecs.touches import MODULUS, TouchLines
 from drivers.errors import ProtocolError
 from drivers.source import ScanOpened
@@ -32,6 +33,7 @@ _WORD = re.compile(rf"([A-Z]) *({NUMBER}) *")
 _WORDS = re.compile(rf"(?:[A-Z] *{NUMBER} *)+")
 _CODED = re.compile(r"G *(330|331|800|801|802) +(.*)")
 _HEADINGS = re.compile(r"(RESULTSFILE|DOCUMENTID|MODELVERSION|TIMESTAMP|TOOLPATHID|TOOLPATH)(?: +(.*))?")
+_REQUEST = re.compile(r"REQUEST *([-+ .0-9]*)")
 _NAMES = ("RESULTSFILE", "DOCUMENTID")
 _OF_NOMINALS = frozenset("IJKOUL")
 
@@ -54,7 +56,8 @@ class G800Decoder(TouchLines):
         self._wanted = set_name
         super().__init__(self._mm_per_unit, parity)
         self._names = dict[str, str]()
-        self._names_are_old = False  # those of a set that has points
+        self._request: int | None = None
+        self._names_are_old = False  # those of a set that has points, and its request with them
         self._begin()
 
     def _begin(self) -> None:
@@ -73,6 +76,8 @@ class G800Decoder(TouchLines):
             self._take_coded(coded[1], coded[2], line, size)
         elif heading := _HEADINGS.fullmatch(line):
             self._take_heading(heading[1], (heading[2] or "").strip())
+        elif asked := _REQUEST.fullmatch(line):
+            self._take_request(asked[1], size)
         elif line == "START":
             self._start()
         elif line == "END":
@@ -88,6 +93,16 @@ class G800Decoder(TouchLines):
             self._names[name] = value
         elif name.startswith("TOOLPATH"):
             self._end_stretch()
+
+    def _take_request(self, told: str, size: int) -> None:
+        """Take the number of a request, which belongs to the set that follows. Behind points it shows that the cycle began anew."""
+        if self._opened or self._passed_over:
+            self._end_stretch()
+            self._begin()
+        self._forget_old_names()
+        self._request = request_in(told)
+        if self._request is None:
+            self._damage(size, NO_REQUEST)
 
     def _start(self) -> None:
         """Begin a set. The names that stand before it are its own."""
@@ -113,6 +128,7 @@ class G800Decoder(TouchLines):
     def _forget_old_names(self) -> None:
         if self._names_are_old:
             self._names.clear()
+            self._request = None
         self._names_are_old = False
 
     @property
@@ -183,7 +199,7 @@ class G800Decoder(TouchLines):
     def _open(self) -> None:
         if not self._opened:
             self._opened = True
-            self._touches.out.append(ScanOpened(" ".join(("G800", *self._names.values())), "", None))
+            self._touches.out.append(ScanOpened(" ".join(("G800", *self._names.values())), "", None, self._request))
 
 
 def _words_in(text: str) -> dict[str, float] | None:

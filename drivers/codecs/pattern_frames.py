@@ -6,7 +6,7 @@ has no group for are 0. A machine that prints no numbers cannot show that a line
 
 import re
 
-from drivers.codecs.text_lines import FEATURES, is_feature_print, number_of, unit_in_mm
+from drivers.codecs.text_lines import FEATURES, NO_REQUEST, is_feature_print, number_of, request_in, unit_in_mm
 from drivers.codecs.touches import TouchLines
 from drivers.errors import ProtocolError
 from drivers.source import ScanOpened
@@ -36,11 +36,26 @@ def point_pattern(pattern: str) -> re.Pattern[str]:
     return found
 
 
+def request_pattern(pattern: str) -> re.Pattern[str]:
+    """The pattern of the line with the number of a request. Raises ValueError where it is none, or has another group than number."""
+    found = compiled(pattern)
+    if set(found.groupindex) != {"number"}:
+        raise ValueError(f"request {pattern!r:.80} has not the one group number, like REQUEST(?P<number>[ 0-9]+)")
+    return found
+
+
 class PatternDecoder(TouchLines):
     """Lines that a pattern describes to points in millimetres."""
 
     def __init__(
-        self, pattern: str, unit: str, end: str | None = None, pass_over: str | None = None, points: int | None = None, parity: str = ""
+        self,
+        pattern: str,
+        unit: str,
+        end: str | None = None,
+        pass_over: str | None = None,
+        points: int | None = None,
+        parity: str = "",
+        request: str | None = None,
     ) -> None:
         """Take what the lines look like.
 
@@ -50,6 +65,7 @@ class PatternDecoder(TouchLines):
         pass_over : the pattern of lines that mean nothing
         points    : the scan ends after so many points, whether they came or are known to be missing
         parity    : even or odd, where the bytes carry it as their eighth bit
+        request   : the pattern of the line with the number by which the control asks for a verdict: the group number
         """
         if end is None and points is None:
             raise ValueError("neither end nor points says how the scan ends; name the line that ends it, or the number of points")
@@ -59,6 +75,8 @@ class PatternDecoder(TouchLines):
         self._end = None if end is None else compiled(end)
         self._pass_over = None if pass_over is None else compiled(pass_over)
         self._points = points
+        self._asks = None if request is None else request_pattern(request)
+        self._request: int | None = None
         super().__init__(unit_in_mm(unit), parity)
         self._opened = False
 
@@ -67,12 +85,23 @@ class PatternDecoder(TouchLines):
             self._take_point(found, line, size)
         elif self._end is not None and self._end.fullmatch(line):
             self._touches.close(size)
+        elif self._asks is not None and (found := self._asks.fullmatch(line)):
+            self._take_request(found["number"] or "", size)
         elif self._pass_over is not None and self._pass_over.fullmatch(line):
             return
         elif is_feature_print(line) and not self._opened:
             raise ProtocolError(FEATURES)
         else:
             self._touches.damage(size, "line that the pattern does not describe")
+
+    def _take_request(self, told: str, size: int) -> None:
+        """Take the number of a request. Behind points it shows that the control began its cycle anew."""
+        self._request = request_in(told)
+        if self._request is None:
+            self._touches.damage(size, NO_REQUEST)
+        if self._opened:
+            self._opened = False
+            self._touches.begin_stretch()
 
     def _take_point(self, found: re.Match[str], line: str, size: int) -> None:
         fields = found.groupdict()
@@ -84,7 +113,7 @@ class PatternDecoder(TouchLines):
             return
         if not self._opened:
             self._opened = True
-            self._touches.out.append(ScanOpened("", "", None))
+            self._touches.out.append(ScanOpened("", "", None, self._request))
         self._touches.take(int(number) if "seq" in fields else None, (x, y, z), hash(line))
         if self._points is not None and self._touches.count >= self._points:
             self._touches.close(size)

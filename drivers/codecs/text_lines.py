@@ -15,6 +15,8 @@ from types import MappingProxyType
 LONGEST_LINE = 256  # bytes; what is longer is no line of a control
 MM_PER_UNIT: Mapping[str, float] = MappingProxyType({"mm": 1.0, "inch": 25.4})
 NUMBER = r"[+-]? *(?:[0-9]{1,9}(?:\.[0-9]{0,9})?|\.[0-9]{1,9})"
+_REQUEST = re.compile(r"0*[1-9][0-9]{0,6}")  # controls hold seven digits exactly
+NO_REQUEST = "line whose number of a request is none from 1 to 9999999"
 _UNSEEN_BYTES = bytes((0x00, 0x11, 0x12, 0x13, 0x14))
 _PRINTABLE = bytes(range(0x20, 0x7F))
 _WITHOUT_PARITY = bytes(byte & 0x7F for byte in range(256))
@@ -39,6 +41,15 @@ def number_of(text: str) -> float | None:
     """Return the number that stands in a field; None where none does."""
     bare = text.strip(" ")
     return float(bare.replace(" ", "")) if re.fullmatch(NUMBER, bare) else None
+
+
+def request_in(text: str) -> int | None:
+    """Return the number by which a control asks for a verdict; None where it is none that a variable of a control holds exactly.
+
+    0 is none: that is what a variable holds which nobody has set.
+    """
+    bare = text.strip(" ").removesuffix(".")
+    return int(bare) if _REQUEST.fullmatch(bare) else None
 
 
 def unit_in_mm(unit: str) -> float:

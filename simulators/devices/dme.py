@@ -16,7 +16,7 @@ from simulators.dme_part import PathPart
 from simulators.faults import CATALOGUE, Injector
 from simulators.line import Line as Wire
 from simulators.line import open_line
-from simulators.settings import Announce, SimulatorSettings
+from simulators.settings import Announce, SimulatorSettings, refuse_answer
 
 _POLL_S = 0.005
 _LINE_S = 0.02  # of a scan that one line holds
@@ -169,8 +169,9 @@ class Server:
 
 def serve(settings: SimulatorSettings, announce: Announce) -> None:
     """Serve the machine until it is ended."""
+    refuse_answer(settings)
     for fault in settings.faults:
-        if CATALOGUE[fault.name].only not in ("", "dme") or fault.name in _KNOWN_ELSEWHERE:
+        if "dme" not in (CATALOGUE[fault.name].only or ("dme",)) or fault.name in _KNOWN_ELSEWHERE:
             raise ValueError(f"fault {fault.name!r} does not strike measuring machines")
     injector = Injector(settings.faults, settings.motion.seed)
     rate_hz = settings.motion.rate_hz

@@ -5,19 +5,22 @@ a line of the user's own, as cameras and line scanners send. Numbers are printed
 posts of CAM systems leave them out.
 """
 
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from simulators.answers import STOPPED, await_answer
 from simulators.faults import Injector
 from simulators.line import open_line_of_control
 from simulators.motion import walk
-from simulators.settings import Announce, SimulatorSettings
+from simulators.settings import LAST_REQUEST, Announce, SimulatorSettings
 from simulators.stream import Device, Sample, stream
 
 _MM_PER_INCH = 25.4
+_OTHER_TOOL_MM = 0.5  # how much larger the ball of another tool is
 _DC2, _DC4 = "\x12", "\x14"
 _OTHER_PART = ("START", "RESULTSFILE OTHER-RESULTS", "G800 N1 X0. Y0. Z0. I0. J1. K0. O0. U.1 L.1", "G801 N1 X0. Y9.9 Z0. R1.5", "END")
 
@@ -72,10 +75,23 @@ class InspectingControl(Device):
     impatience_s = 0.0  # nobody asks a control to begin: its operator does, when somebody listens
 
     def __init__(
-        self, nominal_mm: NDArray[np.float64], outward: NDArray[np.float64], radius_mm: float, quirks: Quirks, injector: Injector
+        self,
+        nominal_mm: NDArray[np.float64],
+        outward: NDArray[np.float64],
+        radius_mm: float,
+        quirks: Quirks,
+        injector: Injector,
+        request: int | None = None,
     ) -> None:
+        """`request` is the number by which the control asks for the verdict; None where it does not ask."""
         self._nominal_mm, self._outward, self._radius_mm = nominal_mm, outward, radius_mm
-        self._quirks, self._injector = quirks, injector
+        self._quirks, self._injector, self._request = quirks, injector, request
+        self._stands = self._has_other_tool = False
+
+    @property
+    def stands(self) -> bool:
+        """Whether somebody pressed the emergency stop: nothing is printed any more, and nobody waits for an answer."""
+        return self._stands
 
     def told_to_begin(self) -> bool:
         """Nobody tells a control."""
@@ -86,17 +102,34 @@ class InspectingControl(Device):
         old = _OTHER_PART if self._quirks.old_set else ()
         planes = ("G331 N1 A0. B0. C0. X0. Y0. Z0.", "G330 N1 A0. B0. C0. X0 Y0 Z0 I0 R0")
         heading = ("START", "RESULTSFILE PART-RESULTS", "TIMESTAMP 260314 150926", "TOOLPATHID 1", "TOOLPATH SECTION")
-        return self._quirks.bytes_of(*old, _DC2 + heading[0], *heading[1:], *planes)
+        return self._quirks.bytes_of(*old, *self.request_lines(), _DC2 + heading[0], *heading[1:], *planes)
+
+    def request_lines(self) -> list[str]:
+        """The line with the number of the request, DPRNT[REQUEST*#500[70]], where the control asks for the verdict."""
+        return [] if self._request is None else [f"REQUEST{dprnt(self._request, 7, 0)}"]
 
     def frame(self, samples: Sequence[Sample]) -> bytes:
         """Print one point: where it should be, and where the ball was when it touched."""
         [taken] = samples
+        if self._is_stopped_at(taken.index):
+            return b""
         nominal = self.nominal_line(taken.index)
         if self._injector.strikes("mislabelled", taken.index):
             nominal = nominal.replace("G800", "G801")
         if self._injector.strikes("no-contact", taken.index):
             return self._quirks.bytes_of(nominal)
-        return self._quirks.bytes_of(nominal, self.measured_line(taken.index, taken.point_mm))
+        return self._quirks.bytes_of(nominal, self.measured_line(taken.index, self._touched(taken)))
+
+    def _is_stopped_at(self, index: int) -> bool:
+        self._stands |= self._injector.strike("emergency-stop", index) is not None
+        return self._stands
+
+    def _touched(self, taken: Sample) -> Sequence[float]:
+        """Where the centre of the ball was; that of another tool is larger, and so farther from the part."""
+        self._has_other_tool |= self._injector.strike("tool-change", taken.index) is not None
+        if not self._has_other_tool:
+            return taken.point_mm
+        return [float(value) for value in np.array(taken.point_mm) + _OTHER_TOOL_MM * self._outward[taken.index]]
 
     def nominal_line(self, index: int) -> str:
         """The nominal point of this number, as a post wrote it into the program."""
@@ -108,11 +141,12 @@ class InspectingControl(Device):
     def measured_line(self, index: int, centre_mm: Sequence[float]) -> str:
         """The centre of the ball, as the control printed it."""
         x, y, z = (bare(value, 4) for value in self._quirks.own(np.array(centre_mm)).tolist())
-        return f"G801 N{index + 1} X{x} Y{y} Z{z} R{bare(float(self._quirks.own(self._radius_mm)), 4)}"
+        radius_mm = self._radius_mm + (_OTHER_TOOL_MM if self._has_other_tool else 0.0)
+        return f"G801 N{index + 1} X{x} Y{y} Z{z} R{bare(float(self._quirks.own(radius_mm)), 4)}"
 
     def closing(self, count: int) -> bytes:
         """End the results, and switch the printer off."""
-        return self._quirks.bytes_of("END" + _DC4) if self._quirks.closes else b""
+        return self._quirks.bytes_of("END" + _DC4) if self._quirks.closes and not self._stands else b""
 
 
 class PrintingControl(InspectingControl):
@@ -120,14 +154,16 @@ class PrintingControl(InspectingControl):
 
     def opening(self, count: int) -> bytes:
         """Switch the printer on."""
-        return self._quirks.bytes_of(_DC2)
+        return self._quirks.bytes_of(_DC2, *self.request_lines())
 
     def frame(self, samples: Sequence[Sample]) -> bytes:
         """Print one point."""
         [taken] = samples
+        if self._is_stopped_at(taken.index):
+            return b""
         if self._injector.strikes("no-contact", taken.index):
             return b""
-        return self._quirks.bytes_of(self.point_line(taken.index, taken.point_mm))
+        return self._quirks.bytes_of(self.point_line(taken.index, self._touched(taken)))
 
     def point_line(self, index: int, centre_mm: Sequence[float]) -> str:
         """One point with its number: DPRNT[N#1[40]*X#2[44]*Y#3[44]*Z#4[44]]."""
@@ -136,7 +172,7 @@ class PrintingControl(InspectingControl):
 
     def closing(self, count: int) -> bytes:
         """Print a last line, and switch the printer off."""
-        return self._quirks.bytes_of("M30" + _DC4) if self._quirks.closes else b""
+        return self._quirks.bytes_of("M30" + _DC4) if self._quirks.closes and not self._stands else b""
 
 
 class OwnLines(PrintingControl):
@@ -167,7 +203,7 @@ class OwnLines(PrintingControl):
 
 
 def serve(settings: SimulatorSettings, announce: Announce, control: type[InspectingControl]) -> None:
-    """Probe a part and print it; the address may also be `to:host:port` or `file:PATH`."""
+    """Probe a part and print it; the address may also be `to:host:port` or `file:PATH`. A control that asks then waits for the verdict."""
     injector = Injector(settings.faults, settings.motion.seed)
     quirks = Quirks.asked_for(injector)
     if control is PrintingControl and settings.line:
@@ -176,8 +212,14 @@ def serve(settings: SimulatorSettings, announce: Announce, control: type[Inspect
     ideal = replace(settings.motion, noise_mm=0.0, form_error_mm=0.0, defect_mm=0.0, tip_radius_mm=0.0, resolution_mm=0.0)
     nominal_mm = walk(settings.path_mm, ideal).points_mm
     outward = walk(settings.path_mm, replace(ideal, tip_radius_mm=1.0)).points_mm - nominal_mm
-    made = control(nominal_mm, outward, settings.motion.tip_radius_mm, quirks, injector)
+    request = settings.request
+    if request is None and settings.answer is not None:
+        request = int(time.time()) % LAST_REQUEST + 1
+    made = control(nominal_mm, outward, settings.motion.tip_radius_mm, quirks, injector, request)
     stream(settings, made, announce, open_line=open_line_of_control)
+    if settings.answer is not None and request is not None:
+        stopped = f"request {request}: emergency stop: {STOPPED}"
+        announce(stopped if made.stands else await_answer(settings.answer, request, settings.answer_s))
 
 
 def serve_inspection(settings: SimulatorSettings, announce: Announce) -> None:

@@ -1,9 +1,10 @@
 """A control that runs short macro programs of Fanuc's kind, as far as those of docs/machines.md go, with a part under its probe.
 
-It knows assignments, IF GOTO, subprograms with letters (G65), skip moves (G31), straight moves, DPRNT, and alarms (#3000). What it does not
+It knows assignments, IF GOTO, subprograms (M98, and with letters G65), skip moves (G31), straight moves, dwelling (G4), DPRNT, and alarms (#3000). What it does not
 know it refuses. Variables that hold nothing are refused as well, so that a misspelled number shows.
 """
 
+import operator
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 _LOCALS = dict(zip("ABCDEFHIJKMQRSTUVWXYZ", (1, 2, 3, 7, 8, 9, 11, 4, 5, 6, 13, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26), strict=True))
 _SYSTEM = 5000
+_COMPARED = {"LT": operator.lt, "GT": operator.gt, "LE": operator.le, "EQ": operator.eq}
 _WORD = re.compile(r"([A-Z])(#[0-9]+|\[[^A-Z]*\]|[-+]?[0-9.]+)")
 
 
@@ -26,12 +28,14 @@ class Control:
     """Runs programs.
     touch       : gives the centre of the ball (3,) where it meets the part between two places, or None where it does not
     sign_places : how many places DPRNT keeps for a sign before the digits of a number: controls differ
+    dwell       : is called with the seconds for which the control waits
     """
 
     programs: Mapping[int, list[str]]
     touch: Callable[[Array, Array], Array | None]
     place_mm: Array
     sign_places: int = 0
+    dwell: Callable[[float], None] = lambda _: None
     printed: list[str] = field(default_factory=list)
     is_open: bool = False
     shared: dict[int, float] = field(default_factory=dict)
@@ -42,11 +46,13 @@ class Control:
         while True:
             block = re.sub(r"^N[0-9]+ ?", "", blocks[at])
             at += 1
+            if not block:
+                continue
             if block in ("M99", "M30"):
                 return
-            if jump := re.fullmatch(r"IF\[(.*)(LT|GT)(.*?)\]GOTO([0-9]+)", block):
+            if jump := re.fullmatch(r"IF\[(.*)(LT|GT|LE|EQ)(.*?)\]GOTO([0-9]+)", block):
                 left, right = self.value(jump[1], own), self.value(jump[3], own)
-                if left < right if jump[2] == "LT" else left > right:
+                if _COMPARED[jump[2]](left, right):
                     at = next(k for k, line in enumerate(blocks) if re.match(rf"N{jump[4]}\b", line))
             else:
                 self.carry_out(block, own)
@@ -56,8 +62,12 @@ class Control:
         if assigned := re.fullmatch(r"#([0-9]+)=(.+)", block):
             number = int(assigned[1])
             if number == 3000:
-                raise AlarmError
+                raise AlarmError(int(assigned[2]))
             (own if number < 100 else self.shared)[number] = self.value(assigned[2], own)
+        elif called := re.fullmatch(r"M98 P([0-9]+)", block):
+            self.run(int(called[1]))
+        elif waited := re.fullmatch(r"G4 X([0-9.]+)", block):
+            self.dwell(float(waited[1]))
         elif block in ("POPEN", "PCLOS"):
             self.is_open = block == "POPEN"
         elif printed := re.fullmatch(r"DPRNT\[(.*)\]", block):

@@ -11,6 +11,7 @@ import faulthandler
 import gc
 import json
 import os
+import re
 import shutil
 import sqlite3
 import sys
@@ -50,6 +51,19 @@ discretisation: {{samples: 400}}
 """
 
 
+ASKING = """\
+part: {name: oval, serial_number: 7}
+nominal: {file: oval.yaml}
+tolerance: {lower_mm: -0.05, upper_mm: 0.05}
+device: {type: lines, file: prints.txt, existing: true, unit: mm, silence_s: 1}
+answer: {file: O9100.nc}
+out: null
+registration: {datum: {}}
+allow: {unseen_mm: 1}
+discretisation: {samples: 400}
+"""
+
+
 @dataclass(frozen=True)
 class Command:
     """A command to be run with failing calls, in a folder made ready for it.
@@ -76,6 +90,33 @@ def _run(scanner: Callable[[], CounterParty], kind: str = "serial", more: str = 
         return ["run", plan, "--headless", "--json", "--records", folder / "records"]
 
     return make
+
+
+EARLIER = "O9100 (CMMLINK ANSWER)\r\n(RUN {run})\r\n#150=1.\r\n#152=41.\r\nM99\r\n"
+
+
+def _asked(folder: Path, _: ExitStack) -> list[object]:
+    """A machine tool printed the oval and asks for the verdict; the answer to its earlier request, which passed a part, stands there."""
+    _oval(folder)
+    points = enumerate(oval_points(0.01).tolist(), start=1)
+    printed = ["REQUEST 42", "START", *(f"G801 N{i} X{x:.4f} Y{y:.4f} Z0." for i, (x, y) in points), "END", ""]
+    (folder / "prints.txt").write_bytes("\r\n".join(printed).encode("ascii"))
+    passed = next(run for run, verdict in runs_in(folder / "records").items() if verdict == "conform")
+    (folder / "O9100.nc").write_bytes(EARLIER.format(run=passed).encode("ascii"))
+    (folder / "plan.yaml").write_text(ASKING, encoding="utf-8")
+    return ["run", folder / "plan.yaml", "--headless", "--json", "--records", folder / "records"]
+
+
+def runs_in(folder: Path) -> dict[str, str]:
+    """The runs of records, in the order in which they began, and the verdict of each that came to its end; empty where it has none."""
+    store = sqlite3.connect(folder / "station.sqlite")
+    try:
+        rows = store.execute("SELECT run, kind, body FROM record WHERE kind IN ('run', 'end') ORDER BY number").fetchall()
+    finally:
+        store.close()
+    found = {run: "" for run, kind, _ in rows if kind == "run"}
+    ends = {run: json.loads(body) for run, kind, body in rows if kind == "end"}
+    return found | {run: end["verdict"] for run, end in ends.items() if end["state"] == "complete" and end["verdict"]}
 
 
 def _inspect(folder: Path, _: ExitStack) -> list[object]:
@@ -138,6 +179,7 @@ COMMANDS = {
         Command("run", _run(lambda: LineScanner(lines_of(0.01))), OF_A_RUN),
         Command("run-port", _run(lambda: PortScanner(lines_of(0.01))), OF_A_RUN),
         Command("run-modbus", _run(RingScanner, "modbus", ", map: generic-ring"), OF_A_RUN),
+        Command("run-asked", _asked, OF_A_RUN),
         Command("inspect", _inspect, frozenset({UNUSABLE, DEVICE, RECORD})),
         Command("export", _recorded("export", "last", "--out", "OUT"), frozenset({UNUSABLE, RECORD})),
         Command("replay", _recorded("replay", "last", "--json", "--out", "OUT"), frozenset({UNUSABLE, RECORD})),
@@ -187,6 +229,7 @@ def attempt(command: Command, faults: Faults, records: Path, *, again: bool = Tr
                 ended = Ended(1, "", traceback.format_exc())
         faulthandler.cancel_dump_traceback_later()
         wrong = [*_said_wrongly(command, ended, faults), *_kept_wrongly(folder / "records", records, faults)]
+        wrong += _answered_wrongly(folder, records, faults)
         made_too_late = faults.after and "mkdir at tempfile.py" in faults.place  # nobody was told its name
         if faults.failed not in OF_TIDYING and "shutil.py" not in faults.place and not made_too_late:
             wrong += [f"left behind: {path.name}" for path in scratch.iterdir()]
@@ -217,7 +260,7 @@ def killed(command: Command, faults: Faults, records: Path) -> Trial:
         _, status = os.waitpid(child, 0)
         faults.failed = "killed" if os.WIFSIGNALED(status) else ""
         faults.committed = {int(line.split()[0]): bytes.fromhex(line.split()[1]) for line in said.read_text().splitlines()}
-        wrong = list(_kept_wrongly(folder / "records", records, faults))
+        wrong = [*_kept_wrongly(folder / "records", records, faults), *_answered_wrongly(folder, records, faults)]
         again = cmmlink(*command.make(folder, stack))
         if again.code != 0:
             wrong.append(f"the next run ends with {again.code}: {again.err}")
@@ -299,6 +342,25 @@ def _kept_wrongly(folder: Path, before: Path, faults: Faults) -> Iterator[str]:
     ended = cmmlink("verify", "--records", folder)
     if ended.code != 0:
         yield f"verify: {ended.err}"
+
+
+def _answered_wrongly(folder: Path, before: Path, faults: Faults) -> Iterator[str]:
+    """A part is passed by the answer to the run alone whose verdict CONFORM is on record, and by no earlier one once a run has begun."""
+    kept = runs_in(folder / "records") if (folder / "O9100.nc").exists() else {}
+    begun = kept.keys() - runs_in(before).keys()
+    for path in (*folder.glob("O9100.nc"), *folder.glob(".O9100.nc.*")):
+        text = path.read_text(encoding="ascii")
+        if "#150=1." not in text:
+            continue
+        run, request = re.search(r"RUN ([-0-9]+)", text), re.search(r"#152=(\d+)", text)
+        if run is None or kept.get(run[1]) != "conform" or request is None:
+            yield f"{path.name} passes a part whose verdict is {kept.get(run[1]) if run else None}: {text}"
+        elif begun and run[1] not in begun and "answer_file" not in faults.place:
+            yield f"{path.name} still passes the part before: {text}"
+        elif (run[1] in begun) != (request[1] == "42"):
+            yield f"{path.name} answers a request of another run: {text}"
+    if not faults.failed and begun and f"#150={1}." not in (folder / "O9100.nc").read_text(encoding="ascii"):
+        yield "nothing failed, yet the machine was not told"
 
 
 def _bytes_of(folder: Path) -> list[bytes]:

@@ -28,6 +28,7 @@ SAMPLE = [
     ("inspect", "statvfs", 1),
     ("inspect", "listdir", 1),
     ("run", "listdir", 1),
+    ("run-asked", "replace", 2),
 ]
 
 
@@ -59,8 +60,11 @@ def test_a_call_to_a_port_that_fails_is_told_as_what_it_is(records: Path, call: 
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="a process is killed at a call of its own on POSIX systems only")
-@pytest.mark.parametrize(("call", "number"), [("sqlite INSERT", 2), ("sqlite COMMIT", 3), ("socket recv", 5)])
-def test_a_run_that_is_killed_at_a_call_has_kept_what_was_acknowledged(records: Path, call: str, number: int) -> None:
-    trial = killed(COMMANDS["run"], Faults(number, only=call), records)
+@pytest.mark.parametrize(
+    ("command", "call", "number"),
+    [("run", "sqlite INSERT", 2), ("run", "sqlite COMMIT", 3), ("run", "socket recv", 5), ("run-asked", "replace", 2)],
+)
+def test_a_run_that_is_killed_at_a_call_has_kept_what_was_acknowledged(records: Path, command: str, call: str, number: int) -> None:
+    trial = killed(COMMANDS[command], Faults(number, only=call), records)
     assert trial.faults.failed
     assert not trial.wrong

@@ -30,7 +30,7 @@ def speaks_registers(source: Source) -> bool:
 
 def kinds_of(source: Source) -> list[str]:
     """The faults that this source may meet; a Modbus device that dies would take this process with it, and is tried elsewhere."""
-    common = {name: kind for name, kind in CATALOGUE.items() if kind.only in ("", "registers")}
+    common = {name: kind for name, kind in CATALOGUE.items() if kind.only in ((), ("registers",))}
     return [name for name, kind in common.items() if (name != "die" if speaks_registers(source) else not kind.only)]
 
 

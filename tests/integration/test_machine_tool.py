@@ -245,7 +245,7 @@ def test_the_plan_of_the_page_of_machines_finds_the_part_that_is_simulated_witho
             "address: COM3, format: {pattern: 'X(?P<x>.*', end: M30}",
             "expected lines that can be told apart: pattern 'X(?P<x>.*' is no regular",
         ),
-        ("address: COM3, format: {language: g800, end: M30}", "expected end, points and pass_over only beside a pattern"),
+        ("address: COM3, format: {language: g800, end: M30}", "expected end, points, pass_over and request only beside a pattern"),
         ("address: COM3, format: {points: 3}", "expected either language or pattern"),
         ("address: COM3, format: g801", "device.format.language is 'g801'"),
         (

@@ -140,6 +140,14 @@ export interface VerdictState {
   readonly reasons: readonly string[];
 }
 
+/** Whether the machine that waits for the verdict was told it: when, ms since 1970, to which of its requests, and why not. */
+export interface AnswerState {
+  readonly state: "awaited" | "sent" | "not sent";
+  readonly at_ms?: number | null;
+  readonly request?: number | null;
+  readonly problem: string;
+}
+
 /** The tolerance zone and the expanded uncertainty of one deviation, mm; how that uncertainty counts, in words. */
 export interface ZoneLimits {
   readonly lower_mm: number;
@@ -148,7 +156,7 @@ export interface ZoneLimits {
   readonly decision_rule: string;
 }
 
-/** Everything that is shown of a run in numbers and words, as it was at one moment. run : its id in the records; empty where it is not kept there, or is not over kind : a run that is measured, or what poses as none: a replay, a run from the records, a section of a surface notes : what was assumed about the nominal and the points began : when the points were measured: date, time of day and offset from UTC ending : null while the run is on; message says why a run has no result, or what failed link_detail : why the link was lost, or how long it was away; empty while it never was streaming : whether the device shows itself alive now expected : number of points the device announced latency_s : how long the newest judged point waited for its verdict verdict_at_ms : when the newest verdict was given, ms since 1970 */
+/** Everything that is shown of a run in numbers and words, as it was at one moment. run : its id in the records; empty where it is not kept there, or is not over kind : a run that is measured, or what poses as none: a replay, a run from the records, a section of a surface notes : what was assumed about the nominal and the points began : when the points were measured: date, time of day and offset from UTC ending : null while the run is on; message says why a run has no result, or what failed link_detail : why the link was lost, or how long it was away; empty while it never was streaming : whether the device shows itself alive now expected : number of points the device announced latency_s : how long the newest judged point waited for its verdict verdict_at_ms : when the newest verdict was given, ms since 1970 answer : null where no machine waits for the verdict */
 export interface RunState {
   readonly number: string;
   readonly run: string;
@@ -190,6 +198,7 @@ export interface RunState {
   readonly out_of_tolerance: number;
   readonly worst: WorstPoint | null;
   readonly verdict: VerdictState;
+  readonly answer: AnswerState | null;
   readonly length_mm: number;
   readonly zone: ZoneLimits;
 }

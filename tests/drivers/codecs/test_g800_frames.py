@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from drivers.codecs.g800_frames import MOST_WAITING, NO_CONTACT, NO_NOMINAL, OTHER_PLANE, G800Decoder
-from drivers.codecs.text_lines import LONGEST_LINE
+from drivers.codecs.text_lines import LONGEST_LINE, NO_REQUEST
 from drivers.codecs.touches import GAP, UNKNOWN_LOSS
 from drivers.errors import ProtocolError
 from drivers.source import ANOTHER_CONTENT, FRAME_REPEATED, ScanClosed, ScanOpened
@@ -230,3 +230,36 @@ def test_what_is_lost_with_the_link_is_counted_or_said_to_be_unknown(behind: lis
     book = account(arrivals)
     assert isinstance(book.others[-1], ScanClosed)
     assert book.counts == counts
+
+
+def requests_in(data: bytes, set_name: str = "") -> list[tuple[str, int | None]]:
+    book = any_cut_is_the_same(lambda: mm(set_name=set_name), data)
+    return [(arrival.device, arrival.request) for arrival in book.others if isinstance(arrival, ScanOpened)]
+
+
+def asked(number: object) -> bytes:
+    return f"REQUEST{number!s:>7}\r\n".encode("ascii")
+
+
+def test_a_set_is_opened_with_the_request_that_stands_before_it() -> None:
+    assert requests_in(asked(42) + set_of(*pair(1))) == [("G800", 42)]
+    assert requests_in(set_of("REQUEST 42", "RESULTSFILE A", *pair(1))) == [("G800 A", 42)]
+    assert requests_in(asked(41) + asked(42) + set_of(*pair(1))) == [("G800", 42)]
+    assert requests_in(set_of(*pair(1))) == [("G800", None)]
+
+
+def test_the_request_of_one_set_is_never_that_of_another() -> None:
+    old = asked(41) + set_of("RESULTSFILE OLD", *pair(1))
+    assert requests_in(old + asked(42) + set_of("RESULTSFILE NEW", *pair(1)), "NEW") == [("G800 NEW", 42)]
+    assert requests_in(old + set_of("RESULTSFILE NEW", *pair(1)), "NEW") == [("G800 NEW", None)]
+    cut_off = asked(41) + set_of(*pair(1), end="")
+    assert requests_in(cut_off + set_of(*pair(1))) == [("G800", 41), ("G800", None)]
+    assert requests_in(cut_off + asked(42) + set_of(*pair(1))) == [("G800", 41), ("G800", 42)]
+    assert requests_in(cut_off + asked("4Z") + set_of(*pair(1))) == [("G800", 41), ("G800", None)]
+
+
+def test_a_request_without_a_number_takes_back_the_one_before() -> None:
+    for told in ("0", "", "-1", "1.5", "10000000"):
+        data = asked(41) + asked(told) + set_of(*pair(1))
+        assert requests_in(data) == [("G800", None)], told
+        assert decoded(mm(), data).counts == {("Damaged", NO_REQUEST): len(asked(told)) - 1}, told

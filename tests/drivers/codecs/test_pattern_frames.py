@@ -4,9 +4,10 @@ import pytest
 
 from drivers.codecs import decoder
 from drivers.codecs.pattern_frames import LONGEST_PATTERN, PatternDecoder
+from drivers.codecs.text_lines import NO_REQUEST
 from drivers.codecs.touches import GAP
 from drivers.errors import ProtocolError
-from drivers.source import ANOTHER_CONTENT, FRAME_REPEATED, ScanClosed
+from drivers.source import ANOTHER_CONTENT, FRAME_REPEATED, ScanClosed, ScanOpened
 from tests.drivers.codecs.g800_transcript import DPRNT, DPRNT_MM, DPRNT_PATTERN, PRINT_OUT
 from tests.drivers.codecs.streams import any_cut_is_the_same, decoded
 
@@ -74,3 +75,35 @@ def test_a_print_out_of_features_is_refused_by_name() -> None:
 def test_wrong_options_are_named(pattern: str, options: dict[str, object], complaint: str) -> None:
     with pytest.raises(ValueError, match=complaint):
         decoder("pattern", **({"pattern": pattern, "unit": "mm", "end": "M30"} | options))
+
+
+ASKING = "REQUEST(?P<number>[ 0-9]+)"
+
+
+def requests_in(data: bytes) -> list[int | None]:
+    book = any_cut_is_the_same(lambda: PatternDecoder(NUMBERED, "mm", end="M30", request=ASKING), data)
+    return [arrival.request for arrival in book.others if isinstance(arrival, ScanOpened)]
+
+
+def test_the_number_of_a_request_opens_the_scan_with_it() -> None:
+    assert requests_in(lines("REQUEST     42", "N 1 X1. Z0.", "N 2 X2. Z0.", "M30")) == [42]
+    assert requests_in(lines("REQUEST     42", "REQUEST     43", "N 1 X1. Z0.", "M30")) == [43]
+    assert requests_in(lines("N 1 X1. Z0.", "M30")) == [None]
+
+
+def test_a_request_behind_points_begins_the_scan_anew() -> None:
+    assert requests_in(lines("REQUEST 41", "N 1 X1. Z0.", "REQUEST 42", "N 1 X1. Z0.", "N 2 X2. Z0.", "M30")) == [41, 42]
+    assert requests_in(lines("REQUEST 41", "N 1 X1. Z0.", "REQUEST 41", "N 1 X1. Z0.", "M30")) == [41, 41]
+
+
+@pytest.mark.parametrize("told", ["0", "000", "10000000", "4 2"])
+def test_a_number_that_no_variable_holds_is_damage_and_no_request(told: str) -> None:
+    data = lines(f"REQUEST {told}", "N 1 X1. Z0.", "M30")
+    assert requests_in(data) == [None]
+    assert decoded(PatternDecoder(NUMBERED, "mm", end="M30", request=ASKING), data).counts == {("Damaged", NO_REQUEST): len(told) + 9}
+
+
+@pytest.mark.parametrize("pattern", ["REQUEST [0-9]+", "REQUEST (?P<seq>[0-9]+)", "REQUEST (?P<number>[0-9]+"])
+def test_the_pattern_of_a_request_names_the_number(pattern: str) -> None:
+    with pytest.raises(ValueError, match=r"number|no regular expression"):
+        PatternDecoder(NUMBERED, "mm", end="M30", request=pattern)
