@@ -1,7 +1,7 @@
 """A control that runs short macro programs of Fanuc's kind, as far as those of docs/machines.md go, with a part under its probe.
 
-It knows assignments, IF GOTO, subprograms (M98, and with letters G65), skip moves (G31), straight moves, dwelling (G4), DPRNT, and alarms (#3000). What it does not
-know it refuses. Variables that hold nothing are refused as well, so that a misspelled number shows.
+It knows assignments, IF GOTO, subprograms (M98, and with letters G65), skip moves (G31), straight moves, dwelling (G4), DPRNT, and alarms
+(#3000). What it does not know it refuses. Variables that hold nothing are refused as well, so that a misspelled number shows.
 """
 
 import operator
