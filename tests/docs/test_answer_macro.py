@@ -18,7 +18,7 @@ NO_ANSWER, FAILED = 1, 2  # alarms
 
 def answer(code: int, request: int) -> str:
     """The page's answer with another verdict and number."""
-    return ANSWER.replace("#150=1.", f"#150={code}.").replace("#152=4711.", f"#152={request}.")
+    return str(ANSWER).replace("#150=1.", f"#150={code}.").replace("#152=4711.", f"#152={request}.")
 
 
 def ended(*answers: str, before: int = 41) -> tuple[int, list[str], int]:

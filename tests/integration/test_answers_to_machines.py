@@ -67,6 +67,10 @@ def carried_out(plan: Path) -> tuple[int, dict[str, Any], str]:
     return done.code, done.json(), done.err
 
 
+def carry_out(plan: Path) -> None:
+    cmmlink("run", plan, "--headless", "--records", plan.parent / "records")
+
+
 def end_of(machine: Simulated) -> str:
     """What the machine did in the end; its account of the points comes before."""
     machine.tally()
@@ -133,7 +137,7 @@ def test_a_killed_run_passes_no_part_and_the_machine_stops(tmp_path: Path) -> No
     (tmp_path / "O9100.nc").write_bytes(OLD_PASS % REQUEST)
     assert what_follows(tmp_path).endswith("the part is released")
     with asking(tmp_path, "--fault=silence@60") as machine:
-        run = split_off(carried_out, planned(tmp_path, machine.address))
+        run = split_off(carry_out, planned(tmp_path, machine.address))
         wait_for(lambda: any(verdict == "" for verdict in begun_in(tmp_path / "records")))
         run.kill()
         run.join()
