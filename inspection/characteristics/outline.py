@@ -29,6 +29,7 @@ _WIDEST_GAP = 0.2  # of the section's length: an outline that is open wider than
 _SCOUT = 2000
 _CLOSEST = 0.2  # of the steps beside it: over a step shorter than this, round-off would bend a spline
 _AS_LARGE = 1e-6  # of a curvature: samples that differ by less lie on one arc
+_END_ROUNDS = 9  # each narrows the end of an arc sixteenfold
 
 
 class Stations(NamedTuple):
@@ -268,7 +269,7 @@ def _round_range(curve: NurbsCurve, leading_near: Array | None) -> tuple[float, 
         other = one
         one = int(np.argmax(np.hypot(*(points - points[other]).T)))
     length = float(np.hypot(*(points[one] - points[other])))
-    tips = [largest_curvature(curve, u, points[k], FRONT * length) for k in (one, other)]
+    tips = [start + (_tip_around(curve, u, k, FRONT * length) - start) % (end - start) for k in (one, other)]
     place, curvature = curve.point(tips), np.abs(curve.curvature(np.array(tips)))
     if leading_near is not None:
         trailing = int(np.argmax(np.hypot(*(place - leading_near).T)))
@@ -277,6 +278,16 @@ def _round_range(curve: NurbsCurve, leading_near: Array | None) -> tuple[float, 
     else:  # two equal tips, as of an ellipse: the trailing one has the larger x, or above it the larger y
         trailing = int(np.argmax(place[:, 0] if abs(np.ptp(place[:, 0])) > 1e-6 * length else place[:, 1]))
     return tips[trailing], tips[trailing] + end - start
+
+
+def _tip_around(curve: NurbsCurve, u: Array, sample: int, within_mm: float) -> float:
+    """The parameter of the largest curvature near one of the samples u (n,) of a closed outline, wherever its seam lies.
+
+    An edge that is an arc may run through the seam, which is then no end of it: the samples are taken from the far side of the outline.
+    """
+    start, end = curve.domain
+    turn, row = np.divmod(np.arange(len(u)) + sample - len(u) // 2, len(u))
+    return largest_curvature(curve, u[row] + turn * (end - start), curve.point(u[[sample]])[0], within_mm)
 
 
 def dense_parameters(curve: NurbsCurve, first: float, last: float) -> Array:
@@ -295,15 +306,42 @@ def dense_parameters(curve: NurbsCurve, first: float, last: float) -> Array:
 def largest_curvature(curve: NurbsCurve, u: Array, near_mm: Array, within_mm: float) -> float:
     """The parameter of the largest curvature, in either sense, among samples u (n,) that lie near a place (2,).
 
-    Where an edge is an arc, the curvature is as large all along it: then it is the middle of the arc.
+    Where an edge is an arc, the curvature is as large all along it: then it is the middle of the arc, by its length.
     """
-    size = np.where(np.hypot(*(curve.point(u) - near_mm).T) < within_mm, np.abs(curve.curvature(u)), -1.0)
+    curvature = np.abs(curve.curvature(u))
+    size = np.where(np.hypot(*(curve.point(u) - near_mm).T) < within_mm, curvature, -1.0)
     best = int(np.argmax(size))
-    low, high = _run_around(size >= (1 - _AS_LARGE) * size[best], best)
+    least = (1 - _AS_LARGE) * size[best]
+    low, high = _run_around(curvature >= least, best)
     if high - low > 2:
-        return float(u[low] + u[high]) / 2
+        return _middle_of_arc(curve, u, (low, high), least)
     beside = u[max(best - 1, 0)], u[min(best + 1, len(u) - 1)]
     return find_maximum(lambda at: np.abs(curve.curvature(at)), float(beside[0]), float(beside[1]))
+
+
+def _middle_of_arc(curve: NurbsCurve, u: Array, run: tuple[int, int], least: float) -> float:
+    """The parameter in the middle of an arc, by its length, between the samples of a run: its ends lie within a step beyond them."""
+    low, high = run
+    if low == 0 and high == len(u) - 1:
+        return float(u[low] + u[high]) / 2
+    start = _end_of_arc(curve, float(u[low - 1]), float(u[low]), least) if low > 0 else float(u[low])
+    end = _end_of_arc(curve, float(u[high + 1]), float(u[high]), least) if high < len(u) - 1 else float(u[high])
+    before = float(curve.station_mm(start)[0])
+
+    def travelled(at: ArrayLike) -> Array:
+        return np.asarray(unwrap(curve, curve.station_mm(at), before) - before)
+
+    half = float(travelled(end)[0]) / 2
+    return find_maximum(lambda at: -np.abs(travelled(at) - half), start, end)
+
+
+def _end_of_arc(curve: NurbsCurve, outside: float, inside: float, least: float) -> float:
+    """The parameter between one outside of an arc and one inside of it at which the curvature begins to be at least so large."""
+    for _ in range(_END_ROUNDS):
+        looked = np.linspace(outside, inside, 17)
+        first = int(np.argmax(np.append(np.abs(curve.curvature(looked))[:-1] >= least, True)))
+        outside, inside = float(looked[max(first - 1, 0)]), float(looked[first])
+    return inside
 
 
 def _run_around(chosen: NDArray[np.bool_], at: int) -> tuple[int, int]:

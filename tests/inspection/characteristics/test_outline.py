@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from inspection import NominalError, NurbsCurve, discretize, find_airfoil
+from inspection import NominalError, NurbsCurve, discretize, edge_radius, find_airfoil
+from inspection.characteristics.outline import Edge
 from tests.inspection.characteristics.airfoils import bent_ellipse, ellipse_section, invert
 from tests.inspection.profiles import clamped, ellipse, moved_curve, naca, polygon
 
@@ -99,3 +100,35 @@ def test_a_lens_with_corners_at_both_edges_is_refused() -> None:
     lens = NurbsCurve(3, np.array(control, dtype=float), np.array([0, 0, 0, 0, 1, 1, 1, 2, 2, 2, 2.0]), closed=True)
     with pytest.raises(NominalError, match="two corners lie 100 mm apart"):
         find_airfoil(lens)
+
+
+def drop(seam: int, turned_deg: float) -> NurbsCurve:
+    """Arcs of radius 6 about (0, 0) and 1.26 about (62.5, 0), joined by lines that touch both; the seam lies in front of one of 6 pieces.
+
+    The lines lean by asin(237 / 3125); a rational parabola with the weights 50, 41, 62.5 or 62.5, 38, 50 is half an edge.
+    """
+    front, back = (0.45504, 5.98272), (62.5955584, 1.2563712)
+    upper = [(63.76, 1.26 * 38 / 41), back, ((front[0] + back[0]) / 2, (front[1] + back[1]) / 2), front, (-6, 6 * 41 / 38)]
+    ring = np.array([(63.76, 0), *upper, (-6, 0), *((x, -y) for x, y in upper[::-1])])
+    weights = np.array([50, 41, 62.5, 62.5, 62.5, 38, 50, 38, 62.5, 62.5, 62.5, 41])
+    ring, weights = np.roll(ring, -2 * seam, axis=0), np.roll(weights, -2 * seam)
+    knots = np.array([0, *np.repeat(np.arange(7), 2), 6], dtype=float)
+    closed = NurbsCurve(2, np.vstack([ring, ring[:1]]), knots, np.append(weights, weights[0]), closed=True)
+    return moved_curve(closed, turned_deg, (3.0, -8.0))
+
+
+@pytest.mark.parametrize("seam", range(6))
+@pytest.mark.parametrize("way", [1, -1])
+def test_the_tip_of_an_edge_that_is_an_arc_is_its_middle_wherever_the_seam_lies(seam: int, way: int) -> None:
+    curve = drop(seam, 20.0)
+    if way < 0:
+        weights = curve.weights
+        assert weights is not None
+        curve = NurbsCurve(2, curve.control_points_mm[::-1].copy(), 6 - curve.knots[::-1], weights[::-1].copy(), closed=True)
+    section = find_airfoil(curve)
+    c, s = np.cos(np.radians(20.0)), np.sin(np.radians(20.0))
+    for parameter, x in ((section.nose, -6.0), (section.first, 63.76), (section.last, 63.76)):
+        assert section.curve.point(np.array([parameter]))[0] == pytest.approx([3 + c * x, -8 + s * x], abs=1e-9)
+    radii: tuple[tuple[Edge, float], ...] = (("leading", 6.0), ("trailing", 1.26))
+    for edge, radius in radii:
+        assert edge_radius(section, edge, "circle", 80.0).value == pytest.approx(radius, abs=1e-9)
