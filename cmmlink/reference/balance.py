@@ -48,28 +48,35 @@ def without_motion(feet: Sequence[Foot], deviation: Sequence[Decimal], weights: 
     return [d - total(g * m for g, m in zip(row, motion, strict=True)) for row, d in zip(rows, deviation, strict=True)]
 
 
-def held_by_four(feet: Sequence[Foot], arm: Decimal, halves: Sequence[Decimal], first: int = 0) -> Held:
+def held_by_four(feet: Sequence[Foot], arm: Decimal, halves: Sequence[Decimal | None], first: int = 0) -> Held:
     """Four feet whose gradients, each divided by its half width of the zone, cancel with multipliers of which none is small.
 
     arm    : a length by which a rotation counts, some mean distance from the origin
-    halves : (m,) half widths; all 1 for a minimum zone
+    halves : (m,) half widths; all 1 for a minimum zone; None for a foot that is not to hold
     first  : where the search for them begins, so that different cases have different ones
     """
     count = len(feet)
-    rows = [(gx / half, gy / half, turn / arm / half) for foot, half in zip(feet, halves, strict=True) for gx, gy, turn in (foot.gradient,)]
+    rows = [
+        None if half is None else (gx / half, gy / half, turn / arm / half)
+        for foot, half in zip(feet, halves, strict=True)
+        for gx, gy, turn in (foot.gradient,)
+    ]
     margin, step = max(count // 40, 1), max(count // 23, 1)
     for start in range(first, first + count):
         for gaps in ((3, 7, 5), (5, 6, 4), (4, 8, 6), (6, 5, 7), (2, 9, 7), (7, 3, 8), (5, 5, 6)):
             at = [start, *(start + step * sum(gaps[: k + 1]) for k in range(3))]
             chosen = sorted({margin + row % (count - 2 * margin) for row in at})
-            if len(chosen) == 4 and min(b - a for a, b in pairwise(chosen)) > 2 and (held := _balanced(rows, chosen)):
+            four = [rows[row] for row in chosen]
+            if len(chosen) == 4 and min(b - a for a, b in pairwise(chosen)) > 2 and (held := _balanced(chosen, four)):
                 return held
     raise ValueError("no four of these feet hold one another")
 
 
-def _balanced(rows: Sequence[Sequence[Decimal]], chosen: Sequence[int]) -> Held | None:
+def _balanced(chosen: Sequence[int], gradients: Sequence[Sequence[Decimal] | None]) -> Held | None:
     """The null vector of four gradients by Cramer's rule; None where a component of it is small, or all of them are."""
-    four = [rows[row] for row in chosen]
+    four = [each for each in gradients if each is not None]
+    if len(four) < len(chosen):
+        return None
     null = [(-1) ** k * determinant(*(four[j] for j in range(4) if j != k)) for k in range(4)]
     whole = total(abs(each) for each in null)
     sizes = [max(total(g * g for g in row).sqrt(), Decimal("1e-9")) for row in four]

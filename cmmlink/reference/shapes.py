@@ -6,7 +6,7 @@ from functools import cache
 from typing import Literal
 
 from cmmlink.reference.exact_curve import ExactCurve
-from cmmlink.reference.exact_numbers import Number, Pair, total
+from cmmlink.reference.exact_numbers import Number, Pair, rounded, total
 
 Places = Sequence[tuple[Number, Number]]
 
@@ -83,6 +83,23 @@ def angle_piece() -> ExactCurve:
     corners = [(0, 0), (60, 0), (60, 20), (25, 20), (25, 50), (0, 50), (0, 0)]
     knots = [0, *range(7), 6]
     return ExactCurve(1, tuple(map(Decimal, knots)), _pairs(corners), (Decimal(1),) * 7, True)
+
+
+@cache
+def drop() -> ExactCurve:
+    """A section with round edges: arcs of radius 6 about (0, 0) and 1.26 about (62.5, 0), joined by lines that touch both.
+
+    The lines lean by asin(237 / 3125). The arcs are halves of the edges; the tangents of half their angles are 41 / 38 and 38 / 41.
+    """
+    large, small, length = Decimal(6), Decimal("1.26"), Decimal("62.5")
+    sine, cosine = Decimal("0.07584"), Decimal("0.99712")
+    front, back = (large * sine, large * cosine), (length + small * sine, small * cosine)
+    nose, tail = (-large, rounded(large * 41 / 38)), (length + small, rounded(small * 38 / 41))
+    upper = [tail, back, ((front[0] + back[0]) / 2, (front[1] + back[1]) / 2), front, nose]
+    lower = [(x, -y) for x, y in reversed(upper)]
+    start, middle = (length + small, Decimal(0)), (-large, Decimal(0))
+    weights = (41, "62.5", "62.5", "62.5", 38)
+    return pieces([start, *upper, middle, *lower, start], (50, *weights, 50, *reversed(weights), 50))
 
 
 @cache
