@@ -79,6 +79,27 @@ def of_file(folder: Path, text: str, points_mm: Array, decimals: int) -> dict[st
     return judged(carried_out(folder, text, "{type: file, file: points.csv}"))
 
 
+TOUCHED = ("--tip-radius-mm=1.0", f"--form-error-mm={FORM_MM}", "--unpaced")
+
+
+@pytest.mark.parametrize(
+    ("heading", "device", "address"),
+    [
+        ("A coordinate measuring machine behind an I++ DME server", "dme", "127.0.0.1:1294"),
+        ("A machine tool that touches the part on its table", "machine-tool", "127.0.0.1:9100"),
+    ],
+)
+def test_plans_of_the_page_find_the_part_that_is_simulated_without_a_path(heading: str, device: str, address: str, folder: Path) -> None:
+    """The touched section at five points a second, as the page has it; the scanned one as fast as it goes."""
+    text = block(heading, "yaml")
+    with simulated(
+        device, "127.0.0.1:0", folder, *TOUCHED, path_mm=section_mm(), noise_mm=0.0, count=204, rate_hz=5.0, speed_mm_s=5.0
+    ) as machine:
+        ended = carried_out(folder, text.replace(address, machine.address))
+    assert (ended.code, ended.json()["verdict"]) == (0, "conform"), ended.err
+    assert any("neither a checksum nor" in note or "no checksum" in note for note in ended.json()["notes"])
+
+
 def sensor_of(device: str, folder: Path, path_mm: Array, motion: Motion, *options: str) -> tuple[AbstractContextManager[Simulated], Array]:
     """A simulated device that takes these points of the path as fast as they are fetched, and the points (n, 3)."""
     told = [f"--{name.replace('_mm', '-mm').replace('_', '-')}={getattr(motion, name):.17g}" for name in OF_THE_PART]

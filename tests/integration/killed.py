@@ -18,6 +18,8 @@ import numpy as np
 from cmmlink.record.reader import check_chain, list_runs, open_to_read, points_of, reads_of
 from cmmlink.record.recorder import Acknowledged
 from drivers.codecs.ascii_frames import AsciiDecoder
+from drivers.codecs.dme_session import DmeJob
+from drivers.links.dme_machine import DmeMachine
 from drivers.links.serial_scanner import SerialScanner
 from drivers.source import PointBatch
 from tests.cmmlink.recorded import plan_with_known_pose, record, today
@@ -35,6 +37,12 @@ def record_scan(folder: Path, address: str, say: Connection) -> None:
         say.send((acknowledged.wire_bytes, acknowledged.points))
 
     record(folder, SerialScanner(address, AsciiDecoder()), plan=plan_with_known_pose(), acknowledge=acknowledge)
+
+
+def record_machine(folder: Path, address: str, job: DmeJob, say: Connection) -> None:
+    """Record what a measuring machine scans, and say how many points are acknowledged."""
+    source = DmeMachine(address, job, silence_s=60.0)
+    record(folder, source, plan=plan_with_known_pose(), acknowledge=lambda acknowledged: say.send(acknowledged.points))
 
 
 def _said(listen: Connection) -> Iterator[tuple[int, int]]:

@@ -22,7 +22,7 @@ from tests.drivers.codecs.streams import account
 Array = NDArray[np.float64]
 DEFAULT_COLUMNS = ("Q", "X", "Y", "Z")  # as that server sends them; the specification says X, Y, Z, Q
 RADIUS_MM = 3.0
-LEAST_COMMANDS = 1600
+PAGE = (Path(__file__).resolve().parents[2] / "docs" / "machines.md").read_text(encoding="utf-8")
 EXPLAINED = {
     "GoTo(X(10000000))": "their server says 1008, target out of the volume; the golden transcript says 2500 for the same",
     "GoTo(X(123456789))": "the same",
@@ -115,17 +115,29 @@ def exchanges(log: list[tuple[str, str]]) -> Iterator[Exchange]:
 
 def test_our_server_answers_as_theirs_but_for_what_is_explained(logs: list[list[tuple[str, str]]]) -> None:
     everything = [one for log in logs for one in exchanges(log)]
-    assert len(everything) > LEAST_COMMANDS
+    assert f"{len(everything):,} commands" in PAGE
     different = [one for one in everything if one.differs]
     beyond = [one for one in different if one.command[6:].partition("(")[0].strip() not in KNOWN]
     assert all("!0501" in order_of(one.ours) or "!0502" in order_of(one.ours) for one in different if one not in beyond)
     unexplained = [(one.command, order_of(one.theirs), order_of(one.ours)) for one in beyond if one.command[6:] not in EXPLAINED]
     assert not unexplained
     assert {one.command[6:] for one in beyond} == set(EXPLAINED)
+    assert sum(count for _, count in rows_of_page()) == len(different)
+    for names, count in rows_of_page():
+        assert count == sum(one.command[6:].partition("(")[0].strip() in names for one in different), names
+    assert f"{len(everything) - len(different):,} are answered by the same signs" in PAGE
+
+
+def rows_of_page() -> list[tuple[list[str], int]]:
+    """The commands of each row of the page's table of differences, and how many differ."""
+    table = PAGE.split("| commands | how many |")[1].split("\n\n")[0]
+    rows = [line.split("|") for line in table.splitlines()[2:]]
+    return [(re.findall(r"`([A-Za-z]+)`", row[1].partition(" after ")[0]), int(row[2])) for row in rows]
 
 
 def test_our_client_reads_every_line_of_their_server_and_no_wrong_point(logs: list[list[tuple[str, str]]]) -> None:
     points = 0
+    assert f"{sum(who == 'Received' for log in logs for who, _ in log):,} lines" in PAGE
     for log in logs:
         command, reader, columns = dict[str, str](), LineReader(), DEFAULT_COLUMNS
         for who, text in log:

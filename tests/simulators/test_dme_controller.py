@@ -1,9 +1,14 @@
 """The simulated I++ DME server: its golden transcript, its queue, its error state and its daemons."""
 
+from collections.abc import Sequence
+
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
+from simulators.devices.dme import Server
 from simulators.dme_controller import Controller
+from simulators.faults import Injector
 from tests.drivers.codecs.dme_transcript import ABORT, EMERGENCY, GOLDEN, SCANNED_MM, TOUCHED_MM
 
 Array = NDArray[np.float64]
@@ -108,3 +113,41 @@ def test_lines_that_are_none_are_told_under_the_tag_of_the_server() -> None:
     for line in ("A2345 GoTo(X(1))", "00000 GoTo(X(1))", "E0000 AbortE()", "0123456 GoTo()", "\x07"):
         [answer] = said(server, line)
         assert answer.startswith("E0000 ! Error("), line
+
+
+class CutWire:
+    """The line of a client that says its commands in pieces of so many bytes, each when the one before is complete, and then goes."""
+
+    address, is_read_live = "", True
+
+    def __init__(self, commands: Sequence[str], size: int) -> None:
+        self.sent = b""
+        lines = [f"{command}\r\n".encode("ascii") for command in commands]
+        self._commands = [[line[at : at + size] for at in range(0, len(line), size)] for line in lines]
+        self._pieces: list[bytes] = []
+        self._said = 0
+
+    def is_connected(self) -> bool:
+        return self.sent.count(b" %\r\n") < len(self._commands)
+
+    def send(self, data: bytes) -> bool:
+        self.sent += data
+        return True
+
+    def receive(self, wait_s: float) -> bytes:
+        if not self._pieces and self._said == self.sent.count(b" %\r\n"):
+            self._pieces, self._said = [*self._commands[self._said]], self._said + 1
+        return self._pieces.pop(0) if self._pieces else b""
+
+    def unplug(self) -> None:
+        raise NotImplementedError
+
+    plug = close = unplug
+
+
+@pytest.mark.parametrize("size", [1, 2, 7, 1000])
+def test_lines_of_the_client_may_be_cut_anywhere(size: int) -> None:
+    steps = (*GOLDEN[:4], *GOLDEN[6:])
+    wire = CutWire([command for command, _ in steps], size)
+    Server(wire, Controller(ToldPart()), Injector((), 0), paced=False).serve_client()
+    assert wire.sent.decode("ascii") == "".join(f"{line}\r\n" for _, answers in steps for line in answers)

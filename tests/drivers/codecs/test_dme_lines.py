@@ -1,8 +1,12 @@
 """The lines of an I++ DME server: values, numbers and errors, as different servers spell them."""
 
+from itertools import pairwise
+
+import numpy as np
 import pytest
 
-from drivers.codecs.dme_lines import MachineError, error_in, number_in, numbers_in, values_in
+from drivers.codecs.dme_lines import LineReader, MachineError, Response, error_in, number_in, numbers_in, values_in
+from tests.drivers.codecs.dme_transcript import ABORT, EMERGENCY, GOLDEN
 
 
 @pytest.mark.parametrize(
@@ -54,3 +58,27 @@ def test_numbers_are_those_of_the_specification(text: str, value: float) -> None
 def test_nothing_else_is_a_number(text: str) -> None:
     assert number_in(text) is None
     assert numbers_in(f"1,{text}") is None
+
+
+def test_the_lines_of_the_golden_transcript_are_read_at_any_cut() -> None:
+    lines = [line for _, answers in (*GOLDEN, *ABORT) for line in answers] + [EMERGENCY]
+    data = "".join(f"{line}\r\n" for line in lines).encode("ascii")
+    rng = np.random.default_rng(1)
+    for cuts in ([], range(1, len(data)), *(sorted(rng.integers(0, len(data), 9).tolist()) for _ in range(30))):
+        edges, reader = [0, *cuts, len(data)], LineReader()
+        found = [one for first, stop in pairwise(edges) for one in reader.feed(data[first:stop])]
+        assert [one for one in found if not isinstance(one, Response)] == []
+        read = [one for one in found if isinstance(one, Response)]
+        assert [f"{one.tag} {one.sign} {one.data}".strip() for one in read] == lines
+    errors = [error_in(one.data) for one in read if one.sign == "!"]
+    assert [(error.severity, error.code, error.cause) for error in errors if error] == [
+        (3, 2500, "GoTo"),
+        (2, 514, "Get"),
+        (2, 6, "ScanOnCircle"),
+        (3, 500, "HealthCheck"),
+    ]
+    assert [numbers_in(one.data) for one in read if one.sign == "#" and one.tag == "00005"] == [
+        [0.0, 0.0, 1.5, 0.5001, 0.0, 1.5002],
+        [1.0002, 0.0, 1.4999],
+    ]
+    assert [values_in(one.data) for one in read if one.sign == "#" and one.tag == "00006"] == [{"X": "10.0002", "Y": "0", "Z": "1.4998"}]
