@@ -83,7 +83,7 @@ def source_of(plan: Plan, scratch: Scratch | None = None) -> ScanSource:
     """The source of a plan's device; a file of points is read here. Raises PlanError, PointFileError, or StoreError for want of room."""
     device = plan.device
     if isinstance(device, FileDevice):
-        room = scratch or scratch_in(plan.records)
+        room = scratch or scratch_in(plan.records.folder)
         return PointFileSource(device.file, device.scale, unit=device.unit, columns=device.columns, invalid=device.invalid, room=room)
     try:
         if isinstance(device, LinesDevice):

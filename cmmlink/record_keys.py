@@ -1,6 +1,6 @@
-"""The keys of what is said of the records themselves: of backups, of merging, and of where a run comes from."""
+"""The keys of what is said of the records themselves: who signed them, whether they were altered, of backups and of merging."""
 
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import Field
 
@@ -21,6 +21,22 @@ class RecordsCopied(JsonObject):
         "`merge` leaves them out"
     )
     aside: str | None = Field(description="the file that keeps the records that were there before, with `restore --replace`")
+
+
+class RunSigned(JsonObject):
+    """The signature of a run over its id and its `chain_sha256`; docs/records.md tells what exactly is signed."""
+
+    algorithm: str = Field(description="Ed25519")
+    public_key: str = Field(description="the public key, 64 hexadecimal digits")
+    signature: str = Field(description="the signature, 128 hexadecimal digits")
+    key_id: str = Field(description="what the key is called: the first 16 digits of the SHA-256 of the public key")
+
+
+class AnchorTold(JsonObject):
+    """A place outside the computer that was to be told how the run ended."""
+
+    place: str = Field(description="the file")
+    problem: str = Field(description="what kept it from being told, empty where nothing did; it is then told at the next run")
 
 
 class RunOrigin(JsonObject):
@@ -61,3 +77,94 @@ class JudgementKept(JsonObject):
     why: str = Field(description="the reason that was given")
     record: int = Field(description="the number of the record that keeps it")
     chain_sha256: str = Field(description="the hash of that record")
+
+
+class Alteration(JsonObject):
+    """The first record that is not as it was written."""
+
+    number: int = Field(description="its number in the chain")
+    run: str = Field(description="the run that it belongs to, empty where that is not known")
+    kind: str = Field(description="what it holds, like points or result")
+    problem: str = Field(description="what is wrong with it")
+    message: str = Field(description="all of this in one sentence")
+
+
+class Against(JsonObject):
+    """What came of holding a result file against the records."""
+
+    run: str = Field(description="the run that the result file names")
+    disagreements: list[str] = Field(description="what the two say differently, in words; empty where they agree")
+    taken_over: bool = Field(
+        description="whether the result was written at another station, which the run was merged from: then it covers that run alone"
+    )
+
+
+class KeySigned(JsonObject):
+    """A key that runs were signed with."""
+
+    key_id: str = Field(description="what the key is called")
+    public_key: str = Field(description="the public key, 64 hexadecimal digits")
+    runs: int = Field(description="how many of the runs it signed")
+    known_as: Literal["given", "station", "handed over", "another", "evidence"] = Field(
+        description="from where it is known: given with `--key`; the station's own; an earlier or later one of the station; another than "
+        "those that are known; or evidence: the evidence itself names it, and there is nothing to compare it with"
+    )
+
+
+class Signatures(JsonObject):
+    """Who signed the runs."""
+
+    signed: int = Field(description="how many runs are signed")
+    unsigned: list[str] = Field(description="the ids of the runs that nobody signed")
+    keys: list[KeySigned] = Field(description="the keys")
+
+
+class Anchored(JsonObject):
+    """What anchors say of the records."""
+
+    heads: int = Field(description="how many heads in them belong to these records")
+    missing: list[str] = Field(description="the runs whose heads they hold and which are not in the records")
+    last: str | None = Field(description="the last run whose head agrees; what was recorded later is not covered")
+    others: dict[str, int] = Field(description="how many heads of other stations they hold, by the name of the station")
+
+
+class KeyShown(JsonObject):
+    """The answer of `key new`, and the beginning of that of `key show`."""
+
+    key_id: str = Field(description="what the key is called: the first 16 digits of the SHA-256 of the public key")
+    public_key: str = Field(description="the public key, 64 hexadecimal digits")
+    file: str = Field(description="the file of the key: of `show` the public one, of `new` the private one")
+
+
+class KeyHandedOver(JsonObject):
+    """A key that was handed over to another, and the answer of `key rotate`."""
+
+    before: str = Field(description="the public key of before")
+    after: str = Field(description="the public key since then")
+    when: str = Field(description="when that was, in UTC")
+    who: str = Field(description="who did it")
+    why: str = Field(description="the reason that was given")
+    signed_before: str = Field(description="the signature of the key of before")
+    signed_after: str = Field(description="the signature of the key since then")
+
+
+class StationKey(KeyShown):
+    """The answer of `key show`."""
+
+    handovers: list[KeyHandedOver] = Field(description="the keys that were handed over, oldest first")
+
+
+class Verified(JsonObject):
+    """The answer of `verify`."""
+
+    altered: bool = Field(description="whether anything was altered or cut off")
+    run: str | None = Field(description="the run that was asked for; null: all records")
+    records: int = Field(description="the number of sound records")
+    chain_sha256: str = Field(description="the hash of the last sound record, of one run that of its end")
+    first: Alteration | None = Field(description="the first record that was altered")
+    state: Literal["intact and signed", "signed by another key", "intact but unsigned", "altered", "cut off"] = Field(
+        description="what the records are: of several runs the least that is proven"
+    )
+    signatures: Signatures | None = Field(description="who signed the runs; null where something was altered")
+    anchors: Anchored | None = Field(description="with `--anchors`: what they say of these records")
+    against: Against | None = Field(default=None, description="with `--against`: whether the result file and the records agree")

@@ -21,7 +21,7 @@ from cmmlink.inspection_keys import (
     Worst,
     Zone,
 )
-from cmmlink.record_keys import JudgedAgain, JudgementKept, RunOrigin
+from cmmlink.record_keys import AnchorTold, JudgedAgain, JudgementKept, RunOrigin, RunSigned
 from cmmlink.version import ResultSchema
 from cmmlink.words import VerdictName
 
@@ -97,10 +97,12 @@ class Recorded(Measured):
     """The result of `inspect`, `run` and `demo`: also what ties it to its record."""
 
     run: str = Field(description="the id of the recorded run")
-    chain_sha256: str = Field(description="the hash of the run's last record, which follows from every record before it")
+    chain_sha256: str = Field(description="the hash of the run's end, which follows from every record before it")
     plan_sha256: str = Field(description="the hash of the effective plan")
     nominal_sha256: str = Field(description="the hash of the nominal's file")
     software: dict[str, str] = Field(description="the versions of everything that the result depends on")
+    signature: RunSigned | None = Field(description="the signature of the run; null where it is not signed, which a note explains")
+    anchors: list[AnchorTold] = Field(description="the places of the plan's `records.anchor`, and whether each was told of the run")
 
 
 class Failure(JsonObject):
@@ -171,7 +173,8 @@ class SectionInspected(Inspected):
     ending: Ending = Field(description="how the inspection of this section ended")
     warnings: list[str] = Field(description="what was not as it should be in this section")
     run: str | None = Field(description="the id of the recorded run that this section is; null where nothing was recorded")
-    chain_sha256: str | None = Field(description="the hash of that run's last record")
+    chain_sha256: str | None = Field(description="the hash of that run's end")
+    signature: RunSigned | None = Field(description="the signature of that run; null where it is not signed")
 
 
 class ShareOfSection(JsonObject):
@@ -214,6 +217,7 @@ class StackInspected(JsonObject):
     characteristics: list[StackCharacterised] = Field(description="every characteristic of the stack, in the order of the plan")
     qualification: QualificationNamed | None = Field(description="the last qualification of the installation; null where none was made")
     notes: list[str] = Field(description="what holds for all sections")
+    anchors: list[AnchorTold] = Field(description="the places of the plan's `records.anchor`, and whether each was told of the sections")
 
 
 class NominalPlane(JsonObject):
@@ -332,6 +336,7 @@ class Shown(JsonObject):
     serial_number: str = Field(description="the serial number of the part, empty where none was given")
     operator: str = Field(description="who measured, empty where nobody was named")
     plan_file: str | None = Field(default=None, description="the name of the plan's file; records of earlier versions have none")
+    station: str | None = Field(default=None, description="the name of the station; records of earlier versions have none")
     device: str = Field(description="the device that the points came from")
     simulated: bool = Field(description="whether the device was a simulated one")
     qualification: QualificationNamed | None = Field(
@@ -351,7 +356,9 @@ class Shown(JsonObject):
     verdict: VerdictName | None = Field(description="the verdict; null where there is none")
     coverage: float | None = Field(description="the share of the profile that was measured; null where no part was found")
     result: Inspected | None = Field(description="the recorded result; null where the run gave none")
-    chain_sha256: str = Field(description="the hash of the run's last record; empty while the run goes on")
+    chain_sha256: str = Field(description="the hash of the run's end; empty while the run goes on")
+    signature: RunSigned | None = Field(description="the signature of the run; null where it is not signed")
+    anchors: list[AnchorTold] = Field(description="the places that were to be told how the run ended")
     origin: RunOrigin | None = Field(default=None, description="where the run was taken over from; null: it was recorded here")
     derived: list[JudgedAgain] = Field(default=[], description="what it was found to be when it was judged again, oldest first")
     recorded: Kept = Field(description="how much was recorded")
@@ -376,37 +383,6 @@ class Reported(JsonObject):
 
     run: str = Field(description="the id of the run, or that of the stack")
     file: str = Field(description="the PDF file that was written")
-
-
-class Alteration(JsonObject):
-    """The first record that is not as it was written."""
-
-    number: int = Field(description="its number in the chain")
-    run: str = Field(description="the run that it belongs to, empty where that is not known")
-    kind: str = Field(description="what it holds, like points or result")
-    problem: str = Field(description="what is wrong with it")
-    message: str = Field(description="all of this in one sentence")
-
-
-class Against(JsonObject):
-    """What came of holding a result file against the records."""
-
-    run: str = Field(description="the run that the result file names")
-    disagreements: list[str] = Field(description="what the two say differently, in words; empty where they agree")
-    taken_over: bool = Field(
-        description="whether the result was written at another station, which the run was merged from: then it covers that run alone"
-    )
-
-
-class Verified(JsonObject):
-    """The answer of `verify`."""
-
-    altered: bool = Field(description="whether anything was altered")
-    run: str | None = Field(description="the run that was asked for; null: all records")
-    records: int = Field(description="the number of sound records")
-    chain_sha256: str = Field(description="the hash of the last sound record")
-    first: Alteration | None = Field(description="the first record that was altered")
-    against: Against | None = Field(default=None, description="with `--against`: whether the result file and the records agree")
 
 
 class ZoneVerified(JsonObject):

@@ -9,7 +9,7 @@ import logging
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,7 @@ from cmmlink.events import Answered, Event, RunStarted, Sink
 from cmmlink.from_plan import inspection_of, notes_on_datum, notes_on_nominal, notes_on_temperature, run_started, with_section, zone_of
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan import FileDevice, LinesDevice, Plan
-from cmmlink.record import PATIENCE_S, QUEUE_BYTES, Recorder, RecordReference, RunInputs, open_to_record
+from cmmlink.record import PATIENCE_S, QUEUE_BYTES, Recorder, RecordReference, RunInputs, anchor_ends, open_to_record, seal_of
 from cmmlink.result_folder import folder_of
 from cmmlink.result_json import density_notes, density_of, result_json, run_document, stations_of
 from cmmlink.run_log import log_event
@@ -132,14 +132,17 @@ def carry_out(
     scratch = scratch_in(records)
     _log.info("%s", words_of_room(scratch.folder))
     live = inspection_of(plan, profile, scratch, provisional=followed)
-    started = run_started(plan, device.device, device.simulated, (*assumed, *notes_on_zone(plan), *_notes_on_end(plan), *device.notes))
+    notes = (*assumed, *notes_on_zone(plan), *_notes_on_end(plan), *device.notes)
     on_ready()
     with ExitStack() as stack:
         recorder: Recorder | None = None
         if records is not None:
             store = stack.enter_context(open_to_record(records, now, patience_s))
             queue_bytes = QUEUE_BYTES if followed else _FILE_BYTES
-            recorder = stack.enter_context(Recorder(store, RunInputs.of(plan), clock=clock, now=now, queue_bytes=queue_bytes))
+            seal = seal_of(store, station=plan.records.station, key=plan.records.key)
+            recorder = stack.enter_context(Recorder(store, RunInputs.of(plan), clock=clock, now=now, queue_bytes=queue_bytes, seal=seal))
+            notes = (*notes, *seal.notes)
+        started = run_started(plan, device.device, device.simulated, notes)
         began = recorder.began if recorder else now()
         answer = _answer_of(plan, [*sinks, log_event], now)
         listeners: list[Sink] = [*([recorder] if recorder else []), *sinks, log_event, *([answer] if answer else [])]
@@ -156,7 +159,10 @@ def carry_out(
             shown=shown,
             cut_short="when failed" if plan.stop_when_failed else "never",
         )
-    evidence = recorder.evidence if recorder else None
+        evidence = recorder.evidence if recorder else None
+        if evidence is not None:
+            told = anchor_ends(store, plan.records.anchor, seal.station, utc_words(now()), [evidence])
+            evidence = replace(evidence, anchors=[one.model_dump() for one in told])
     if evidence is not None:
         _log.info("recorded in %s as run %s, chain %s, plan %s", records, evidence.run, evidence.chain_sha256, evidence.plan_sha256)
     answered = answer.deliver(outcome, evidence.run if evidence else "") if answer else None

@@ -20,8 +20,8 @@ from cmmlink.from_plan import inspection_of
 from cmmlink.outline import Outline, place_of
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan import NO_RESULTS, CtPlan, FileDevice, Plan, Section
-from cmmlink.record import Recorder, RunInputs, Store
-from cmmlink.words import VERDICT_WORDS
+from cmmlink.record import Recorder, RecordReference, RunInputs, Seal, Store, Told, anchor_ends
+from cmmlink.words import VERDICT_WORDS, utc_words
 from drivers import MeshError, Rejected, ScanClosed, ScanOpened, ScanSource
 from drivers.surface import Contour, ContourSource, SurfaceSection, add_points_between
 from inspection import Characteristic, Evaluation, NominalProfile, Reason, RegistrationError, SectionCharacteristic, evaluate
@@ -56,9 +56,10 @@ def plan_of_section(plan: CtPlan, cut: SurfaceSection, nominal: Path) -> Plan:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StackRecord:
-    """Where the sections of one stack are recorded. `facts` are what every section says of its stack."""
+    """Where the sections of one stack are recorded, and how their runs end. `facts` are what every section says of its stack."""
 
     store: Store
+    seal: Seal
     facts: Mapping[str, Any]
     clock: Callable[[], float]
     now: Callable[[], datetime]
@@ -67,6 +68,7 @@ class StackRecord:
     def of(
         cls,
         store: Store,
+        seal: Seal,
         plan: CtPlan,
         triangles: int,
         sections: int,
@@ -92,13 +94,17 @@ class StackRecord:
             "triangles": triangles,
             "plan": plan.effective_yaml(),
         }
-        return cls(store, facts, clock, now)
+        return cls(store, seal, facts, clock, now)
 
     def recorder(self, number: int, cut: SurfaceSection, plan: Plan, doubt: Reason | None) -> Recorder:
         """A recorder for one section; `number` counts from 1."""
         place = {"section": number, "height_mm": cut.height_mm, "asked_height_mm": cut.asked_mm, "cutter": cut.cutter}
         place["doubt"] = doubt.words if doubt else None
-        return Recorder(self.store, RunInputs.of(plan, {**self.facts, **place}), clock=self.clock, now=self.now)
+        return Recorder(self.store, RunInputs.of(plan, {**self.facts, **place}), clock=self.clock, now=self.now, seal=self.seal)
+
+    def tell_ends(self, places: Sequence[Path], sections: Sequence[RecordReference]) -> tuple[Told, ...]:
+        """Tell every place outside how the runs of the sections ended; see `anchor_ends`."""
+        return anchor_ends(self.store, places, self.seal.station, utc_words(self.now()), sections)
 
 
 @contextmanager

@@ -26,7 +26,7 @@ from cmmlink.last_qualification import qualification_here
 from cmmlink.outline import outline_of
 from cmmlink.pipeline import RunOutcome
 from cmmlink.plan import CtPlan, Plan
-from cmmlink.record import PATIENCE_S, RecordReference, open_to_record
+from cmmlink.record import PATIENCE_S, RecordReference, Told, open_to_record, seal_of
 from cmmlink.result_folder import folder_of
 from cmmlink.result_json import result_json
 from cmmlink.section_run import (
@@ -109,6 +109,7 @@ class SectionOutcome:
             "warnings": list(self.warnings),
             "run": self.evidence.run if self.evidence else None,
             "chain_sha256": self.evidence.chain_sha256 if self.evidence else None,
+            "signature": self.evidence.signature if self.evidence else None,
         }
 
 
@@ -117,6 +118,7 @@ class StackOutcome:
     """The inspected sections of a surface. `asked` is how many the plan asks for; `notes` apply to all of them.
 
     characteristics : those of the stack, in the order of the plan
+    anchors : the places outside that were to be told how the runs of the sections ended
     """
 
     mesh: SurfaceMesh
@@ -125,6 +127,7 @@ class StackOutcome:
     notes: tuple[str, ...]
     began: datetime
     characteristics: tuple[StackCharacteristicResult, ...] = ()
+    anchors: tuple[Told, ...] = ()
 
     @property
     def complete(self) -> bool:
@@ -170,6 +173,7 @@ class StackOutcome:
             "characteristics": [stack_characteristic_json(one) for one in self.characteristics],
             "qualification": self.qualification,
             "notes": list(self.notes),
+            "anchors": [one.model_dump() for one in self.anchors],
         }
 
 
@@ -215,12 +219,13 @@ def inspect_stack(
         record = None
         if records is not None:
             store = opened.enter_context(open_to_record(records, now, patience_s))
-            record = StackRecord.of(store, plan, mesh.triangles, len(heights), began=began, clock=clock, now=now)
+            seal = seal_of(store, station=plan.records.station, key=plan.records.key)
+            record = StackRecord.of(store, seal, plan, mesh.triangles, len(heights), began=began, clock=clock, now=now)
         on_start(len(heights))
         foresight.expect(len(heights), len(plan.characteristics) + max(numbers))
         read_in = [f"{plan.mesh.file.name}: read in {plan.mesh.unit}, as asked"] if plan.mesh.unit else []
         notes = [*read_in, *mesh.warnings, *profiles.notes, *notes_on_temperature(plan), *notes_on_zone(plan)]
-        notes += [warning for _, warning in [qualification_here()] if warning]
+        notes += [*filter(None, [qualification_here()[1]]), *(record.seal.notes if record else ())]
         sections: list[SectionOutcome] = []
         slices: Iterator[SurfaceSection] = opened.enter_context(closing(_slices(plan, mesh, heights, open3d, notes, profiles.shortest_mm)))
         if plan.stack_fit == "common":
@@ -243,10 +248,11 @@ def inspect_stack(
             if stop.is_set():
                 notes.append(f"aborted by the operator after {len(sections)} of {len(heights)} sections")
                 break
+        told = record.tell_ends(plan.records.anchor, [one.evidence for one in sections if one.evidence]) if record else ()
     if all(section.run.result is None for section in sections) and sections[0].run.refusal is not None:
         raise sections[0].run.refusal
     judged = [JudgedSection(section.slice.asked_mm, section.slice.height_mm, section.run) for section in sections]
-    outcome = StackOutcome(mesh, tuple(sections), len(heights), tuple(notes), began, questions.judge(judged, len(heights)))
+    outcome = StackOutcome(mesh, tuple(sections), len(heights), tuple(notes), began, questions.judge(judged, len(heights)), told)
     _log.info("%s: %s, %d of %d sections. %s", surface_words(plan), outcome.verdict.word, len(sections), len(heights), "; ".join(notes))
     return outcome
 

@@ -110,3 +110,8 @@ def named_first(names: Sequence[str]) -> str:
 def printable(text: str) -> str:
     """The text without signs that steer a terminal, each spelled out in its place; lines stay lines."""
     return "".join(sign if sign.isprintable() or sign == "\n" else repr(sign)[1:-1] for sign in text)
+
+
+def anchor_words(place: str, problem: str) -> str:
+    """That a place outside was not told how a run ended, for the operator: it changes nothing of the verdict."""
+    return f"the end of this run was not told to {place}: {problem}. It is kept and told at the next run; the verdict and the record stand"

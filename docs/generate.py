@@ -23,7 +23,7 @@ from cmmlink.plan.surface import CtPlan
 from cmmlink.qualification import QUANTITIES
 from cmmlink.qualification_keys import Qualified
 from cmmlink.record import evidence, export
-from cmmlink.record_keys import RecordsCopied
+from cmmlink.record_keys import KeyHandedOver, RecordsCopied, StationKey, Verified
 from cmmlink.report import stack_folder
 from cmmlink.result_keys import (
     Exported,
@@ -37,7 +37,6 @@ from cmmlink.result_keys import (
     Shown,
     StackInspected,
     Understood,
-    Verified,
     ZonesVerified,
 )
 from cmmlink.version import RESULT_SCHEMA
@@ -160,6 +159,8 @@ OBJECTS: tuple[tuple[str, type[BaseModel], type[BaseModel] | None], ...] = (
     ("`verify`", Verified, None),
     ("`verify-zone`", ZonesVerified, None),
     ("`qualify`, and its certificate", Qualified, None),
+    ("`key show`; `key new` prints its first three keys", StationKey, None),
+    ("`key rotate`", KeyHandedOver, None),
     ("`backup`, `restore` and `merge`", RecordsCopied, None),
 )
 

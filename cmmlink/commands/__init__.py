@@ -19,17 +19,19 @@ from cmmlink.commands.compare import compare
 from cmmlink.commands.console import serve_console
 from cmmlink.commands.exit_codes import DEVICE_FAILED, NO_RECORD, STOPPED, UNUSABLE, fail_as_asked, fail_in_words
 from cmmlink.commands.export import export
+from cmmlink.commands.key import key
 from cmmlink.commands.measure import demo, run
 from cmmlink.commands.plans import example, plan
 from cmmlink.commands.point_files import inspect
 from cmmlink.commands.proofs import verify_zone
 from cmmlink.commands.qualification import qualify
-from cmmlink.commands.records import replay, runs, show, verify
+from cmmlink.commands.records import replay, runs, show
 from cmmlink.commands.reference_set import reference
 from cmmlink.commands.registers import registers
 from cmmlink.commands.report import report
 from cmmlink.commands.setup import doctor, list_ports, nominal, prepare, simulate
 from cmmlink.commands.surfaces import ManyHeights, ct
+from cmmlink.commands.verify import verify
 from cmmlink.errors import PlanError, RunError, StoreError
 from cmmlink.log import keep_log, log_command, log_folder
 from cmmlink.version import __version__
@@ -65,7 +67,8 @@ app.command(short_help="Write recorded runs as files, also for other programs.")
 app.command(short_help="Write the report of a recorded run as a PDF.")(report)
 app.command(short_help="Lay two scans of one profile over one another.")(compare)
 app.command(short_help="Judge a recorded run again, also with another plan.")(replay)
-app.command(short_help="Show whether a record was altered.")(verify)
+app.command(short_help="Show whether a record was altered, and who signed it.")(verify)
+app.add_typer(key, name="key")
 app.command("verify-zone", short_help="Check the proofs of minimum zones and least consumptions.")(verify_zone)
 app.command(short_help="Write points and nominals whose truth is known.")(reference)
 app.command(short_help="Copy all records to one checked file.")(backup)

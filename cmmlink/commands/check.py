@@ -54,7 +54,7 @@ def _check_scan(plan: "Plan", plan_file: Path) -> int:
         return _fail_with(plan_file, as_mistakes(plan_file, found.problems))
     zone = zone_of(plan, profile)
     typer.echo(f"{plan_file} can be run: {plan.part.name}, zone {zone.lower_mm:+g} .. {zone.upper_mm:+g} mm, {words_of(plan.device)}")
-    typer.echo(f"records in {words_of_room(plan.records or records_folder(None))}")
+    typer.echo(f"records in {words_of_room(plan.records.folder or records_folder(None))}")
     typer.echo(f"nominal {profile.length_mm:.3f} mm long, {len(profile)} samples, material on the {profile.material}")
     typer.echo(f"decision rule: {zone.decision_rule}")
     _print_notes(found.notes)

@@ -93,7 +93,7 @@ def run(
 
     plan = load_plan(plan_file)
     profile = check_plan(plan, plan_file)
-    output = Output(headless, as_json, out or plan.out.folder, records or plan.records, no_browser)
+    output = Output(headless, as_json, out or plan.out.folder, records or plan.records.folder, no_browser)
     plan, notes = NextPart(serial, operator, count_up).of(plan, records_folder(output.records), asks=not as_json)
     prepare(output.out)
     connect_part = partial(_connect_part, connect, plan.part.serial_number, notes)

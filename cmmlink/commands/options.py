@@ -1,5 +1,6 @@
 """Options that several commands share, and what they mean."""
 
+import getpass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -131,3 +132,13 @@ def _section_of(given: tuple[float, ...], plane: PlaneName) -> dict[str, Any]:
     except ValueError as error:
         raise PlanError(f"--section: {error}") from None
     return {"origin_mm": given[:3], "normal": tuple(axes.normal.tolist()), "x_axis": tuple(axes.x.tolist())}
+
+
+def who_asks(operator: str | None) -> str:
+    """Who does something that is kept with his name: as --operator says, else the user of this computer. Raises PlanError."""
+    if operator:
+        return operator
+    try:
+        return getpass.getuser()
+    except (OSError, KeyError, ImportError):  # which of them depends on the system and the version of Python
+        raise PlanError("the system does not tell who you are; expected --operator O") from None

@@ -16,6 +16,7 @@ import typer
 from cmmlink.commands.exit_codes import DEVICE_FAILED, EXIT_OF, NO_RECORD, UNUSABLE, say
 from cmmlink.commands.progress import progress
 from cmmlink.errors import StoreError
+from cmmlink.words import anchor_words
 from inspection import NotMeasured
 
 if TYPE_CHECKING:
@@ -80,6 +81,9 @@ def report_outcome(run: "FinishedRun", output: Output, pictures: "Pictures | Non
         message = message or "stopped by the operator: the scan is not complete"
     if message:
         say(message)
+    for told in evidence.anchors if evidence is not None else ():
+        if told["problem"]:
+            say(anchor_words(told["place"], told["problem"]))
     written: Sequence[str] = ()
     folder: Path | None = None
     try:

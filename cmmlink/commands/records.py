@@ -1,6 +1,5 @@
-"""Commands on what was recorded: list, show, judge again, verify."""
+"""Commands on what was recorded: list, show, judge again."""
 
-import getpass
 import os
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from cmmlink.commands.exit_codes import EXIT_OF, NO_RECORD, UNUSABLE, fail
-from cmmlink.commands.options import Json, Out, Records, RunName, RunOrFolder, records_folder
+from cmmlink.commands.options import Json, Out, Records, RunName, RunOrFolder, records_folder, who_asks
 from cmmlink.commands.output import now, print_json, terminal
 from cmmlink.commands.progress import progress
 from cmmlink.errors import PlanError, RunError
@@ -27,19 +26,6 @@ VerdictSought = Literal["conform", "nonconform", "uncertain", "none"]
 SortKey = Literal["started", "part", "serial_number", "operator", "plan_file", "state", "verdict"]
 
 _DETAILS = ("run", "started", "ended", "state", "message", "verdict", "part", "serial_number", "operator", "device", "chain_sha256")
-_MOST_DISAGREEMENTS = 5
-_PROVES = (
-    "This shows that the file fits together as it is. It does not show a file that was written anew, hashes and all, or whose last runs "
-    "were cut off: `cmmlink verify --against result.json` does, with a result that was kept elsewhere."
-)
-_PROVES_AGAINST = (
-    "The result of run {run} and the records agree: nothing up to the end of that run was changed, cut off or added since the result was "
-    "written. What was recorded later is not covered by it."
-)
-_PROVES_OF_MERGED = (
-    "The result of run {run} and the records agree: the run was merged from another station, and nothing of it was changed since the "
-    "result was written there. The other records are not covered by it."
-)
 _DAYS = ["%Y-%m-%d"]
 _LONGEST_HEADLINE = len("INTERRUPTED AT 99 %")
 
@@ -113,6 +99,10 @@ def show(name: RunName, records: Records = None, as_json: Json = False) -> int:
         _say(f"note: {note}")
     for key in ("software", "recorded"):
         _say(f"{key:<14} {', '.join(f'{name} {value}' for name, value in found[key].items() if value)}")
+    if (signature := found["signature"]) is not None:
+        _say(f"{'signed':<14} by the key {signature['key_id']}")
+    for told in found["anchors"]:
+        _say(f"{'anchor':<14} {told['place']}: {'not told, ' + told['problem'] if told['problem'] else 'told'}")
     if (origin := found["origin"]) is not None:
         _say(f"{'origin':<14} merged {_local(origin['merged'])} from {origin['file']}, its chain there {origin['chain_sha256']}")
     for judged in found["derived"]:
@@ -176,7 +166,7 @@ def replay(
     kept = None
     if reason is not None:
         with open_to_record(folder, now) as store:
-            kept = keep_judgement(store, recorded, again, who=operator or _user(), why=reason.strip(), now=now())
+            kept = keep_judgement(store, recorded, again, who=who_asks(operator), why=reason.strip(), now=now())
     document = {"schema": RESULT_SCHEMA, **again.result_json} | {
         "replay_of": recorded.run,
         "chain_sha256": recorded.chain_sha256 if evidence is None else evidence.chain_sha256,
@@ -236,14 +226,6 @@ def _settings_in(texts: Sequence[str]) -> dict[str, str]:
     return changes
 
 
-def _user() -> str:
-    """The name of the user of this computer. Raises PlanError where the system does not tell it."""
-    try:
-        return getpass.getuser()
-    except (OSError, KeyError, ImportError):  # which of them depends on the system and the version of Python
-        raise PlanError("the system does not tell who you are; expected --operator O") from None
-
-
 def _print_replay(again: "Replay", run_id: str, notes: Sequence[str]) -> None:
     from cmmlink.report import print_summary
 
@@ -257,51 +239,3 @@ def _print_replay(again: "Replay", run_id: str, notes: Sequence[str]) -> None:
     elif again.identical:
         typer.echo(f"identical to the recorded result of run {run_id}, to the last bit")
         typer.echo(f"SHA-256 of the result and of every deviation: {again.result_sha256}")
-
-
-def verify(
-    name: Annotated[str | None, typer.Argument(metavar="[RUN]", help="One run; without it all records.")] = None,
-    against: Annotated[
-        Path | None, typer.Option(metavar="result.json", help="Hold a result file against all records, which its hash covers.")
-    ] = None,
-    records: Records = None,
-    as_json: Json = False,
-) -> int:
-    """Recompute the hash chain and name the first record that was altered.
-
-    A chain has no key: whoever may write the file can write it anew, hashes and all, or cut off its end. A result file that was kept
-    elsewhere shows that, with --against.
-    """
-    from cmmlink.record import check_chain, disagreements, find_run, open_to_read, origin_of, read_result
-
-    result = None if against is None else read_result(against)
-    with open_to_read(records_folder(records), now, close_interrupted=False) as store:
-        run = find_run(store, name) if name else None
-        if result is not None and run not in (None, result["run"]):
-            raise PlanError(f"{against}: it is the result of run {result['run']}, not of run {run}")
-        with progress("recomputing the hashes"):
-            found = check_chain(store, None if result is not None else run)
-        if result is not None:
-            told = [] if found["altered"] else disagreements(store, result)
-            origin = None if told or found["altered"] else origin_of(store, result["run"])
-            taken_over = origin is not None and origin.chain_sha256 == result["chain_sha256"]
-            found["against"] = {"run": result["run"], "disagreements": told, "taken_over": taken_over}
-    if as_json:
-        print_json(found)
-    return _verified(found, silent=as_json)
-
-
-def _verified(found: Mapping[str, Any], silent: bool) -> int:
-    """Say what was found, and what that proves. Returns the exit code."""
-    against = found.get("against", {"run": None, "disagreements": [], "taken_over": False})
-    if found["altered"]:
-        return NO_RECORD if silent else fail(found["first"]["message"], NO_RECORD)
-    if against["disagreements"]:
-        told = "; ".join(against["disagreements"][:_MOST_DISAGREEMENTS])
-        more = len(against["disagreements"]) - _MOST_DISAGREEMENTS
-        return NO_RECORD if silent else fail(told + (f"; and {more} more" if more > 0 else ""), NO_RECORD)
-    if not silent:
-        typer.echo(f"nothing was altered: {found['records']} records, chain {found['chain_sha256']}")
-        proves = _PROVES if against["run"] is None else _PROVES_OF_MERGED if against["taken_over"] else _PROVES_AGAINST
-        typer.echo(proves.format(run=against["run"]))
-    return 0

@@ -244,7 +244,7 @@ def _judge_stack(plan: "CtPlan", output: Output, bar: "_SectionBar", pictures: "
             plan,
             clock=time.monotonic,
             stop=stop,
-            records=None if no_record else records_folder(output.records or plan.records),
+            records=None if no_record else records_folder(output.records or plan.records.folder),
             patience_s=_PATIENCE_S,
             on_start=begin,
             on_section=add,

@@ -8,7 +8,17 @@ from cmmlink.errors import RunError, StoreError
 from cmmlink.events import Counts, RunStarted
 from cmmlink.exports.earlier_results import earlier_notes, with_keys_of_today
 from cmmlink.exports.measured_part import MeasuredPart, part_of_document
-from cmmlink.record import RecordedRun, Store, end_missing, recorded_plan, recorded_profile, recorded_run, unpack_judged
+from cmmlink.record import (
+    RecordedRun,
+    Store,
+    anchors_of,
+    end_missing,
+    recorded_plan,
+    recorded_profile,
+    recorded_run,
+    signature_of,
+    unpack_judged,
+)
 from cmmlink.result_json import density_notes, density_of, result_json, run_document
 from cmmlink.words import utc_words
 from inspection import JudgedRows, NominalProfile
@@ -58,9 +68,15 @@ def document_on_record(store: Store, recorded: RecordedRun, profile: NominalProf
         *density_notes(density_of(stations, profile.length_mm), profile.length_mm),
     ]
     began = utc_words(datetime.fromisoformat(recorded.header["started"]))
-    return run_document(found, started, notes, end["state"], began, _evidence(recorded))
+    return run_document(found, started, notes, end["state"], began, _evidence(store, recorded))
 
 
-def _evidence(recorded: RecordedRun) -> Mapping[str, Any]:
-    header = recorded.header
-    return {"run": recorded.run, "chain_sha256": recorded.chain_sha256, **{key: header[key] for key in _HASHES if key in header}}
+def _evidence(store: Store, recorded: RecordedRun) -> Mapping[str, Any]:
+    header, signature = recorded.header, signature_of(store, recorded.run)
+    return {
+        "run": recorded.run,
+        "chain_sha256": recorded.chain_sha256,
+        **{key: header[key] for key in _HASHES if key in header},
+        "signature": None if signature is None else signature.beside_result(),
+        "anchors": [one.model_dump() for one in anchors_of(store, recorded.run)],
+    }

@@ -20,6 +20,7 @@ from cmmlink.plan.answer import ANSWER, Answer
 from cmmlink.plan.datum import Datum
 from cmmlink.plan.deciding import PROFILE, Deciding
 from cmmlink.plan.dme import DmeSettings
+from cmmlink.plan.keeping import RECORDS, RecordKeeping, RecordsOrFolder
 from cmmlink.plan.lines import LinesSettings
 from cmmlink.plan.report import REPORT, ReportSettings
 from cmmlink.plan.results import OUT, Results, ResultsOrFolder
@@ -44,7 +45,6 @@ Address = Annotated[Text, AfterValidator(_address)]
 _SILENCE = "how long a device may send nothing before it counts as failed"
 _RECONNECT = "how long a lost link is tried again while the run goes on"
 _PARITY = "the parity of a serial port: none, even or odd"
-RECORDS = "the folder of the run records; null: the user's own. A console keeps all its runs in one folder"
 _STOP = (
     "whether the scan is ended as soon as it is proven that the part can no longer pass; a machine that can be told so stops. A scan of "
     "such a plan that somebody ends early is not complete either"
@@ -309,7 +309,7 @@ class Plan(Deciding):
     out: ResultsOrFolder = Field(default=Results(), description=OUT)
     answer: Answer | None = Field(default=None, description=ANSWER)
     report: ReportSettings = Field(default=ReportSettings(), description=REPORT)
-    records: Path | None = Field(default=None, description=RECORDS)
+    records: RecordsOrFolder = Field(default=RecordKeeping(), description=RECORDS)
 
     @field_validator("serial_number")
     @classmethod
@@ -431,7 +431,7 @@ def _with_paths_from(folder: Path, plan: Plan) -> Plan:
             "device": device,
             "out": plan.out.with_path_from(folder),
             "answer": None if plan.answer is None else plan.answer.model_copy(update={"file": folder / plan.answer.file}),
-            "records": folder / plan.records if plan.records else None,
+            "records": plan.records.with_path_from(folder),
             "report": plan.report.with_path_from(folder),
         }
     )

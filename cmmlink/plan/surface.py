@@ -15,9 +15,10 @@ from cmmlink.errors import PlanError, YamlError
 from cmmlink.plan.characteristics import AskedProfile
 from cmmlink.plan.cutters import CutterName
 from cmmlink.plan.deciding import Deciding, check_names
+from cmmlink.plan.keeping import RECORDS, RecordKeeping, RecordsOrFolder
 from cmmlink.plan.report import REPORT, ReportSettings
 from cmmlink.plan.results import NO_RESULTS, OUT, ResultsOrFolder
-from cmmlink.plan.scan import RECORDS, Nominal, Part, Registration, Unit, place_of
+from cmmlink.plan.scan import Nominal, Part, Registration, Unit, place_of
 from cmmlink.plan.stack_characteristics import AskedOfStack
 from cmmlink.plan.yaml_model import Positive, Settings, read_model
 from drivers import PointFileError, mm_per, read_text
@@ -107,7 +108,7 @@ class CtPlan(Deciding):
     )
     out: ResultsOrFolder = Field(default=NO_RESULTS, description=f"{OUT}; so it is without this key")
     report: ReportSettings = Field(default=ReportSettings(), description=REPORT)
-    records: Path | None = Field(default=None, description=RECORDS)
+    records: RecordsOrFolder = Field(default=RecordKeeping(), description=RECORDS)
 
     @field_validator("stack_fit")
     @classmethod
@@ -164,7 +165,7 @@ def load_ct_plan(path: str | PathLike[str]) -> CtPlan:
             "nominal": plan.nominal.model_copy(update={"file": folder / plan.nominal.file}),
             "sections": plan.sections.model_copy(update={"nominal_at": own}),
             "out": plan.out.with_path_from(folder),
-            "records": folder / plan.records if plan.records else None,
+            "records": plan.records.with_path_from(folder),
             "report": plan.report.with_path_from(folder),
         }
     )

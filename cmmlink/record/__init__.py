@@ -4,12 +4,15 @@ TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer 
 
 if TYPE_CHECKING:
     from cmmlink.record.against import disagreements, read_result
+    from cmmlink.record.anchors import Head, Told, anchor_ends, anchors_of, heads_in
     from cmmlink.record.backup import Copied, back_up, merge, restore
     from cmmlink.record.bodies import unpack_judged
     from cmmlink.record.chain import Draft, Record
     from cmmlink.record.derived import Change, derived_of
     from cmmlink.record.evidence import Evidence, is_evidence, open_evidence
     from cmmlink.record.export import export_run
+    from cmmlink.record.handover import handover_words, handovers_of, rotate_key
+    from cmmlink.record.keys import make_key, public_key_given, read_key
     from cmmlink.record.origin import origin_of
     from cmmlink.record.reader import (
         RecordedRun,
@@ -30,22 +33,29 @@ if TYPE_CHECKING:
         recorded_result,
         recorded_run,
     )
-    from cmmlink.record.recorder import QUEUE_BYTES, Recorder, RecordReference, RunInputs, software
+    from cmmlink.record.recorder import QUEUE_BYTES, Recorder, RecordReference
     from cmmlink.record.replay import Replay, keep_judgement, recorded_plan, recorded_profile, replay_run
+    from cmmlink.record.run_inputs import RunInputs, software
+    from cmmlink.record.seal import KEY_FILE, PUBLIC_FILE, Seal, seal_of
     from cmmlink.record.search import RunSearch, VerdictSought
+    from cmmlink.record.signature import Signature, key_id_of, signature_of
     from cmmlink.record.station_lock import PATIENCE_S
-    from cmmlink.record.store import FILE_NAME, Store
+    from cmmlink.record.store import FILE_NAME, Store, has_records
+    from cmmlink.record.trust import trust_in
 else:
     from cmmlink.front_door import load_on_use
 
     _PLACES = {
         "cmmlink.record.against": ("disagreements", "read_result"),
+        "cmmlink.record.anchors": ("Head", "Told", "anchor_ends", "anchors_of", "heads_in"),
         "cmmlink.record.backup": ("Copied", "back_up", "merge", "restore"),
         "cmmlink.record.bodies": ("unpack_judged",),
         "cmmlink.record.chain": ("Draft", "Record"),
         "cmmlink.record.derived": ("Change", "derived_of"),
         "cmmlink.record.evidence": ("Evidence", "is_evidence", "open_evidence"),
         "cmmlink.record.export": ("export_run",),
+        "cmmlink.record.handover": ("handover_words", "handovers_of", "rotate_key"),
+        "cmmlink.record.keys": ("make_key", "public_key_given", "read_key"),
         "cmmlink.record.origin": ("origin_of",),
         "cmmlink.record.reader": (
             "RecordedRun",
@@ -68,11 +78,15 @@ else:
             "recorded_result",
             "recorded_run",
         ),
-        "cmmlink.record.recorder": ("QUEUE_BYTES", "Recorder", "RecordReference", "RunInputs", "software"),
+        "cmmlink.record.recorder": ("QUEUE_BYTES", "Recorder", "RecordReference"),
         "cmmlink.record.replay": ("Replay", "keep_judgement", "recorded_plan", "recorded_profile", "replay_run"),
+        "cmmlink.record.run_inputs": ("RunInputs", "software"),
+        "cmmlink.record.seal": ("KEY_FILE", "PUBLIC_FILE", "Seal", "seal_of"),
         "cmmlink.record.search": ("RunSearch", "VerdictSought"),
+        "cmmlink.record.signature": ("Signature", "key_id_of", "signature_of"),
         "cmmlink.record.station_lock": ("PATIENCE_S",),
-        "cmmlink.record.store": ("FILE_NAME", "Store"),
+        "cmmlink.record.store": ("FILE_NAME", "Store", "has_records"),
+        "cmmlink.record.trust": ("trust_in",),
     }
 
     __getattr__ = load_on_use(__name__, _PLACES)
@@ -80,12 +94,15 @@ else:
 
 __all__ = [
     "FILE_NAME",
+    "KEY_FILE",
     "PATIENCE_S",
+    "PUBLIC_FILE",
     "QUEUE_BYTES",
     "Change",
     "Copied",
     "Draft",
     "Evidence",
+    "Head",
     "Record",
     "RecordReference",
     "RecordedRun",
@@ -93,8 +110,13 @@ __all__ = [
     "Replay",
     "RunInputs",
     "RunSearch",
+    "Seal",
+    "Signature",
     "Store",
+    "Told",
     "VerdictSought",
+    "anchor_ends",
+    "anchors_of",
     "arrivals_of",
     "back_up",
     "check_chain",
@@ -107,16 +129,24 @@ __all__ = [
     "export_run",
     "find_run",
     "find_stack",
+    "handover_words",
+    "handovers_of",
+    "has_records",
+    "heads_in",
     "is_evidence",
     "keep_judgement",
+    "key_id_of",
     "last_serial_number",
     "list_runs",
+    "make_key",
     "merge",
     "open_evidence",
     "open_to_read",
     "open_to_record",
     "origin_of",
     "points_of",
+    "public_key_given",
+    "read_key",
     "read_result",
     "reads_of",
     "recorded_plan",
@@ -125,6 +155,10 @@ __all__ = [
     "recorded_run",
     "replay_run",
     "restore",
+    "rotate_key",
+    "seal_of",
+    "signature_of",
     "software",
+    "trust_in",
     "unpack_judged",
 ]

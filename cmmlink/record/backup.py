@@ -15,7 +15,7 @@ from datetime import datetime
 from pathlib import Path
 
 from cmmlink.errors import PlanError, RunError, StoreError
-from cmmlink.record.chain import GENESIS, Record
+from cmmlink.record.chain import BEHIND_THE_END, GENESIS, Record
 from cmmlink.record.evidence import is_evidence, open_evidence
 from cmmlink.record.origin import Origin, origin_of
 from cmmlink.record.reader import open_to_record
@@ -169,7 +169,7 @@ def _content(store: Store, run: str) -> bytes:
     """A hash of all that was recorded of a run, wherever its records stand."""
     digest = hashlib.sha256()
     for record in store.records(run):
-        if record.kind not in ("origin", "derived"):
+        if record.kind not in BEHIND_THE_END:
             digest.update(f"{record.kind}\n{record.time_s!r}\n{record.count}\n{len(record.body)}\n".encode() + record.body)
     return digest.digest()
 

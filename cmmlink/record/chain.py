@@ -10,8 +10,14 @@ from dataclasses import dataclass
 from typing import Literal
 from zlib import crc32
 
-Kind = Literal["run", "plan", "nominal", "wire", "points", "events", "registration", "deviations", "result", "end", "origin", "derived"]
-"""What a record holds. Behind the end of a run may stand where it was taken over from, and what it was found to be when judged again."""
+Kind = Literal[
+    "run", "plan", "nominal", "wire", "points", "events", "registration", "deviations", "result", "end",
+    "signature", "anchors", "timestamp", "origin", "derived", "key",
+]  # fmt: skip
+"""What a record holds. Behind the end of a run may stand its signature, where its hash was told, where it was taken over from, and what it
+was found to be when judged again. A key that was handed over belongs to no run."""
+
+BEHIND_THE_END: tuple[Kind, ...] = ("signature", "anchors", "timestamp", "origin", "derived")
 
 GENESIS = bytes(32)  # in place of the hash before the first record
 
@@ -60,6 +66,15 @@ def chain_record(draft: Draft | Record, number: int, time_s: float, previous: by
     return Record(number, draft.run, draft.kind, time_s, draft.count, draft.body, crc32(draft.body), sha256)
 
 
+def chain_records(drafts: Iterable[Draft], head: tuple[int, bytes], time_s: float) -> list[Record]:
+    """Give drafts their places behind the head of a chain: the number and the hash of its last record."""
+    (number, previous), found = head, list[Record]()
+    for draft in drafts:
+        found.append(chain_record(draft, number + 1, time_s, previous))
+        number, previous = found[-1].number, found[-1].sha256
+    return found
+
+
 def hash_of(records: Iterable[Record], number: int, previous: bytes) -> bytes:
     """The last hash of records as they stood in another file, from `number` on behind the hash `previous`."""
     for record in records:
@@ -76,7 +91,7 @@ def first_alteration(records: Iterable[Record], number: int, previous: bytes) ->
         if record.number != number:
             missing = Alteration(number, "", "", "is missing: it was deleted, or its number was changed")
             return missing, number, previous
-        problem = _problem(record, previous)
+        problem = problem_of(record, previous)
         if problem:
             return Alteration(number, str(record.run), str(record.kind), problem), number, previous
         number, previous = number + 1, record.sha256
@@ -90,7 +105,8 @@ def is_damaged(record: Record) -> bool:
     return record.crc32 != crc32(record.body)
 
 
-def _problem(record: Record, previous: bytes) -> str:
+def problem_of(record: Record, previous: bytes) -> str:
+    """What is wrong with a record behind the hash of the one before it; nothing where it is as it was written."""
     try:
         expected = _sha256(record.number, record.run, record.kind, record.time_s, record.count, record.body, previous)
     except (TypeError, ValueError, AttributeError):  # a column may hold a value of any type once a file was tampered with

@@ -15,6 +15,7 @@ from cmmlink.record.evidence import write_chain
 from cmmlink.record.reader import arrivals_of, describe, event_document, points_of, reads_of, recorded_run
 from cmmlink.record.replay import recorded_plan, recorded_profile
 from cmmlink.record.shapes import plain_name
+from cmmlink.record.signature import signature_of
 from cmmlink.record.store import Store
 from cmmlink.result_files import NewFiles, new_files
 from cmmlink.zone_file import nominal_document, zone_document
@@ -39,7 +40,8 @@ def export_run(store: Store, run: str, folder: Path) -> list[Path]:
     run.json: all but the points; events.json; points.csv and points.npy (m, 5): sequence, time_s, x, y, z in mm;
     wire.bin, the bytes as they arrived, and wire.csv, when; plan.yaml; the nominal's file; of a run with a result
     deviations.csv and result.json, and zone.json where it has a certificate. nominal.json is the curve that was made of the nominal's
-    file; records.bin, the records as they are hashed, and chain.csv, their hashes, are what somebody else recomputes the chain from.
+    file; records.bin, the records as they are hashed, and chain.csv, their hashes, are what somebody else recomputes the chain from;
+    signature.json says who signed the run, where somebody did.
     """
     try:
         with new_files(folder) as files:
@@ -48,6 +50,7 @@ def export_run(store: Store, run: str, folder: Path) -> list[Path]:
             _wire(store, run, files)
             _result(store, run, files)
             write_chain(store, run, files)
+            _signature(store, run, files)
         return [folder / name for name in files.names]
     except OSError as error:
         raise PlanError(f"{folder}: the run cannot be written there ({error.strerror}); choose another folder with --out") from None
@@ -100,6 +103,12 @@ def _result(store: Store, run: str, files: NewFiles) -> None:
         if zones is not None:
             _json(files("zone.json"), zones)
     _json(files("result.json"), recorded.result | ({} if ending == "complete" else {"ending": ending}))
+
+
+def _signature(store: Store, run: str, files: NewFiles) -> None:
+    signature = signature_of(store, run)
+    if signature is not None:
+        _json(files("signature.json"), signature.model_dump())
 
 
 def _json(path: Path, document: Any) -> None:

@@ -17,6 +17,7 @@ from typing import Any
 from platformdirs import user_data_path
 
 from cmmlink.errors import RunError, StationBusyError, StoreError
+from cmmlink.record.anchors import anchors_of
 from cmmlink.record.bodies import PlacedArrival, unpack_arrivals, unpack_document, unpack_points, unpack_reads
 from cmmlink.record.chain import Record, is_damaged
 from cmmlink.record.derived import derived_of
@@ -24,6 +25,7 @@ from cmmlink.record.origin import origin_of
 from cmmlink.record.recorder import end_draft
 from cmmlink.record.search import RunSearch
 from cmmlink.record.shapes import End, Header, Result, checked
+from cmmlink.record.signature import signature_of
 from cmmlink.record.station_lock import PATIENCE_S
 from cmmlink.record.store import Store, has_records, name_record
 from cmmlink.words import deciding_words
@@ -253,6 +255,8 @@ def describe(store: Store, run: str) -> dict[str, Any]:
         **{key: end.get(key) for key in ("state", "ended", "message", "received", "verdict", "coverage")},
         "result": recorded.result,
         "chain_sha256": recorded.chain_sha256,
+        "signature": None if (signature := signature_of(store, run)) is None else signature.beside_result(),
+        "anchors": [one.model_dump() for one in anchors_of(store, run)],
         "origin": None if (origin := origin_of(store, run)) is None else origin.model_dump(mode="json"),
         "derived": derived_of(store, run),
         "recorded": {
@@ -275,8 +279,13 @@ def event_document(moment: PlacedArrival) -> dict[str, Any]:
 
 
 def check_chain(store: Store, run: str | None) -> dict[str, Any]:
-    """Recompute the chain of a run, or of all: altered, records (sound ones), chain_sha256, and the first altered record."""
+    """Recompute the chain of a run, or of all: altered, records (sound ones), chain_sha256, and the first altered record.
+
+    The hash is that of the last sound record, of a run that of its end.
+    """
     found, sound, last = store.first_alteration(run)
+    if run is not None and found is None:
+        last = next((bytes(end.sha256) for end in store.records(run, "end")), last)
     first = None if found is None else {**dataclasses.asdict(found), "message": str(found)}
     return {"altered": found is not None, "run": run, "records": sound, "chain_sha256": last.hex(), "first": first}
 

@@ -7,29 +7,27 @@ without a verdict.
 """
 
 import hashlib
-import platform
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from datetime import datetime
-from functools import cache
-from importlib import metadata
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from cmmlink.buffer import Buffer
-from cmmlink.errors import PlanError, StoreError
+from cmmlink.errors import StoreError
 from cmmlink.events import Arrived, Event, Judged, RunFinished, RunStarted
 from cmmlink.record.bodies import JUDGED_ROWS, PlacedArrival, pack_arrivals, pack_document, pack_judged, pack_points, pack_reads
-from cmmlink.record.chain import Draft, Kind
+from cmmlink.record.chain import Draft, Kind, Record
+from cmmlink.record.run_inputs import RunInputs
+from cmmlink.record.seal import Seal
+from cmmlink.record.signature import Signature
 from cmmlink.record.store import Store
 from cmmlink.result_json import number, result_json
-from cmmlink.version import __version__
 from cmmlink.words import utc_words
 from drivers import LinkDown, PointBatch, Rejected, WireBytes
 
 if TYPE_CHECKING:
-    from cmmlink.plan import Plan
     from inspection import InspectionResult
 
 COMMIT_S = 0.1
@@ -42,49 +40,20 @@ _POSE_S = 0.1  # the shortest time between two notes of a pose that still moves
 
 
 @dataclass(frozen=True, slots=True)
-class RunInputs:
-    """Everything that a run depends on and that its record keeps: the effective plan as YAML, the nominal's file, the software versions.
-
-    plan_file : the name of the plan's file, empty where the plan was made without one
-    stack : of a section of a surface its place in its stack and what the stack rests on; None of every other run
-    """
-
-    plan: str
-    nominal_name: str
-    nominal: bytes
-    software: Mapping[str, str]
-    stack: Mapping[str, Any] | None = None
-    plan_file: str = ""
-
-    @classmethod
-    def of(cls, plan: "Plan", stack: Mapping[str, Any] | None = None) -> "RunInputs":
-        """The inputs of a plan as they are at this moment. The user's own register maps become part of the plan. Raises PlanError.
-
-        A map is kept as it was understood, with every default filled in, because a later version may read the same file differently.
-        """
-        from cmmlink.plan import map_of, with_own_maps  # noqa: PLC0415 - who reads records needs no plans
-
-        try:
-            device = with_own_maps(plan.device, lambda own: map_of(own).model_dump(mode="json"))
-        except ValueError as error:
-            raise PlanError(f"device: {error}") from None
-        plan = plan.model_copy(update={"device": device})
-        try:
-            nominal = plan.nominal.file.read_bytes()
-        except OSError as error:
-            raise PlanError(f"{plan.nominal.file}: cannot be read: {error.strerror or error}") from error
-        return cls(plan.effective_yaml(), plan.nominal.file.name, nominal, software(), stack, plan.file_name)
-
-
-@dataclass(frozen=True, slots=True)
 class RecordReference:
-    """Ties a result file to its record: the run and the hashes."""
+    """Ties a result file to its record: the run, the hashes, the signature, and the places outside that were told the hash of its end.
+
+    signature : None where the run is not signed
+    anchors   : each place, and the problem that kept it from being told, empty where nothing did
+    """
 
     run: str
     chain_sha256: str
     plan_sha256: str
     nominal_sha256: str
     software: Mapping[str, str]
+    signature: Mapping[str, str] | None = None
+    anchors: Sequence[Mapping[str, str]] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,18 +69,6 @@ class _Pose:
     """One entry of the registration's history."""
 
     document: Mapping[str, Any]
-
-
-def software() -> dict[str, str]:
-    """Versions of everything that a result depends on."""
-    system = {"cmmlink": __version__, "python": platform.python_version(), "machine": f"{platform.system()} {platform.machine()}"}
-    return system | {package: _version(package) for package in ("numpy", "scipy", "numba")}
-
-
-@cache
-def _version(package: str) -> str:
-    """The version of a package, which is looked up among all that is installed: once, for every section of a stack asks."""
-    return metadata.version(package)
 
 
 def result_sha256(document: Mapping[str, Any], bodies: Iterable[bytes]) -> str:
@@ -143,14 +100,19 @@ class Recorder:
         commit_s: float = COMMIT_S,
         queue_bytes: int = QUEUE_BYTES,
         acknowledge: Callable[[Acknowledged], None] = lambda _: None,
+        seal: Seal | None = None,
     ) -> None:
-        """`clock` is the run's; `now` gives date and time of day; the writer's thread calls `acknowledge` after every commit."""
+        """`clock` is the run's; `now` gives date and time of day; the writer's thread calls `acknowledge` after every commit.
+
+        seal : names the station and signs the end of the run; None: the run tells no station and is not signed
+        """
         self.run = ""
         self.evidence: RecordReference | None = None
         self._started: RunStarted | None = None
         self.began = now()
         self._store, self._inputs, self._clock, self._now = store, inputs, clock, now
-        self._commit_s, self._acknowledge = commit_s, acknowledge
+        self._commit_s, self._acknowledge, self._seal = commit_s, acknowledge, seal
+        self._signature: Signature | None = None
         self._queue: Buffer[Arrived | _Pose] = Buffer(queue_bytes)
         self._pack = _Packing()
         self._last_pose: tuple[str, float] = ("", float("-inf"))
@@ -187,7 +149,7 @@ class Recorder:
         self._stop_writing()
         why = f"the program failed: {error!r}" if self._failure is None else f"the record could not be kept: {self._failure}"
         try:
-            self._store.append([self._end_draft("interrupted", why, self._pack.counts())])
+            self._store.append([self._end_draft("interrupted", why, self._pack.counts())], self._sign)
         except StoreError:
             if self._failure is None:
                 raise
@@ -204,6 +166,7 @@ class Recorder:
             "started": utc_words(began),
             "clock_s": self._clock(),
             **asdict(started),
+            **({"station": self._seal.station} if self._seal else {}),
             "software": dict(inputs.software),
             "plan_file": inputs.plan_file,
             "plan_sha256": hashlib.sha256(plan).hexdigest(),
@@ -257,13 +220,21 @@ class Recorder:
             sha256 = self._keep_judged(result, finished.result)
             drafts = [self._draft("result", pack_document(result))] if finished.result is not None else []
             drafts.append(self._end_draft(finished.ending, finished.message, result, sha256))
-            end = self._store.append(drafts)[-1]
+            end = self._store.append(drafts, self._sign)[len(drafts) - 1]
         except StoreError as error:
             self._failure = error
             raise self._no_record() from error
         plan_sha256 = hashlib.sha256(self._inputs.plan.encode()).hexdigest()
         nominal_sha256 = hashlib.sha256(self._inputs.nominal).hexdigest()
-        self.evidence = RecordReference(self.run, end.sha256.hex(), plan_sha256, nominal_sha256, self._inputs.software)
+        signature = self._signature.beside_result() if self._signature else None
+        self.evidence = RecordReference(self.run, end.sha256.hex(), plan_sha256, nominal_sha256, self._inputs.software, signature)
+
+    def _sign(self, end: Record) -> list[Draft]:
+        """The signature of the run, which is committed together with its end: no run that was signed is ever found without it."""
+        if self._seal is None or self._seal.sign is None:
+            return []
+        self._signature = self._seal.sign(self.run, end.sha256.hex())
+        return [self._signature.draft()]
 
     def _keep_judged(self, document: Mapping[str, Any], result: "InspectionResult | None") -> str:
         """Write the judged rows, some megabytes at a time, and return the hash of the result. They count once the result follows."""

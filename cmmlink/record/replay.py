@@ -25,7 +25,8 @@ from cmmlink.plan import Plan, read_model, value_of, words_of_allowed
 from cmmlink.record.bodies import PlacedArrival, pack_document
 from cmmlink.record.derived import Change, derived_draft
 from cmmlink.record.reader import RecordedRun, arrivals_of, points_of, reads_of
-from cmmlink.record.recorder import judged_bodies, result_sha256, software
+from cmmlink.record.recorder import judged_bodies, result_sha256
+from cmmlink.record.run_inputs import software
 from cmmlink.record.shapes import plain_name
 from cmmlink.record.store import Store
 from cmmlink.result_json import density_notes, density_of, result_json, stations_of

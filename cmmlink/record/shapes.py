@@ -55,6 +55,7 @@ class Header(_Document):
     software: dict[str, str | None]
     nominal: str
     plan_file: str = ""
+    station: str = ""
     stack: Place | None = None
 
 

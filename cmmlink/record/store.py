@@ -6,7 +6,6 @@ a run stand together, from `run` to `end`; a run whose `end` is missing was inte
 
 import os
 import re
-import shutil
 import sqlite3
 import stat
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -14,7 +13,18 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 
 from cmmlink.errors import StoreError
-from cmmlink.record.chain import GENESIS, Alteration, Draft, Record, chain_record, first_alteration, is_damaged
+from cmmlink.record.chain import (
+    BEHIND_THE_END,
+    GENESIS,
+    Alteration,
+    Draft,
+    Record,
+    chain_record,
+    chain_records,
+    first_alteration,
+    is_damaged,
+)
+from cmmlink.record.sqlite_words import reason_of, translate_errors
 from cmmlink.record.station_lock import PATIENCE_S, StationLock
 
 FILE_NAME = "station.sqlite"
@@ -78,7 +88,7 @@ class Store:
             self._unlock()
             raise StoreError(f"{self.path}: cannot be opened: {error}; choose another folder with --records DIR") from None
         try:
-            with _translate_errors(self.path):
+            with translate_errors(self.path):
                 self._prepare(writing, migrations)
         except BaseException:
             self.close()
@@ -95,18 +105,20 @@ class Store:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def append(self, drafts: Sequence[Draft]) -> list[Record]:
-        """Add records in one transaction; they are on the disk when this returns. Raises StoreError: then none of them is."""
-        number, previous = self._head
-        records: list[Record] = []
+    def append(self, drafts: Sequence[Draft], behind: Callable[[Record], Sequence[Draft]] = lambda last: ()) -> list[Record]:
+        """Add records in one transaction; they are on the disk when this returns. Raises StoreError: then none of them is.
+
+        behind : gives what stands behind the last of them and follows from its hash
+        """
         time_s = self._epoch_s()
-        for draft in drafts:
-            records.append(chain_record(draft, number + 1, time_s, previous))
-            number, previous = number + 1, records[-1].sha256
+        records = chain_records(drafts, self._head, time_s)
+        if records:
+            records += chain_records(behind(records[-1]), (records[-1].number, records[-1].sha256), time_s)
         rows = [(r.number, r.run, r.kind, r.time_s, r.count, r.body, r.crc32, r.sha256) for r in records]
-        with _translate_errors(self.path), _transaction(self._connection):
+        with translate_errors(self.path), _transaction(self._connection):
             self._connection.executemany(f"INSERT INTO record ({_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?, ?)", rows)
-        self._head = number, previous
+        if records:
+            self._head = records[-1].number, records[-1].sha256
         return records
 
     def adopt(self, records: Iterable[Record]) -> None:
@@ -124,13 +136,13 @@ class Store:
                 number, previous = number + 1, placed.sha256
                 yield number, record.run, record.kind, record.time_s, record.count, record.body, placed.crc32, previous
 
-        with _translate_errors(self.path), _transaction(self._connection):
+        with translate_errors(self.path), _transaction(self._connection):
             self._connection.executemany(f"INSERT INTO record ({_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?, ?)", rows())
         self._head = number, previous
 
     def back_up(self, path: Path, tell: Callable[[float], None] = lambda share: None) -> None:
         """Copy what stands in the file at this moment to a new file, while others may go on recording. `tell` is told the share done."""
-        with _translate_errors(path), closing(sqlite3.connect(path, isolation_level=None)) as copy:
+        with translate_errors(path), closing(sqlite3.connect(path, isolation_level=None)) as copy:
             with self._as_it_is():
                 self._connection.backup(copy, pages=_PAGES_AT_ONCE, progress=lambda _, left, pages: tell(1 - left / max(pages, 1)))
             copy.execute("PRAGMA journal_mode = DELETE")  # so that one file holds all of it
@@ -138,13 +150,13 @@ class Store:
     @contextmanager
     def _as_it_is(self) -> Iterator[None]:
         """While this is entered, the file reads as it is now, whatever others add to it."""
-        with _translate_errors(self.path):
+        with translate_errors(self.path):
             self._connection.execute("BEGIN")
             self._connection.execute("SELECT count(*) FROM sqlite_master").fetchone()  # this is what begins it
         try:
             yield
         finally:
-            with _translate_errors(self.path):
+            with translate_errors(self.path):
                 self._connection.execute("ROLLBACK")
 
     @property
@@ -154,20 +166,20 @@ class Store:
 
     def record_at(self, number: int) -> Record | None:
         """The record with a number."""
-        with _translate_errors(self.path):
+        with translate_errors(self.path):
             row = self._connection.execute(f"SELECT {_COLUMNS} FROM record WHERE number = ?", (number,)).fetchone()
             return None if row is None else Record(*row)
 
     def records_from(self, number: int) -> Iterator[Record]:
         """All records from a number on, in their order."""
-        with _translate_errors(self.path):
+        with translate_errors(self.path):
             for row in self._connection.execute(f"SELECT {_COLUMNS} FROM record WHERE number >= ? ORDER BY number", (number,)):
                 yield Record(*row)
 
     def records(self, run: str, kind: str | None = None) -> Iterator[Record]:
         """Records of a run in their order, all or of one kind. Raises StoreError where one cannot be read."""
         query = f"SELECT {_COLUMNS} FROM record WHERE run = ?" + (" AND kind = ?" if kind else "") + " ORDER BY number"
-        with _translate_errors(self.path):
+        with translate_errors(self.path):
             for row in self._connection.execute(query, (run, kind) if kind else (run,)):
                 record = Record(*row)
                 if is_damaged(record):
@@ -175,15 +187,38 @@ class Store:
                     raise StoreError(f"{self.path}: {what} is damaged; `cmmlink verify` says more")
                 yield record
 
+    def holds(self, kind: str) -> bool:
+        """Whether there is a record of a kind."""
+        with translate_errors(self.path):
+            return self._connection.execute("SELECT 1 FROM record WHERE kind = ? LIMIT 1", (kind,)).fetchone() is not None
+
+    def added_behind(self, run: str, end: int) -> int | None:
+        """The number of the first record of a run that has no place behind its end, None where there is none; also of a second end."""
+        allowed = ", ".join("?" * len(BEHIND_THE_END))
+        query = (
+            f"SELECT max(number) FROM record WHERE run = ? AND kind NOT IN ({allowed}) AND (number > ? OR (number < ? AND kind = 'end'))"
+        )
+        with translate_errors(self.path):
+            (found,) = self._connection.execute(query, (run, *BEHIND_THE_END, end, end)).fetchone()
+        return None if found is None else int(found)
+
+    def stray_record(self) -> int | None:
+        """The number of a record that belongs to no run and is none of the station, None where there is none."""
+        runs = "SELECT run FROM record WHERE kind = 'run'"
+        query = f"SELECT max(number) FROM record WHERE NOT (run = '' AND kind = 'key') AND run NOT IN ({runs})"
+        with translate_errors(self.path):
+            (found,) = self._connection.execute(query).fetchone()
+        return None if found is None else int(found)
+
     def totals(self, run: str) -> dict[str, tuple[int, int]]:
         """Records and what they hold together (reads, points, ...), by kind."""
         query = "SELECT kind, count(*), sum(count) FROM record WHERE run = ? GROUP BY kind"
-        with _translate_errors(self.path):
+        with translate_errors(self.path):
             return {kind: (records, count) for kind, records, count in self._connection.execute(query, (run,))}
 
     def count_runs(self) -> int:
         """How many runs there are."""
-        with _translate_errors(self.path):
+        with translate_errors(self.path):
             (count,) = self._connection.execute("SELECT count(*) FROM record WHERE kind = 'run'").fetchone()
             return int(count)
 
@@ -191,7 +226,7 @@ class Store:
         """The first and, unless it is open, the last record of every run, oldest run first."""
         query = f"SELECT {_COLUMNS} FROM record WHERE kind IN ('run', 'end') ORDER BY number"
         found: dict[str, tuple[Record, Record | None]] = {}
-        with _translate_errors(self.path):
+        with translate_errors(self.path):
             for record in (Record(*row) for row in self._connection.execute(query)):
                 if record.kind == "run":
                     found[record.run] = record, None
@@ -211,7 +246,7 @@ class Store:
                 found = self._unsound_file(number)
         except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
             if getattr(error, "sqlite_errorcode", 0) & 0xFF in _OF_THE_SYSTEM:  # says nothing about what is in the file
-                raise StoreError(f"{self.path}: {_reason(error, self.path)}") from error
+                raise StoreError(f"{self.path}: {reason_of(error, self.path)}") from error
             return Alteration(0, "", "", f"cannot be read: the file is damaged ({error})"), 0, b""
         return found, stopped - first, last
 
@@ -317,19 +352,6 @@ def _transaction(connection: sqlite3.Connection) -> Iterator[None]:
 
 
 @contextmanager
-def _translate_errors(path: Path) -> Iterator[None]:
-    """Turn what SQLite says into a message that says what to do."""
-    try:
-        yield
-    except sqlite3.Error as error:
-        raise StoreError(f"{path}: {_reason(error, path)}") from error
-    except UnicodeDecodeError as error:  # where even the names in the file are damaged, its library cannot say what is
-        raise StoreError(f"{path}: the file is damaged; keep it as it is and choose another folder with --records DIR") from error
-    except MemoryError as error:
-        raise StoreError(f"{path}: this computer has too little memory left; close other programs") from error
-
-
-@contextmanager
 def name_record(path: Path, record: Record) -> Iterator[None]:
     """Say which record of a file it is that cannot be read."""
     try:
@@ -347,23 +369,3 @@ def has_records(folder: Path) -> bool:
         return False
     except OSError as error:
         raise StoreError(f"{folder / FILE_NAME}: cannot be opened: {error}; choose another folder with --records DIR") from None
-
-
-def _reason(error: Exception, path: Path) -> str:
-    code = getattr(error, "sqlite_errorcode", 0) & 0xFF
-    if code in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR):
-        mend = "free some space" if code == sqlite3.SQLITE_FULL else "look whether the disk is sound"
-        return f"{error}{_words_of_room(path.parent)}; {mend}, or keep the records elsewhere with --records DIR"
-    if code in (sqlite3.SQLITE_READONLY, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_PERM):
-        return f"{error}; is the folder writable? --records DIR chooses another"
-    if code in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB):
-        return f"{error}: the file is damaged; keep it as it is and choose another folder with --records DIR"
-    return str(error)
-
-
-def _words_of_room(folder: Path) -> str:
-    """How much room the disk of a folder has, in brackets; nothing where it does not say."""
-    try:
-        return f" ({shutil.disk_usage(folder).free / 1e6:.1f} MB free)"
-    except OSError:
-        return ""

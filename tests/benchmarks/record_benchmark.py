@@ -11,7 +11,7 @@ import sqlite3
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +19,8 @@ import numpy as np
 from cmmlink.events import Arrived, Counts, Event, RunFinished, RunStarted
 from cmmlink.record.chain import Draft, Record
 from cmmlink.record.reader import open_to_record
-from cmmlink.record.recorder import Recorder, RunInputs
+from cmmlink.record.recorder import Recorder
+from cmmlink.record.run_inputs import RunInputs
 from cmmlink.record.store import Store
 from drivers.source import PointBatch, WireBytes
 from tests.cmmlink.recorded import today
@@ -34,10 +35,10 @@ class TimedStore:
     def __init__(self, store: Store) -> None:
         self._store, self.commits_s = store, list[float]()
 
-    def append(self, drafts: list[Draft]) -> list[Record]:
+    def append(self, drafts: list[Draft], *behind: Callable[[Record], Sequence[Draft]]) -> list[Record]:
         begin = time.perf_counter()
         try:
-            return self._store.append(drafts)
+            return self._store.append(drafts, *behind)
         finally:
             self.commits_s.append(time.perf_counter() - begin)
 

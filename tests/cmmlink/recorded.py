@@ -17,7 +17,8 @@ from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan.datum import Datum
 from cmmlink.plan.scan import Plan, Registration, load_plan
 from cmmlink.record.reader import open_to_record
-from cmmlink.record.recorder import Acknowledged, Recorder, RunInputs
+from cmmlink.record.recorder import Acknowledged, Recorder
+from cmmlink.record.run_inputs import RunInputs
 from drivers.codecs.ascii_frames import AsciiDecoder
 from drivers.source import Arrival, Damaged, Lost, PointBatch, Rejected, ScanClosed, ScanOpened, ScanSource
 from inspection import NominalProfile

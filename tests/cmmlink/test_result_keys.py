@@ -15,6 +15,7 @@ from cmmlink.deviations_csv import COLUMNS
 from cmmlink.plan.reference import groups_of
 from cmmlink.record.evidence import CHAIN_COLUMNS
 from cmmlink.record.export import POINT_COLUMNS, WIRE_COLUMNS
+from cmmlink.record_keys import KeyHandedOver, KeyShown, StationKey, Verified
 from cmmlink.report.stack_folder import CONTOUR_COLUMNS, SECTION_COLUMNS
 from cmmlink.result_keys import (
     Exported,
@@ -27,7 +28,6 @@ from cmmlink.result_keys import (
     Shown,
     StackInspected,
     Understood,
-    Verified,
 )
 from tests.cmmlink.command import cmmlink
 from tests.cmmlink.oval_part import oval_points, write_nominal, write_points
@@ -101,6 +101,10 @@ def test_records(folder: Path) -> None:
     changed = printed(Replayed, "replay", first, "--tolerance", -0.3, 0.3, *records)
     assert [change["key"] for change in changed["changed"]] == ["tolerance.lower_mm", "tolerance.upper_mm"]
     assert not printed(Verified, "verify", *records)["altered"]
+    shown = printed(StationKey, "key", "show", *records)
+    assert printed(Verified, "verify", *records)["signatures"]["keys"][0]["public_key"] == shown["public_key"]
+    assert printed(KeyHandedOver, "key", "rotate", "--reason", "yearly", *records)["before"] == shown["public_key"]
+    printed(KeyShown, "key", "new", folder / "stick.pem")
     written = printed(Exported, "export", first, "--out", folder / "exported", *records)["files"]
     assert Path(printed(Reported, "report", first, "-o", folder / "a.pdf", *records)["file"]).read_bytes().startswith(b"%PDF")
     tables = {Path(name).name: header_of(Path(name)) for name in written if name.endswith(".csv") and "nominal" not in name}

@@ -177,8 +177,8 @@ def reject_a_point(evidence: Evidence) -> None:
 
 
 def cut_off(evidence: Evidence) -> None:
-    evidence.rows.pop()
-    evidence.bodies.pop()
+    end = next(place for place, row in enumerate(evidence.rows) if row["kind"] == "end")
+    del evidence.rows[end:], evidence.bodies[end:]
     evidence.write()
 
 

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from datetime import datetime
 from pathlib import Path
 from time import monotonic
+from typing import Any
 
 import numpy as np
 import pytest
@@ -190,11 +191,11 @@ def test_no_part_found_is_said(bench: Bench, keep: Keep) -> None:
 def test_full_disk_stops_the_run_and_says_so(make_bench: MakeBench, tmp_path: Path, keep: Keep, monkeypatch: pytest.MonkeyPatch) -> None:
     append, left = Store.append, [1000]
 
-    def append_until_full(store: Store, drafts: Sequence[Draft]) -> list[Record]:
+    def append_until_full(store: Store, drafts: Sequence[Draft], *behind: Any) -> list[Record]:
         left[0] -= sum(draft.count for draft in drafts if draft.kind == "points")
         if left[0] < 0:
             raise StoreError("station.sqlite: no space left on the device")
-        return append(store, drafts)
+        return append(store, drafts, *behind)
 
     monkeypatch.setattr(Store, "append", append_until_full)
     bench = make_bench(records=PastRuns(tmp_path / "records", lambda _: None, monotonic, lambda: datetime.now().astimezone()))

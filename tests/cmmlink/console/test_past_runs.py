@@ -3,6 +3,7 @@
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -61,10 +62,10 @@ def test_a_run_whose_end_a_full_disk_does_not_take_is_interrupted_and_never_runn
 ) -> None:
     append = Store.append
 
-    def append_until_the_end(store: Store, drafts: Sequence[Draft]) -> list[Record]:
+    def append_until_the_end(store: Store, drafts: Sequence[Draft], *behind: Any) -> list[Record]:
         if any(draft.kind in ("result", "end") for draft in drafts):
             raise StoreError("no space left on the device")
-        return append(store, drafts)
+        return append(store, drafts, *behind)
 
     monkeypatch.setattr(Store, "append", append_until_the_end)
     with pytest.raises(StoreError, match="600 points are safe"):

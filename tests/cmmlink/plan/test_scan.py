@@ -12,7 +12,7 @@ from cmmlink.errors import PlanError
 from cmmlink.plan.own_maps import map_of
 from cmmlink.plan.scan import FileDevice, ModbusDevice, Plan, SerialDevice, load_plan
 from cmmlink.plan.yaml_model import read_model
-from cmmlink.record.recorder import RunInputs
+from cmmlink.record.run_inputs import RunInputs
 from inspection import ToleranceZone
 
 SHORT = """\
@@ -59,7 +59,7 @@ def test_short_plan_gets_the_documented_defaults(tmp_path: Path) -> None:
     assert (plan.registration.fit, plan.registration.method, plan.registration.datum) == ("best-fit", "exact", None)
     assert plan.registration.coverage_min == 0.95
     assert (plan.discretisation.samples, plan.discretisation.pole_angle_min_deg, plan.discretisation.step_min) == (10_000, 178.0, 1e-4)
-    assert (plan.buffer_points, plan.out.folder, plan.records) == (500_000, tmp_path / "results/{part}/{serial}_{run}", None)
+    assert (plan.buffer_points, plan.out.folder, plan.records.folder) == (500_000, tmp_path / "results/{part}/{serial}_{run}", None)
 
 
 def test_full_plan_says_what_it_says(tmp_path: Path) -> None:
@@ -72,7 +72,7 @@ def test_full_plan_says_what_it_says(tmp_path: Path) -> None:
     assert plan.registration.datum is not None
     assert (plan.registration.datum.rotation_deg, plan.registration.datum.translation_mm) == (30, (1, -2))
     assert plan.registration.fit == "none"
-    assert (plan.out.folder, plan.records) == (tmp_path / "results", tmp_path / "records")
+    assert (plan.out.folder, plan.records.folder) == (tmp_path / "results", tmp_path / "records")
 
 
 @pytest.mark.parametrize("text", [SHORT, FULL, SHORT.replace("COM3", '"null"').replace("blade,", "'~',")])

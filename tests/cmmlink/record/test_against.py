@@ -1,4 +1,4 @@
-"""What the chain inside the file cannot show, a result file that was kept elsewhere does."""
+"""What the chain inside the file cannot show, a result file that was kept elsewhere does; of runs that nobody signed."""
 
 import json
 import shutil
@@ -22,7 +22,7 @@ tolerance: {{lower_mm: -0.05, upper_mm: 0.05}}
 probe: {{tip_radius_mm: 1}}
 discretisation: {{samples: 1000}}
 device: {{type: file, file: points.npy}}
-records: kept
+records: {{folder: kept, key: absent.pem}}
 """
 
 

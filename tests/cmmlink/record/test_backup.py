@@ -240,7 +240,8 @@ def test_a_result_of_another_station_is_held_against_the_merged_run(tmp_path: Pa
     shown = cmmlink(*asked, "--records", tmp_path / "two").json()
     (tmp_path / "result.json").write_text(json.dumps(shown), encoding="utf-8")
     copied = cmmlink("backup", tmp_path / "two.sqlite", "--records", tmp_path / "two", "--json").json()
-    assert copied["chain_sha256"] == shown["chain_sha256"]
+    found = cmmlink("verify", "last", "--records", tmp_path / "two", "--json").json()
+    assert (found["chain_sha256"], found["records"]) == (shown["chain_sha256"], copied["records"])
     assert f"added: {shown['run']}" in cmmlink("merge", tmp_path / "two.sqlite", "--records", tmp_path / "one").out
     against = ("verify", "--records", tmp_path / "one", "--against", tmp_path / "result.json")
     ended = cmmlink(*against)

@@ -5,6 +5,7 @@ import threading
 from collections.abc import Iterator, Sequence
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,7 +25,8 @@ from cmmlink.record.reader import (
     recorded_run,
     registrations_of,
 )
-from cmmlink.record.recorder import Acknowledged, Recorder, RunInputs
+from cmmlink.record.recorder import Acknowledged, Recorder
+from cmmlink.record.run_inputs import RunInputs
 from cmmlink.record.store import FILE_NAME, Store
 from drivers.source import Arrival, Heartbeat, LinkDown, LinkUp, PointBatch, Rejected, WireBytes
 from tests.cmmlink.recorded import Script, record, scan_arrivals, today
@@ -236,10 +238,10 @@ def test_a_run_killed_between_its_judged_rows_and_its_result_was_interrupted(tmp
     assert np.array_equal(found, whole.result.deviation_mm, equal_nan=True)
     pack = Store.append
 
-    def cut_off(store: Store, drafts: Sequence[Draft]) -> list[Record]:
+    def cut_off(store: Store, drafts: Sequence[Draft], *behind: Any) -> list[Record]:
         if any(draft.kind == "result" for draft in drafts):
             raise StoreError("the power is gone")
-        return pack(store, drafts)
+        return pack(store, drafts, *behind)
 
     monkeypatch.setattr(Store, "append", cut_off)
     with pytest.raises(StoreError, match="the power is gone"):
@@ -261,7 +263,7 @@ def test_what_waits_before_the_device_is_there_stands_behind_the_head_of_the_run
     append, others = Store.append, threading.Event()
     kinds: list[str] = []
 
-    def slow_append(store: Store, drafts: Sequence[Draft]) -> list[Record]:
+    def slow_append(store: Store, drafts: Sequence[Draft], *behind: Any) -> list[Record]:
         kinds.extend(draft.kind for draft in drafts)
         if drafts[0].kind != "run":
             others.set()
@@ -269,7 +271,7 @@ def test_what_waits_before_the_device_is_there_stands_behind_the_head_of_the_run
             others.wait(0.3)
             if is_disk_full:
                 raise StoreError("disk full")
-        return append(store, drafts)
+        return append(store, drafts, *behind)
 
     monkeypatch.setattr(Store, "append", slow_append)
     script = Script(LinkDown("switched off"), LinkUp(1.0), *scan_arrivals(20))
