@@ -4,7 +4,7 @@ import json
 import signal
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
@@ -81,9 +81,7 @@ def report_outcome(run: "FinishedRun", output: Output, pictures: "Pictures | Non
         message = message or "stopped by the operator: the scan is not complete"
     if message:
         say(message)
-    for told in evidence.anchors if evidence is not None else ():
-        if told["problem"]:
-            say(anchor_words(told["place"], told["problem"]))
+    say_untold(() if evidence is None else evidence.anchors)
     written: Sequence[str] = ()
     folder: Path | None = None
     try:
@@ -117,6 +115,13 @@ def _say_answer(answer: "Answered", output: Output) -> None:
         say(f"NOT SENT to the machine: {answer.problem}")
     elif not output.as_json:
         typer.echo(f"sent to the machine at {answer.at:%H:%M:%S}, request {answer.request}")
+
+
+def say_untold(anchors: Sequence[Mapping[str, str]]) -> None:
+    """Say which places outside were not told how a run ended. It changes no exit status."""
+    for told in anchors:
+        if told["problem"]:
+            say(anchor_words(told["place"], told["problem"]))
 
 
 @contextmanager

@@ -32,7 +32,7 @@ from cmmlink.commands.options import (
     Weights,
     records_folder,
 )
-from cmmlink.commands.output import Output, print_json, stop_on_ctrl_c, terminal
+from cmmlink.commands.output import Output, print_json, say_untold, stop_on_ctrl_c, terminal
 from cmmlink.errors import PlanError
 from cmmlink.plan import CutterName
 from cmmlink.words import VERDICT_WORDS, headline_of, printable
@@ -203,6 +203,7 @@ def _inspect_stack(plan: "CtPlan", output: Output, pictures: PicturesWanted, no_
         drawn = pictures != "none" and pattern is not None
         wanted = SectionPictures(plan.part.name, processes, every=pictures == "all") if drawn else None
         stack = _judge_stack(plan, output, bar, wanted, no_record)
+        say_untold([one.model_dump() for one in stack.anchors])
         folder = None if pattern is None else stack.folder_of(pattern, plan)
         try:
             if folder is not None:
