@@ -26,6 +26,7 @@ NOT_TOLD = (
     "the machine told no number of a request (REQUEST) before its points, so that it could not know the answer for its own; "
     "let its program print one"
 )
+STILL_STANDING = "; an earlier answer may stand there still"
 NOT_RECORDED = "the run is not on record, and the machine is told nothing that no record shows"
 _MM_PER_INCH = 25.4
 _DECIMALS = {"mm": 4, "inch": 5}
@@ -64,12 +65,14 @@ class MachineAnswer:
 
     def deliver(self, outcome: RunOutcome, run: str) -> Answered:
         """Tell the machine the verdict, once the run is on record under its id (empty where it is not), and tell what came of it."""
+        verdict = _verdict_of(outcome)
         problem = NOT_RECORDED if not run else NOT_TOLD if self._request is None else ""
         if not problem and self._request is not None:
-            problem = self._put(replace_answer, self._told_of(outcome, self._request, run))
+            problem = self._put(replace_answer, _told_of(outcome, verdict, self._request, run))
         if problem and self._standing:
-            problem += f". An earlier answer may stand there still: {self._standing}"
-        answered = Answered("not sent" if problem else "sent", self._request, self._now(), problem)
+            problem += STILL_STANDING
+        sent = not problem
+        answered = Answered("sent" if sent else "not sent", self._request, self._now(), problem, verdict if sent else None)
         self._tell(answered)
         return answered
 
@@ -86,17 +89,21 @@ class MachineAnswer:
             return str(error)
         return ""
 
-    def _told_of(self, outcome: RunOutcome, request: int, run: str) -> _Told:
-        """What is told of a run that is on record. Only one that came to its end can have passed."""
-        result = outcome.result
-        code = CODE_OF[Verdict.UNCERTAIN if result is None else result.verdict]
-        if code == CODE_OF[Verdict.CONFORM] and (outcome.ending != "complete" or outcome.failure is not None):
-            code = CODE_OF[Verdict.UNCERTAIN]
-        if result is None:
-            return _Told(code, request, run=run)
-        worst = result.worst_row
-        values = tuple((found.name, found.value, found.unit) for found in result.characteristics)
-        return _Told(code, request, math.nan if worst is None else float(worst.deviation_mm[0]), values, run)
+
+def _verdict_of(outcome: RunOutcome) -> Verdict:
+    """The verdict that a machine is told. Only a run that came to its end can have passed its part."""
+    verdict = Verdict.UNCERTAIN if outcome.result is None else outcome.result.verdict
+    broke_off = outcome.ending != "complete" or outcome.failure is not None
+    return Verdict.UNCERTAIN if verdict == Verdict.CONFORM and broke_off else verdict
+
+
+def _told_of(outcome: RunOutcome, verdict: Verdict, request: int, run: str) -> _Told:
+    result = outcome.result
+    if result is None:
+        return _Told(CODE_OF[verdict], request, run=run)
+    worst = result.worst_row
+    values = tuple((found.name, found.value, found.unit) for found in result.characteristics)
+    return _Told(CODE_OF[verdict], request, math.nan if worst is None else float(worst.deviation_mm[0]), values, run)
 
 
 def answer_text(answer: Answer, unit: str, told: _Told) -> str:

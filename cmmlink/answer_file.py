@@ -39,8 +39,9 @@ def replace_answer(file: Path, data: bytes, sleep: Callable[[float], None] = tim
         _bring_to_disk(file.parent)
         found = file.read_bytes()
     except OSError as error:
-        told = "" if file.parent.is_dir() else f"there is no folder {file.parent}: "
-        raise AnswerError(f"{file}: {told}the answer cannot be kept there: {error.strerror or error}") from error
+        if not file.parent.is_dir():
+            raise AnswerError(f"{file}: there is no folder {file.parent}; connect the share") from error
+        raise AnswerError(f"{file}: the answer cannot be kept there: {error.strerror or error}") from error
     if found != data:
         raise AnswerError(f"{file}: something else was written there at the same time; let one station alone answer there")
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from drivers import Arrival
 
 if TYPE_CHECKING:
-    from inspection import CharacteristicResult, InspectionResult, LiveUpdate, ProfileUncertainty
+    from inspection import CharacteristicResult, InspectionResult, LiveUpdate, ProfileUncertainty, Verdict
 
 Ending = Literal["complete", "aborted", "interrupted"]
 
@@ -129,12 +129,14 @@ class Answered:
     """Whether a machine was told the verdict that it asked for, when, and why not; or that an earlier answer still stands as a run begins.
 
     request : the number of its request; None where it told none
+    verdict : what it was told; None where it was told nothing
     """
 
     state: Literal["sent", "not sent", "not withdrawn"]
     request: int | None
     at: datetime
     problem: str
+    verdict: "Verdict | None" = None
 
 
 Event = RunStarted | Arrived | Judged | ProvenOut | Evaluated | RunFinished | Answered

@@ -73,6 +73,7 @@ class MachineTold(JsonObject):
 
     request: int | None = Field(description="the number of its request; null where it told none")
     sent: bool = Field(description="whether the answer stands in its file, read back; it changes no verdict")
+    verdict: VerdictName | None = Field(description="what it was told: uncertain where the run broke off; null where it was told nothing")
     at: str = Field(description="when it was sent, or could not be, in UTC")
     problem: str | None = Field(description="why it was not sent; null where it was")
 

@@ -185,6 +185,7 @@ def _answer_json(answer: Answered) -> dict[str, Any]:
     return {
         "request": answer.request,
         "sent": answer.state == "sent",
+        "verdict": answer.verdict.word if answer.verdict is not None else None,
         "at": utc_words(answer.at),
         "problem": answer.problem or None,
     }

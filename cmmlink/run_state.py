@@ -59,12 +59,16 @@ class ZoneLimits:
 
 @dataclass(frozen=True, slots=True)
 class AnswerState:
-    """Whether the machine that waits for the verdict was told it: when, ms since 1970, to which of its requests, and why not."""
+    """Whether the machine that waits for the verdict was told it: when, ms since 1970, to which of its requests, and why not.
+
+    told : the verdict in words that it was told; empty where it was told nothing
+    """
 
     state: Literal["awaited", "sent", "not sent"]
     at_ms: float | None = None
     request: int | None = None
     problem: str = ""
+    told: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,7 +23,7 @@ from cmmlink.from_plan import zone_of
 from cmmlink.plan import Plan
 from cmmlink.result_json import density_notes, density_of, number, result_json
 from cmmlink.run_state import AnswerState, LinkPhase, Phase, RegistrationState, RunKind, RunState, VerdictState, WorstPoint, ZoneLimits
-from cmmlink.words import LOOKS_OUT, NOT_MEASURED, VERDICT_NAMES, Headline, headline_of, local_words
+from cmmlink.words import LOOKS_OUT, NOT_MEASURED, VERDICT_NAMES, VERDICT_WORDS, Headline, headline_of, local_words
 from drivers import Heartbeat, LinkDown, LinkUp, PointBatch, Rejected, ScanClosed, ScanOpened
 from inspection import LiveUpdate, NominalProfile, ToleranceZone, Verdict, coverage
 
@@ -274,7 +274,8 @@ class RunView:
         if event.state == "not withdrawn":
             return  # an alarm says so; the answer to this run is still awaited
         with self._lock:
-            self._answer = AnswerState(event.state, event.at.timestamp() * 1e3, event.request, event.problem)
+            told = VERDICT_WORDS[event.verdict] if event.verdict is not None else ""
+            self._answer = AnswerState(event.state, event.at.timestamp() * 1e3, event.request, event.problem, told)
             self._publish()
 
     def _characteristics_so_far(self) -> Characteristics:

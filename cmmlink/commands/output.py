@@ -16,7 +16,7 @@ import typer
 from cmmlink.commands.exit_codes import DEVICE_FAILED, EXIT_OF, NO_RECORD, UNUSABLE, say
 from cmmlink.commands.progress import progress
 from cmmlink.errors import StoreError
-from cmmlink.words import anchor_words
+from cmmlink.words import VERDICT_WORDS, anchor_words
 from inspection import NotMeasured
 
 if TYPE_CHECKING:
@@ -114,7 +114,8 @@ def _say_answer(answer: "Answered", output: Output) -> None:
     if answer.state != "sent":
         say(f"NOT SENT to the machine: {answer.problem}")
     elif not output.as_json:
-        typer.echo(f"sent to the machine at {answer.at:%H:%M:%S}, request {answer.request}")
+        told = VERDICT_WORDS[answer.verdict] if answer.verdict is not None else ""
+        typer.echo(f"sent to the machine at {answer.at:%H:%M:%S}: {told}, request {answer.request}")
 
 
 def say_untold(anchors: Sequence[Mapping[str, str]]) -> None:

@@ -7,9 +7,10 @@ from dataclasses import replace
 from cmmlink.console.alarms import Alarms
 from cmmlink.console.choice import CheckedPlan
 from cmmlink.console.job import Job
+from cmmlink.console.refused import without_folders
 from cmmlink.console.station_setup import StationSetup
 from cmmlink.errors import PlanError, StoreError
-from cmmlink.events import Event, Sink
+from cmmlink.events import Answered, Event, Sink
 from cmmlink.run import carry_out
 from cmmlink.run_view import RunView
 from cmmlink.words import anchor_words
@@ -75,7 +76,7 @@ def sink_of(view: RunView, alarms: Alarms) -> Sink:
 
     def show(event: Event) -> None:
         try:
-            view(event)
+            view(replace(event, problem=without_folders(event.problem)) if isinstance(event, Answered) else event)
         except Exception as error:
             alarms.raise_alarm("fault", "The page cannot show this run", repr(error))
 

@@ -8,11 +8,12 @@ from datetime import datetime
 import numpy as np
 import pytest
 
-from cmmlink.events import Arrived, Counts, Evaluated, Judged, ProvenOut, RunFinished, RunStarted
+from cmmlink.events import Answered, Arrived, Counts, Evaluated, Judged, ProvenOut, RunFinished, RunStarted
 from cmmlink.extremes import Extremes, PointsVersion
+from cmmlink.run_state import AnswerState
 from cmmlink.run_view import RunContext, RunView
 from drivers import Arrival, LinkDown, LinkUp, PointBatch, ScanClosed, ScanOpened
-from inspection import LiveUpdate, NominalProfile, NurbsCurve, State, ToleranceZone, discretize
+from inspection import LiveUpdate, NominalProfile, NurbsCurve, State, ToleranceZone, Verdict, discretize
 from tests.cmmlink.test_characteristic_rows import CHORD, OUT, PROVEN
 
 UNSEEN = PointsVersion(-1, 0)
@@ -27,10 +28,11 @@ def profile() -> NominalProfile:
 class Played:
     """A view whose clock and events the test plays."""
 
-    def __init__(self, profile: NominalProfile, base: int | None = 0) -> None:
+    def __init__(self, profile: NominalProfile, base: int | None = 0, *, answers: bool = False) -> None:
         self.now_s = 100.0
         self.profile = profile
-        context = RunContext("7", "blade.yaml", profile, ToleranceZone(-0.05, 0.05, 0.01), 0.95, 5000, NOON, base=base)
+        zone = ToleranceZone(-0.05, 0.05, 0.01)
+        context = RunContext("7", "blade.yaml", profile, zone, 0.95, 5000, NOON, base=base, answers=answers)
         self.view = RunView(context, lambda: self.now_s, lambda: NOON)
         self.view(RunStarted("blade", "B-1", "Ada", "COM3", False))
 
@@ -260,3 +262,21 @@ def test_nobody_waits_while_points_are_put_in_their_bins(played: Played, monkeyp
         assert (looked.result(30.0).judged, looked.result(30.0).out_of_tolerance) == (3, 1)
     assert (played.view.state().judged, played.view.state().out_of_tolerance) == (4, 1)
     assert played.view.state().phase == "ending"
+
+
+def test_a_machine_waits_until_it_was_told_or_was_not(profile: NominalProfile) -> None:
+    assert Played(profile).view.state().answer is None
+    view = Played(profile, answers=True).view
+    assert view.state().answer == AnswerState("awaited")
+    view(Answered("not withdrawn", None, NOON, "no folder"))
+    assert view.state().answer == AnswerState("awaited")
+    view(Answered("sent", 7, NOON, "", Verdict.UNCERTAIN))
+    assert view.state().answer == AnswerState("sent", NOON.timestamp() * 1e3, 7, "", "NOT PROVEN")
+    view(Answered("not sent", 7, NOON, "no folder"))
+    assert view.state().answer == AnswerState("not sent", NOON.timestamp() * 1e3, 7, "no folder")
+
+
+def test_a_run_that_breaks_off_tells_the_machine_nothing(profile: NominalProfile) -> None:
+    view = Played(profile, answers=True).view
+    view.fail("Record not kept: the disk is full")
+    assert view.state().answer == AnswerState("not sent", problem="the run broke off")

@@ -40,6 +40,7 @@ export function showRun(heard) {
   byId("kind").hidden = !card.badge;
   put("kind", card.badge);
   showVerdict(card);
+  showAnswer(run?.answer ?? null);
   byId("report").hidden = !card.record;
   showRemarks(card);
   const band = heard.hasBand ? gettext("shaded around the limits: the U of each station") : "";
@@ -75,6 +76,27 @@ function showVerdict({ word: told, shape, final, of: whose, why: reason, phase }
   byId("verdict-why").title = reason; // a long one is cut, and so is what the system said
   put("provisional", phase);
   byId("provisional").hidden = !phase;
+}
+
+/**
+ * Whether the machine that waits for the verdict was told it.
+ * @param {RunState["answer"]} answer
+ */
+function showAnswer(answer) {
+  const element = byId("answer");
+  element.hidden = !answer;
+  element.dataset.state = answer?.state ?? "";
+  put("answer", answer ? answerWords(answer) : "");
+  element.title = answer?.problem ?? ""; // a long one is cut
+}
+
+/** @param {NonNullable<RunState["answer"]>} answer */
+export function answerWords({ state, at_ms: atMs, request, problem, told }) {
+  if (state === "awaited") return gettext("The machine waits for the verdict");
+  if (state === "not sent") return `\u2715 ${gettext("NOT SENT to the machine: {why}", { why: translate(problem) })}`;
+  const time = new Date(atMs ?? 0).toTimeString().slice(0, 8);
+  const values = { time, verdict: translate(told), number: String(request) };
+  return `\u2713 ${gettext("Sent to the machine at {time}: {verdict}, request {number}", values)}`;
 }
 
 /**

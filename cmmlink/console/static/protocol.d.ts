@@ -140,12 +140,13 @@ export interface VerdictState {
   readonly reasons: readonly string[];
 }
 
-/** Whether the machine that waits for the verdict was told it: when, ms since 1970, to which of its requests, and why not. */
+/** Whether the machine that waits for the verdict was told it: when, ms since 1970, to which of its requests, and why not. told : the verdict in words that it was told; empty where it was told nothing */
 export interface AnswerState {
   readonly state: "awaited" | "sent" | "not sent";
   readonly at_ms?: number | null;
   readonly request?: number | null;
   readonly problem: string;
+  readonly told: string;
 }
 
 /** The tolerance zone and the expanded uncertainty of one deviation, mm; how that uncertainty counts, in words. */

@@ -68,7 +68,7 @@ def hindrances(page: Page, view: str) -> dict[str, object]:
 def overflowing(page: Page) -> list[str]:
     """Elements of the result whose text does not fit into their box; the list of reasons and notes scrolls."""
     found: list[str] = page.evaluate(
-        """() => [...document.querySelectorAll('aside .card, aside .verdict, aside dd, .word, .why, .big, .where')]
+        """() => [...document.querySelectorAll('aside .card, aside .verdict, aside .answer, aside dd, .word, .why, .big, .where')]
            .filter(e => e.offsetParent && e.id !== 'remarks' && (e.scrollWidth > e.clientWidth + 1
                || (!e.matches('.word, .big') && e.scrollHeight > e.clientHeight + 3)))  // their lines are set closer than their letters
            .map(e => e.className + ' ' + e.id)"""

@@ -3,8 +3,9 @@ from datetime import datetime
 import pytest
 
 from cmmlink.console.alarms import Alarms
-from cmmlink.events import Arrived, Counts, RunFinished, RunStarted
+from cmmlink.events import Answered, Arrived, Counts, RunFinished, RunStarted
 from drivers.source import Arrival, Damaged, LinkDown, LinkUp, Lost, Rejected
+from inspection import Verdict
 
 STARTED = RunStarted("part", "", "", "device", True)
 
@@ -74,3 +75,13 @@ def test_an_alarm_carries_its_run_and_is_no_fault_beside_the_next_part(alarms: A
     (alarm,) = alarms.shown.alarms
     assert (alarm.run, alarm.current, alarm.active, alarm.acknowledged) == ("B-1", False, False, False)
     assert not alarms.fault
+
+
+def test_an_answer_that_was_not_sent_is_a_fault_and_one_that_was_is_none(alarms: Alarms) -> None:
+    moment = datetime(2026, 11, 22, 12, 0)
+    alarms(Answered("sent", 7, moment, "", Verdict.CONFORM))
+    assert not alarms.fault
+    alarms(Answered("not withdrawn", None, moment, "no folder"))
+    alarms(Answered("not sent", 7, moment, "no folder"))
+    told = [(alarm.what, alarm.severity) for alarm in alarms.newest_first()]
+    assert told == [("Not sent to the machine", "fault"), ("Earlier answer to the machine not withdrawn", "fault")]
