@@ -30,7 +30,8 @@ FINELY = "discretisation: {samples: 300}\nout: null\n"
 RADIUS_MM, FORM_MM, LEAVES_MM = 1.0, 0.02, 0.002
 MACRO, G800 = "A macro that prints a line a point", "A macro that prints G800 lines"
 CAMERA, REGISTERS = "A camera or line scanner that sends lines of text", "A camera or line scanner that fills registers"
-OF_ITS_WAY = {"run", "device", "simulated", "measured_at", "chain_sha256", "plan_sha256", "notes"}  # what a file and a device may differ in
+# What results by a file and by a device may differ in.
+OF_ITS_WAY = {"run", "device", "simulated", "measured_at", "chain_sha256", "plan_sha256", "signature", "notes"}
 
 
 def block(heading: str, language: str) -> str:
@@ -83,20 +84,25 @@ TOUCHED = ("--tip-radius-mm=1.0", f"--form-error-mm={FORM_MM}", "--unpaced")
 
 
 @pytest.mark.parametrize(
-    ("heading", "device", "address"),
+    ("heading", "device", "address", "told"),
     [
-        ("A coordinate measuring machine behind an I++ DME server", "dme", "127.0.0.1:1294"),
-        ("A machine tool that touches the part on its table", "machine-tool", "127.0.0.1:9100"),
+        ("A coordinate measuring machine behind an I++ DME server", "dme", "127.0.0.1:1294", ()),
+        ("A machine tool that touches the part on its table", "machine-tool", "127.0.0.1:9100", ()),
+        (MACRO, "machine-tool-dprnt", "COM3", ("--translation-mm", "0", "-10", "0")),
     ],
 )
-def test_plans_of_the_page_find_the_part_that_is_simulated_without_a_path(heading: str, device: str, address: str, folder: Path) -> None:
+def test_plans_of_the_page_find_the_part_that_is_simulated_without_a_path(
+    heading: str, device: str, address: str, told: tuple[str, ...], folder: Path
+) -> None:
     """The touched section at five points a second, as the page has it; the scanned one as fast as it goes."""
     text = block(heading, "yaml")
     with simulated(
-        device, "127.0.0.1:0", folder, *TOUCHED, path_mm=section_mm(), noise_mm=0.0, count=204, rate_hz=5.0, speed_mm_s=5.0
+        device, "127.0.0.1:0", folder, *TOUCHED, *told, path_mm=section_mm(), noise_mm=0.0, count=204, rate_hz=5.0, speed_mm_s=5.0
     ) as machine:
         ended = carried_out(folder, text.replace(address, machine.address))
     assert (ended.code, ended.json()["verdict"]) == (0, "conform"), ended.err
+    assert f"simulate {device} --address 127.0.0.1:" in PAGE
+    assert " ".join(told) in PAGE
     assert any("neither a checksum nor" in note or "no checksum" in note for note in ended.json()["notes"])
 
 
@@ -138,13 +144,14 @@ def test_lines_of_a_camera_are_judged_as_the_same_points_in_a_file(defect_mm: fl
 def test_a_camera_that_does_not_find_a_point_proves_nothing(folder: Path) -> None:
     text, line = block(CAMERA, "yaml"), "{number};{x:.4f};{y:.4f}"
     rows = [line.format(number=k + 1, x=x, y=y) for k, (x, y) in enumerate(section_mm()[::5].tolist())]
-    for missing in ("201;;", None, "FAIL"):
+    kept_out = re.findall(r"`(\(\?P<x>\(\?!.*?)`", PAGE)[0]
+    for missing in ("201;;", None, "FAIL", "201;-9999;-9999"):
         shown = [row if k != 200 else missing for k, row in enumerate(rows)]
         (folder / "lines.txt").write_text("\r\n".join(["READY", *filter(None, shown), "END", ""]), encoding="ascii")
         device = re.search(r"^device:\n(.*?)(?=^\S)", text, re.DOTALL | re.MULTILINE)
         assert device is not None
         of_a_file = device[1].replace('address: "127.0.0.1:8500"', "file: lines.txt\n  existing: true")
-        ended = carried_out(folder, text.replace(device[1], of_a_file))
+        ended = carried_out(folder, text.replace(device[1], of_a_file.replace("(?P<x>[-+.0-9]*)", kept_out)))
         assert (ended.code, ended.json()["verdict"]) == (3, "uncertain"), ended.err
 
 
@@ -220,12 +227,12 @@ def test_the_macro_in_the_language_of_inspection_is_read_by_name() -> None:
     def change(text: str) -> str:
         text = text.replace("DPRNT[M30]", "DPRNT[END]").replace("POPEN", "POPEN\nDPRNT[START]")
         text = text.replace("G31 X#32 Y#33 F50", f"{nominal}\nG31 X#32 Y#33 F50")
-        return text.replace("DPRNT[N#100[40]*X#5061[44]*Y#5062[44]]", measured)
+        return text.replace("DPRNT[N#100[40]*X#5061[44]*Y#5062[44]*Z#5063[44]]", measured)
 
     printed = probed(change, sign_places=1, most=40).printed
     book = decoded(decoder("g800", unit="mm", tip_radius_mm=RADIUS_MM), "\r".join([*printed, ""]).encode("ascii"))
     own = [[float(number) for number in re.findall(r"[-.0-9]+", line)[1:]] for line in probed().printed[:40]]
-    np.testing.assert_allclose(np.array(book.points_mm)[:, :2], own, atol=1e-9)
+    np.testing.assert_allclose(np.array(book.points_mm), own, atol=1e-9)
     assert not book.counts
 
 
@@ -240,7 +247,7 @@ def test_where_the_macro_meets_nothing_it_prints_nothing_and_a_touch_on_the_way_
 
 def test_a_log_of_probing_is_read(folder: Path) -> None:
     points = [re.findall(r"[-.0-9]+", line)[1:] for line in probed().printed[:-1]]
-    rows = [" ".join([*point, *7 * ["0.000000"]]) for point in points]
+    rows = [" ".join([*point, *6 * ["0.000000"]]) for point in points]
     (folder / "blade.txt").write_text("\n".join([*rows, ""]), encoding="ascii")
     ended = carried_out(folder, block("A log of probing", "yaml"))
     assert (ended.code, ended.json()["judged"]) == (0, len(points)), ended.err

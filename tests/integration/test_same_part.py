@@ -17,7 +17,8 @@ STEP_MM, RATE_HZ = 0.2, 1000.0
 SECTION_MM = section_on_machine()[::4]
 COUNT = round(float(np.hypot(*np.diff(SECTION_MM, axis=0).T).sum()) / STEP_MM)
 BLADE = ["--tip-radius-mm", "1.0", "--form-error-mm", "0.02", "--resolution-mm", "0.0001", "--unpaced"]
-OF_ITS_OWN = {"run", "device", "measured_at", "chain_sha256", "plan_sha256", "notes"}  # what results by different devices may differ in
+# What results by different devices may differ in.
+OF_ITS_OWN = {"run", "device", "measured_at", "chain_sha256", "plan_sha256", "signature", "notes"}
 MORE = "section: {origin_mm: [0, 10, 0]}\ndiscretisation: {samples: 300}\n"
 DEVICES = {
     "serial": "{type: serial, address: 'ADDRESS'}",
