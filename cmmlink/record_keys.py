@@ -24,7 +24,7 @@ class RecordsCopied(JsonObject):
 
 
 class RunSigned(JsonObject):
-    """The signature of a run over its id and its `chain_sha256`; docs/records.md tells what exactly is signed."""
+    """The signature of a run over its id and its `chain_sha256`; docs/evidence.md tells what exactly is signed."""
 
     algorithm: str = Field(description="Ed25519")
     public_key: str = Field(description="the public key, 64 hexadecimal digits")

@@ -21,9 +21,7 @@ _PROVES = (
     "This shows that the file fits together as it is. It does not show a file that was written anew, hashes and all, or whose last runs "
     "were cut off: a key that you were given (--key), an anchor (--anchors), or a result that was kept elsewhere (--against) does."
 )
-_PROVES_SIGNED = (
-    "Who may write the file but has not the key could not have written these runs anew. Whether later ones were cut off, an anchor shows."
-)
+_PROVES_SIGNED = "Whoever may write the file but has not the key could not have written these runs anew. Whether later ones were cut off, an anchor shows."
 _PROVES_AGAINST = (
     "The result of run {run} and the records agree: nothing up to the end of that run was changed, cut off or added since the result was "
     "written. What was recorded later is not covered by it."
@@ -62,10 +60,10 @@ def verify(
     alone has no key: whoever may write the file can write it anew, hashes and all. Exit status 0 only where nothing was altered or cut
     off and, with --key, where every run is signed by a key that was given.
     """
-    from cmmlink.record import check_chain, disagreements, heads_in, open_to_read, origin_of, public_key_given, read_result, trust_in
+    from cmmlink.record import check_chain, disagreements, heads_in, open_to_read, origin_of, read_result, trust_in
 
     result = None if against is None else read_result(against)
-    keys = [public_key_given(given) for given in key or ()]
+    keys = _public_keys(key or ())
     heads = None if anchors is None else [head for file in anchors for head in heads_in(file)]
     with open_to_read(records_folder(records), now, close_interrupted=False) as store:
         run = _run_named(store, name, heads or ()) if name else None
@@ -88,6 +86,14 @@ def verify(
         for line in _words(found):
             typer.echo(printable(line))
     return 0
+
+
+def _public_keys(given: Sequence[str]) -> list[str]:
+    if not given:
+        return []
+    from cmmlink.record import public_key_given  # this loads the library of signatures
+
+    return [public_key_given(one) for one in given]
 
 
 def _run_named(store: "Store", name: str, heads: Sequence["Head"]) -> str | None:
@@ -157,7 +163,7 @@ def _anchor_words(anchors: Mapping[str, Any]) -> str:
     if not anchors["heads"]:
         return f"the anchor holds no head of these records{beside}"
     heads = count_of(anchors["heads"], "head")
-    return f"not cut off: {heads} of the anchor agree, the last that of run {anchors['last']}; what came later is not covered{beside}"
+    return f"not cut off: as {heads} of the anchor say, the last that of run {anchors['last']}; what came later is not covered{beside}"
 
 
 def _named(runs: Sequence[str]) -> str:

@@ -180,10 +180,12 @@ def _keys(store: Store, given: Sequence[str]) -> Keys:
 
 def _public_key(file: Path) -> str:
     """The public key beside the records, empty where there is none that can be read."""
+    if not file.exists():
+        return ""
     from cmmlink.record.keys import public_key_given  # noqa: PLC0415 - as above
 
     try:
-        return public_key_given(str(file)) if file.exists() else ""
+        return public_key_given(str(file))
     except PlanError:
         return ""
 

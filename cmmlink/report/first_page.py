@@ -73,12 +73,13 @@ def identity_block(report: ReportInput, say: Speech, width: float) -> Table:
 
 
 def code_of(document: Mapping[str, Any]) -> str | None:
-    """What the QR code says: the run, the hash of its record and that of its plan; None where nothing was recorded."""
+    """What the QR code says: the run, the hash of its record, who signed that, and the hash of its plan; None where nothing was recorded."""
     if not document.get("chain_sha256"):
         return None
     named = {
         "run": document.get("run") or document.get("replay_of"),
         "record": document["chain_sha256"],
+        "key": (document.get("signature") or {}).get("key_id"),
         "plan": document.get("plan_sha256"),
     }
     return "\n".join(["cmmlink", *(f"{name} {value}" for name, value in named.items() if value)])

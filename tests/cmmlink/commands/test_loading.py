@@ -19,7 +19,8 @@ DEVICES, PAGE, PICTURES = {"pymodbus", "serial"}, {"starlette", "uvicorn", "webs
 CAD, BOOKS, SURFACES = {"ezdxf", "OCP"}, {"xlsxwriter"}, {"drivers.surface"}
 MATHS, PLANS, SPEECH = {"numpy", "scipy", "numba", "llvmlite"}, {"yaml", "cmmlink.plan.scan"}, {"rich"}
 SCIPY = {f"scipy.{part}" for part in ("interpolate", "linalg", "optimize", "sparse", "spatial", "special")}  # a third of a second together
-HEAVY = SCIPY | DEVICES | PAGE | PICTURES | MATHS | PLANS | SPEECH | CAD | BOOKS | SURFACES | {"simulators", "sqlite3"}
+SIGNATURES = {"cryptography"}  # where something is signed, or a signature verified
+HEAVY = SIGNATURES | SCIPY | DEVICES | PAGE | PICTURES | MATHS | PLANS | SPEECH | CAD | BOOKS | SURFACES | {"simulators", "sqlite3"}
 
 IN_ONE_PROCESS = """
 import contextlib, io, json, sys
@@ -45,7 +46,7 @@ def loaded_by(*commands: tuple[object, ...]) -> list[tuple[int, str, set[str]]]:
 
 def test_help_version_and_mistakes_load_nothing_heavy() -> None:
     working = ("demo", "run", "inspect", "ct", "nominal", "check", "console", "prepare", "doctor", "ports", "registers")
-    commands = (*working, "runs", "show", "export", "report", "compare", "replay", "verify", "backup", "restore", "merge")
+    commands = (*working, "runs", "show", "export", "report", "compare", "replay", "verify", "backup", "restore", "merge", "key")
     helped = loaded_by(("--version",), ("--help",), *((command, "--help") for command in commands))
     assert [(code, loaded) for code, _, loaded in helped] == [(0, set())] * (2 + len(commands))
     mistaken = loaded_by(("inspcet",), ("inspect", "points.csv"), ("inspect", "points.csv", "--nominal", "n.dat", "--tolerance", "wide", 1))
@@ -69,7 +70,7 @@ def test_points_are_inspected_without_devices_page_and_pictures_and_pictures_dra
     assert ("matplotlib" in drawn) == (processes_here() == 0)  # else another process draws
     noisy = write_points(tmp_path / "noisy.csv", oval_points(np.random.default_rng(1).normal(0.0, 0.003, 360)))
     ((_, _, least),) = loaded_by(("inspect", noisy, "--nominal", nominal, *TOLERANCE, "--no-record", "--json"))
-    assert least & SCIPY == set()
+    assert least & (SCIPY | SIGNATURES) == set()
     assert drawn & (DEVICES | PAGE | CAD | BOOKS | {"simulators"}) == set()
 
 
