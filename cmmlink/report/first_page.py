@@ -73,7 +73,7 @@ def identity_block(report: ReportInput, say: Speech, width: float) -> Table:
 
 
 def code_of(document: Mapping[str, Any]) -> str | None:
-    """What the QR code says: the run, the hash of its record, who signed that, and the hash of its plan; None where nothing was recorded."""
+    """What the QR code says: the run, the hash of its record, its key and the hash of its plan; None where nothing was recorded."""
     if not document.get("chain_sha256"):
         return None
     named = {
