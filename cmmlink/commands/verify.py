@@ -21,7 +21,10 @@ _PROVES = (
     "This shows that the file fits together as it is. It does not show a file that was written anew, hashes and all, or whose last runs "
     "were cut off: a key that you were given (--key), an anchor (--anchors), or a result that was kept elsewhere (--against) does."
 )
-_PROVES_SIGNED = "Whoever may write the file but has not the key could not have written these runs anew. Whether later ones were cut off, an anchor shows."
+_PROVES_SIGNED = (
+    "Whoever may write the file but has not the key could not have written these runs anew. Whether later ones were cut off, an anchor "
+    "shows (--anchors), or a result that was kept elsewhere (--against)."
+)
 _PROVES_AGAINST = (
     "The result of run {run} and the records agree: nothing up to the end of that run was changed, cut off or added since the result was "
     "written. What was recorded later is not covered by it."
