@@ -1,6 +1,9 @@
 """A machine tool that asks for the verdict and waits: what it does in the end, whatever went wrong on either side."""
 
+import socket
 import sqlite3
+import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -10,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from simulators.answers import await_answer
+from simulators.answers import await_answer, variables_set_by
 from tests.cmmlink.command import cmmlink
 from tests.cmmlink.oval_part import LENGTH_MM as OVAL_MM
 from tests.cmmlink.oval_part import oval_points, write_nominal
@@ -18,6 +21,7 @@ from tests.integration.fail_once import runs_in
 from tests.integration.simulated import Simulated, simulated
 from tests.integration.split_off import split_off
 
+POSIX_ONLY = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals exist on POSIX systems only")
 COUNT = 120
 REQUEST = 4711
 PLAN = """\
@@ -43,13 +47,13 @@ def planned(folder: Path, address: str, *, silence_s: float = 5.0, more: str = "
 
 
 @contextmanager
-def asking(folder: Path, *options: object, within_s: float = 20.0) -> Iterator[Simulated]:
+def asking(folder: Path, *options: object, within_s: float = 20.0, address: str = "127.0.0.1:0") -> Iterator[Simulated]:
     """A machine tool that touches the oval, asks for the verdict, and waits for its answer."""
     file = folder / "O9100.nc"
     words = ["--unpaced", "--tip-radius-mm", "1.5", "--answer", file, "--request", REQUEST, "--answer-within", within_s, *options]
     with simulated(
         "machine-tool",
-        "127.0.0.1:0",
+        address,
         folder,
         *map(str, words),
         path_mm=np.vstack([oval_points(0.0), oval_points(0.0)[:1]]),
@@ -124,12 +128,60 @@ def test_an_emergency_stop_ends_the_run_after_the_silence_that_the_plan_allows(t
         assert end_of(machine) == f"request {REQUEST}: emergency stop: the machine stops"
 
 
+@POSIX_ONLY
 def test_a_killed_machine_leaves_a_run_that_proves_nothing(tmp_path: Path) -> None:
-    with asking(tmp_path, "--fault=die@60") as machine:
+    """At a serial port, what the killed process said last may be gone with it, the number of its request too."""
+    with asking(tmp_path, "--fault=die@60", "--fault=parity", address="pty") as machine:
         found = carried_out(planned(tmp_path, machine.address))
-        assert (found[0], found[1]["verdict"]) == (4, "uncertain"), found[2]
-        assert "the link was lost" in found[2]
-    assert "NOT PROVEN" in what_follows(tmp_path)
+    assert (found[0], found[1]["verdict"]) == (4, "uncertain"), found[2]
+    assert "the link was lost" in found[2]
+    assert what_follows(tmp_path).endswith("the machine stops")
+
+
+def printed(last: int) -> bytes:
+    """Lines with so many points of the oval, each behind its nominal one."""
+    rows = []
+    for k, ((x, y), (p, q)) in enumerate(zip(oval_points(0.0)[:last].tolist(), oval_points(1.5)[:last].tolist(), strict=True), 1):
+        rows.append(f"G800 N{k} X{x:.4f} Y{y:.4f} Z0. I0. J1. K0.\r\nG801 N{k} X{p:.4f} Y{q:.4f} Z0. R1.5\r\n")
+    return "".join(rows).encode("ascii")
+
+
+OPENING = b"REQUEST    4711\r\nSTART\r\n"
+
+
+@pytest.mark.parametrize(
+    ("sent", "code", "words", "told"),
+    [
+        (OPENING + printed(360) + b"END\r\n", 0, "", (4711, 1)),
+        (OPENING + printed(60) + b"G801 N61 X1", 4, "the link was lost", (4711, 3)),
+        (OPENING + printed(360), 4, "the link was lost", (4711, 3)),
+        (b"REQUEST    4710\r\nSTART\r\n" + printed(60) + OPENING + printed(360) + b"END\r\n", 3, "began anew", (4711, 3)),
+        (b"REQUEST    4Z11\r\nSTART\r\n" + printed(360) + b"END\r\n", 0, "told no number of a request", (0, 9)),
+        (b"START\r\n" + printed(360) + b"END\r\n", 0, "told no number of a request", (0, 9)),
+        (OPENING, 4, "the link was lost", (0, 9)),
+    ],
+    ids=["whole", "cut in mid-line", "without its end", "begun anew", "garbled request", "no request", "nothing touched"],
+)
+def test_whatever_comes_of_a_cable_the_machine_is_told_no_more_than_is_proven(
+    sent: bytes, code: int, words: str, told: tuple[int, int], tmp_path: Path
+) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as control:
+
+        def talk() -> None:
+            link, _ = control.accept()
+            with link:
+                link.sendall(sent)
+
+        address = f"127.0.0.1:{control.getsockname()[1]}"
+        thread = threading.Thread(target=talk, daemon=True)
+        thread.start()
+        ended = carried_out(planned(tmp_path, address))
+        thread.join()
+    assert (ended[0], words in ended[2] + str(ended[1])) == (code, True), ended
+    found = variables_set_by((tmp_path / "O9100.nc").read_text(encoding="ascii"))
+    assert found is not None
+    assert (found[152], found[150]) == told
+    assert ended[1]["answer"]["sent"] is (told[1] != 9)
 
 
 def test_a_killed_run_passes_no_part_and_the_machine_stops(tmp_path: Path) -> None:
