@@ -7,7 +7,7 @@ INSTALL := $(PIP) --no-build-isolation --editable
 # The tests start a hundred processes; where Python may keep no compiled files, each of them compiles every file anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo install test checks compiled lowest lowest-compiled lowest-drivers platforms upgrade bench slower paper faults powercuts kills fuzz soak damage memory proofs stops machines laws audit uncertainty supply-chain docs bundle page-tools screenshots
+.PHONY: demo install test checks compiled lowest lowest-compiled lowest-drivers platforms upgrade bench slower paper faults powercuts kills fuzz soak damage memory elsewhere proofs stops machines laws audit uncertainty supply-chain docs bundle page-tools screenshots
 demo: .venv/installed
 	$(BIN)/cmmlink demo --out demo-result
 
@@ -123,6 +123,11 @@ damage: .venv/test-installed
 POINTS := 1e6 4e6 1.6e7 3.6e7
 memory: .venv/test-installed
 	$(BIN)/python -m tests.benchmarks.memory_per_point $(POINTS)
+
+# Runs of every kind, exported and replayed as on other processors, with other languages, time zones and numbers of threads; takes minutes.
+# With PYTHONS=.venv/lowest/bin/python also with another Python and its libraries.
+elsewhere: .venv/test-installed
+	$(BIN)/python -m tests.benchmarks.elsewhere --python $(PYTHONS)
 
 # The proof in mid-scan over 1,200 simulated scans of six kinds, 200 each: no part that passes may be proven out.
 proofs: .venv/test-installed

@@ -153,6 +153,17 @@ class Replayed(Inspected):
         description="the SHA-256 of the result and of every point's deviation, foot, station and verdict, to the last bit; where the "
         "replay is identical it is the one that the run's end keeps"
     )
+    same_decision: bool | None = Field(
+        description="whether the same was decided of the part, every characteristic and every point; null where no result was recorded"
+    )
+    apart: float | None = Field(
+        description="how far a deviation, or the value of a characteristic, lies from the recorded one at most, in its unit; 0 where the "
+        "replay is identical, null where a point or a value is missing in one of the two"
+    )
+    decision_sha256: str = Field(
+        description="the SHA-256 of what was decided: verdict, counts of points, kinds of the reasons, the verdict of every "
+        "characteristic, and the verdict and rejection of every point; the same on every processor where the decision is the same"
+    )
     changed: list[Change] = Field(description="the settings and software that are not those of the recorded run")
     differs: list[Change] = Field(description="what of the result is not as recorded")
     derived: JudgementKept | None = Field(default=None, description="with `--reason`: where this judgement is kept")

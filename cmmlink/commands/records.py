@@ -147,6 +147,7 @@ def replay(
     """
     from cmmlink.devices import decoder_of
     from cmmlink.record import keep_judgement, open_to_record, recorded_run, replay_run
+    from cmmlink.result_json import number
 
     changes = _settings_in(settings or ())
     if changes and not (reason or "").strip():
@@ -171,7 +172,10 @@ def replay(
         "replay_of": recorded.run,
         "chain_sha256": recorded.chain_sha256 if evidence is None else evidence.chain_sha256,
         "identical": again.identical,
-        "result_sha256": again.result_sha256,
+        "same_decision": again.agreement.same_decision,
+        "apart": None if again.agreement.apart is None else number(again.agreement.apart),
+        "result_sha256": again.agreement.result_sha256,
+        "decision_sha256": again.agreement.decision_sha256,
     }
     document |= {"ending": again.outcome.ending, "measured_at": utc_words(datetime.fromisoformat(recorded.header["started"]))}
     notes = (*again.notes, *([] if evidence is None else [evidence.words]))
@@ -190,7 +194,7 @@ def replay(
         _print_replay(again, recorded.run, notes)
         if kept is not None:
             _say(f"kept as record {kept['record']}, chained to run {recorded.run}: {kept['who']}, {kept['why']}")
-    if again.identical is False and not again.changed:
+    if again.identical is False and not again.changed and not again.agreement.holds:
         return fail(f"run {recorded.run}: nothing was changed, yet the result is not the recorded one", NO_RECORD)
     return UNUSABLE if again.outcome.result is None else EXIT_OF[again.outcome.result.verdict]
 
@@ -238,4 +242,7 @@ def _print_replay(again: "Replay", run_id: str, notes: Sequence[str]) -> None:
         typer.echo(f"run {run_id} has no recorded result to compare with")
     elif again.identical:
         typer.echo(f"identical to the recorded result of run {run_id}, to the last bit")
-        typer.echo(f"SHA-256 of the result and of every deviation: {again.result_sha256}")
+        typer.echo(f"SHA-256 of the result and of every deviation: {again.agreement.result_sha256}")
+    else:
+        typer.echo(again.agreement.words)
+    typer.echo(f"SHA-256 of what was decided: {again.agreement.decision_sha256}")

@@ -210,4 +210,6 @@ def _comparison_of(again: Replay, run: str) -> str:
         return f"Replay of run {run}, which has no recorded result to compare with{changed}"
     if again.identical:
         return f"Replay of run {run}: identical to the recorded result, to the last bit{changed}"
+    if again.agreement.holds:
+        return f"Replay of run {run}: the same decision as recorded, with numbers at most {again.agreement.apart:.1e} apart{changed}"
     return f"Replay of run {run}: NOT the recorded result; {', '.join(change.key for change in again.differs[:4])} differ{changed}"

@@ -22,7 +22,8 @@ from cmmlink.events import RunStarted, Sink
 from cmmlink.from_plan import inspection_of, notes_on_datum, notes_on_nominal, notes_on_temperature, profile_of
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan import Plan, read_model, value_of, words_of_allowed
-from cmmlink.record.bodies import PlacedArrival, pack_document
+from cmmlink.record.agreement import Agreement, compare, differences_of
+from cmmlink.record.bodies import PlacedArrival
 from cmmlink.record.derived import Change, derived_draft
 from cmmlink.record.reader import RecordedRun, arrivals_of, points_of, reads_of
 from cmmlink.record.recorder import judged_bodies, result_sha256
@@ -56,9 +57,7 @@ class Replay:
 
     plan      : what was evaluated, with what was changed in it
     changed   : settings and software that are not those of the recorded run
-    differs   : values of the result that are not as recorded
-    identical : to the last bit of every deviation; None where the recorded run has no result to compare with
-    result_sha256 : the hash of all that was found, see `result_sha256` in the end of a run: where it is identical, that of the record
+    agreement : how the result compares with the recorded one
     notes     : what was assumed about nominal and points when they were recorded
     """
 
@@ -67,10 +66,18 @@ class Replay:
     profile: NominalProfile
     result_json: dict[str, Any]
     changed: tuple[Change, ...]
-    differs: tuple[Change, ...]
-    identical: bool | None
-    result_sha256: str
+    agreement: Agreement
     notes: tuple[str, ...]
+
+    @property
+    def identical(self) -> bool | None:
+        """Whether all is as recorded, to the last bit of every deviation; None where there is no recorded result."""
+        return self.agreement.identical
+
+    @property
+    def differs(self) -> tuple[Change, ...]:
+        """Values of the result that are not as recorded."""
+        return self.agreement.differs
 
 
 def replay_run(
@@ -123,15 +130,11 @@ def replay_run(
     reading.raise_failure(recorded.run, outcome)
     replayed = result_json(outcome.result, outcome.counts)
     changes = (*_settings_changed(plan, changed), *_software_changed(recorded.header["software"]))
-    differs = tuple(_differences_of(recorded.result, replayed)) if recorded.result is not None else ()
-    same = replayed if differs or recorded.result is None else recorded.result  # a later version tells more, which is no difference
-    sha256 = result_sha256(same, (body for _, body in judged_bodies(outcome.result)))
-    identical, differs = _compare(recorded, sha256, differs)
     notes = (
         *_notes_on(changed, plan, started.notes, recorded),
         *density_notes(density_of(stations_of(outcome.result), profile.length_mm), profile.length_mm),
     )
-    return Replay(changed, outcome, profile, replayed, changes, differs, identical, sha256, notes)
+    return Replay(changed, outcome, profile, replayed, changes, compare(store, recorded, replayed, outcome.result), notes)
 
 
 class _Reading:
@@ -360,41 +363,8 @@ def _rows(batch: PointBatch, begin: int, end: int) -> PointBatch:
 
 
 def _settings_changed(plan: Plan, changed: Plan) -> Iterator[Change]:
-    return _differences_of(plan.model_dump(mode="json"), changed.model_dump(mode="json"))
+    return differences_of(plan.model_dump(mode="json"), changed.model_dump(mode="json"))
 
 
 def _software_changed(recorded: Mapping[str, str]) -> Iterator[Change]:
-    return _differences_of(dict(recorded), software(), "software.")
-
-
-def _compare(recorded: RecordedRun, sha256: str, differs: tuple[Change, ...]) -> tuple[bool | None, tuple[Change, ...]]:
-    """Whether all that was recorded is found again to the last bit, and what is not. None where no result was recorded.
-
-    Deviations alone may differ without any of the summary showing it.
-    """
-    if recorded.end is None or not recorded.end["result_sha256"]:
-        return None, differs
-    alike = sha256 == recorded.end["result_sha256"]
-    if not alike and not differs:
-        differs = (Change("deviations", "as recorded", "differ in the last bits; nothing of the summary does"),)
-    return alike and not differs, differs
-
-
-def _differences_of(recorded: Any, replayed: Any, key: str = "") -> Iterator[Change]:
-    """Name the recorded values that are not found again, by their path."""
-    if isinstance(recorded, Mapping) and isinstance(replayed, Mapping):
-        for name in recorded:
-            prefix = key if not key or key.endswith(".") else key + "."
-            yield from _differences_of(recorded.get(name), replayed.get(name), prefix + name)
-    elif _is_list(recorded) and _is_list(replayed):
-        if len(recorded) != len(replayed):
-            yield Change(f"{key} (how many)", len(recorded), len(replayed))
-            return
-        for index, (before, now) in enumerate(zip(recorded, replayed, strict=True)):
-            yield from _differences_of(before, now, f"{key}[{index}]")
-    elif pack_document(recorded) != pack_document(replayed):
-        yield Change(key, recorded, replayed)
-
-
-def _is_list(value: Any) -> bool:
-    return isinstance(value, Sequence) and not isinstance(value, str)
+    return differences_of(dict(recorded), software(), "software.")
