@@ -26,7 +26,7 @@ def replace_answer(file: Path, data: bytes, sleep: Callable[[float], None] = tim
     A file that is no answer of cmmlink's is left as it is. So is an earlier answer, wherever this is raised before the renaming.
     """
     try:
-        _refuse_foreign(file)
+        refuse_foreign(file)
         _remove_left_behind(file)
         new = file.with_name(f".{file.name}.{os.getpid()}.new")
         try:
@@ -61,14 +61,14 @@ def withdraw_answer(file: Path, data: bytes) -> None:
 def _is_taken_away(file: Path) -> bool:
     """Take an earlier answer away, and tell whether none stands there: where the folder is out of reach, nobody knows."""
     with suppress(OSError, AnswerError):
-        _refuse_foreign(file)
+        refuse_foreign(file)
         if file.parent.is_dir():
             file.unlink(missing_ok=True)
             return True
     return False
 
 
-def _refuse_foreign(file: Path) -> None:
+def refuse_foreign(file: Path) -> None:
     """Raise AnswerError where the place is taken by a file that was not written here; an empty one was left by a disk that was full."""
     try:
         with file.open("rb") as standing:

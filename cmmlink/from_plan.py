@@ -10,8 +10,9 @@ from typing import TypedDict, TypeVar
 
 import numpy as np
 
+from cmmlink.answer_file import refuse_foreign
 from cmmlink.characteristics import Builder, base_of, known_pose, pose_of
-from cmmlink.errors import PlanError
+from cmmlink.errors import AnswerError, PlanError
 from cmmlink.events import RunStarted
 from cmmlink.last_qualification import qualification_here
 from cmmlink.line_sample import check_sample
@@ -57,6 +58,8 @@ def find_problems(plan: Plan, plan_file: Path) -> tuple[NominalProfile | None, t
     profile = found.attempt("nominal.file", lambda: profile_of(plan))
     if isinstance(plan.device, LinesDevice):
         found.attempt("device.format.sample", partial(check_sample, plan.device, plan.probe.tip_radius_mm))
+    if plan.answer is not None:
+        found.attempt("answer.file", partial(_check_answer, plan.answer.file))
     found.attempt("temperature" if plan.temperature is not None else "uncertainty.temperature", lambda: check_fixed_place(plan))
     if profile is not None:
         found.attempt("uncertainty", lambda: zone_of(plan, profile))
@@ -65,6 +68,16 @@ def find_problems(plan: Plan, plan_file: Path) -> tuple[NominalProfile | None, t
             found.attempt(f"characteristics.{number}", partial(builder.build, number))
         found.attempt("probe.tip_radius_mm", lambda: inspection_of(plan, profile, characteristics=()))
     return profile, tuple(found.problems)
+
+
+def _check_answer(file: Path) -> None:
+    """Raise PlanError where a file stands in the place of the answer that is none. One that is out of reach now may be there later."""
+    try:
+        refuse_foreign(file)
+    except AnswerError as error:
+        raise PlanError(str(error)) from None
+    except OSError:
+        return
 
 
 class Problems:

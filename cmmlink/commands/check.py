@@ -57,6 +57,9 @@ def _check_scan(plan: "Plan", plan_file: Path) -> int:
     typer.echo(f"records in {words_of_room(plan.records.folder or records_folder(None))}")
     typer.echo(f"nominal {profile.length_mm:.3f} mm long, {len(profile)} samples, material on the {profile.material}")
     typer.echo(f"decision rule: {zone.decision_rule}")
+    if plan.answer is not None:
+        away = "" if plan.answer.file.parent.is_dir() else f", which is out of reach now: there is no folder {plan.answer.file.parent}"
+        typer.echo(f"the machine is told the verdict in {plan.answer.file}{away}")
     _print_notes(found.notes)
     return 0
 

@@ -70,4 +70,6 @@ def _description(name: str, text: str, plan: Plan, profile: NominalProfile) -> C
     ]
     if plan.probe.tip_radius_mm:
         facts.append(("Probe", f"ball, radius {plan.probe.tip_radius_mm:g} mm"))
+    if plan.answer is not None:
+        facts.append(("Answer", plan.answer.file.name))
     return ChosenPlan(name, text, "", None, plan.part.name, tuple(facts), has_address=plan.has_address)

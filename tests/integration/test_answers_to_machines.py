@@ -212,3 +212,17 @@ def wait_for(met: Callable[[], bool], within_s: float = 30.0) -> None:
     while not met():
         assert time.monotonic() < end_s
         time.sleep(0.01)
+
+
+def test_check_says_where_the_machine_is_answered_and_refuses_a_file_that_is_something_else(tmp_path: Path) -> None:
+    plan = planned(tmp_path, "127.0.0.1:9", answer="dnc/O9100.nc")
+    told = cmmlink("check", plan)
+    assert told.code == 0
+    assert f"the machine is told the verdict in {tmp_path / 'dnc' / 'O9100.nc'}, which is out of reach now" in told.out
+    (tmp_path / "dnc").mkdir()
+    (tmp_path / "dnc" / "O9100.nc").write_text("O9100 (THE MAIN PROGRAM)", encoding="ascii")
+    for command in ("check", "run"):
+        problem = cmmlink(command, plan).refused()
+        assert "line 6: answer.file: " in problem
+        assert "is no answer of cmmlink's" in problem
+    assert (tmp_path / "dnc" / "O9100.nc").read_text(encoding="ascii") == "O9100 (THE MAIN PROGRAM)"
