@@ -7,16 +7,20 @@ TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer 
 
 if TYPE_CHECKING:
     from inspection.surface.feet import FootKind, NominalSurface, SurfaceFeet, rejections
+    from inspection.surface.patches import PatchSurface
+    from inspection.surface.spline_face import SplineFace
     from inspection.surface.triangles import TriangleSurface
 else:
     from inspection.front_door import load_on_use
 
     _PLACES = {
         "inspection.surface.feet": ("FootKind", "NominalSurface", "SurfaceFeet", "rejections"),
+        "inspection.surface.patches": ("PatchSurface",),
+        "inspection.surface.spline_face": ("SplineFace",),
         "inspection.surface.triangles": ("TriangleSurface",),
     }
 
     __getattr__ = load_on_use(__name__, _PLACES)
 
 
-__all__ = ["FootKind", "NominalSurface", "SurfaceFeet", "TriangleSurface", "rejections"]
+__all__ = ["FootKind", "NominalSurface", "PatchSurface", "SplineFace", "SurfaceFeet", "TriangleSurface", "rejections"]

@@ -9,6 +9,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from inspection.errors import NominalError
+from inspection.surface.orientation import which_to_turn
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -129,30 +130,20 @@ def _weld_borders(corners: Array, triangles: Index, notes: list[str]) -> Index:
 
 
 def _orient(corners: Array, triangles: Index, notes: list[str]) -> Index:
-    """Turn triangles so that neighbours have their outsides on the same side, and a closed surface has them outside.
-
-    Of a part that hangs together the side of the greater area stays. Whether a triangle is turned is sought in a graph of two nodes a
-    triangle, as it is and turned: neighbours that agree join what is alike, others what is not.
-    """
-    edges, n = _edges(triangles), len(triangles)
+    """Turn triangles so that neighbours have their outsides on the same side, and a closed surface has them outside."""
+    edges = _edges(triangles)
     side_order = np.argsort(edges.of, kind="stable")
     first = np.cumsum(edges.faces) - edges.faces
     pair = edges.faces == 2
     one, other = side_order[first[pair]], side_order[first[pair] + 1]
     agrees = edges.forward[one] != edges.forward[other]
-    if not agrees.all():
-        i, j = one // 3, other // 3
-        rows = np.concatenate([i, i + n])
-        columns = np.concatenate([np.where(agrees, j, j + n), np.where(agrees, j + n, j)])
-        _, label = connected_components(coo_array((np.ones(len(rows)), (rows, columns)), shape=(2 * n, 2 * n)), directed=False)
-        if (label[:n] == label[n:]).any():
-            x, y, z = corners[triangles[np.flatnonzero(label[:n] == label[n:])[0]]].mean(axis=0)
-            raise NominalError(
-                f"the surface has no two sides: its triangles cannot be turned to agree near ({x:.6g}, {y:.6g}, {z:.6g}) mm; mend the mesh"
-            )
-        area = _areas(corners, triangles)
-        weight = np.bincount(label, np.concatenate([area, -area]))  # of a component as it is, less its mirror image
-        turned = (weight[label[:n]] < 0) | ((weight[label[:n]] == 0) & (label[:n] > label[n:]))
+    turned, hopeless = which_to_turn(_areas(corners, triangles), one // 3, other // 3, agrees)
+    if len(hopeless):
+        x, y, z = corners[triangles[hopeless[0]]].mean(axis=0)
+        raise NominalError(
+            f"the surface has no two sides: its triangles cannot be turned to agree near ({x:.6g}, {y:.6g}, {z:.6g}) mm; mend the mesh"
+        )
+    if turned.any():
         triangles = np.where(turned[:, None], triangles[:, ::-1], triangles)
         notes.append(f"{np.count_nonzero(turned)} triangles were turned over, so that they agree with their neighbours")
     if (edges.faces == 2).all() and _volume(corners, triangles) < 0:

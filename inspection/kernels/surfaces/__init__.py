@@ -7,12 +7,14 @@ around it every point is worked out on its own: no result depends on the batch, 
 TYPE_CHECKING = False  # as type checkers read it
 
 if TYPE_CHECKING:
+    from inspection.kernels.surfaces.on_patches import PatchTables, project_on_patches
     from inspection.kernels.surfaces.on_triangles import TriangleTables, project_on_triangles
     from inspection.kernels.surfaces.space_feet import SpaceFeet
 else:
     from inspection.front_door import load_on_use
 
     _PLACES = {
+        "inspection.kernels.surfaces.on_patches": ("PatchTables", "project_on_patches"),
         "inspection.kernels.surfaces.on_triangles": ("TriangleTables", "project_on_triangles"),
         "inspection.kernels.surfaces.space_feet": ("SpaceFeet",),
     }
@@ -20,4 +22,4 @@ else:
     __getattr__ = load_on_use(__name__, _PLACES)
 
 
-__all__ = ["SpaceFeet", "TriangleTables", "project_on_triangles"]
+__all__ = ["PatchTables", "SpaceFeet", "TriangleTables", "project_on_patches", "project_on_triangles"]

@@ -24,3 +24,23 @@ NOTHING = -1  # in place of a triangle, where a cluster is not full; of a face b
 
 # What a foot lies on in its triangle: its inside, the edges AB, AC, BC, the corners A, B, C.
 IN_TRIANGLE, EDGE_1, EDGE_2, EDGE_3, CORNER_1, CORNER_2, CORNER_3 = range(7)
+
+# --- a piece of a spline face: a polynomial in s, t of [-1/2, 1/2] each -------------------------------------------------------
+
+# Bounds over the piece of the lengths of S_s, S_t, S_ss, S_st, S_tt, S_sss, S_sst, S_stt, S_ttt.
+M10, M01, M20, M11, M02, M30, M21, M12, M03 = range(9)
+# The box that holds it: the middle, three unit axes, half the sides along them. Then where it is on its face, and 1 or -1 for the side.
+BOX_MIDDLE, BOX_AXES, BOX_HALF, PIECE_U, PIECE_V, PIECE_DU, PIECE_DV, PIECE_OUTWARD = 9, 12, 21, 24, 25, 26, 27, 28
+COEFFICIENTS = 32  # of x, y, z: width * width each, that of s^i t^j at i * width + j
+WIDTH_CUBIC, WIDTH_QUINTIC = 4, 6
+HALF = 0.5  # where a piece ends
+# What lies beyond the sides s = -1/2, s = 1/2, t = -1/2, t = 1/2, and at the corners (-,-), (+,-), (-,+), (+,+): a side that goes on
+# in another piece has INNER, one at the border of the face the row of its border; a corner of the face has the row of its vertex.
+SIDES, CORNERS, LINKS = 4, 4, 8
+INNER = -1
+BORDER_STEPS = 4  # a border has pseudonormals at so many steps and one place more: x, y, z, and 1 where nothing adjoins
+PLACE_WIDTH = 4
+BORDER_WIDTH = PLACE_WIDTH * (BORDER_STEPS + 1)
+RECTANGLES = 128  # that may wait to be looked at in one piece: three for each halving, and one more
+RECTANGLE_WIDTH = 4
+PIECE_SCRATCH = SCRATCH + RECTANGLES * RECTANGLE_WIDTH

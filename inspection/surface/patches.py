@@ -1,0 +1,124 @@
+"""A nominal surface of spline faces, projected on the splines themselves: no tessellation, no chord error."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from inspection.errors import NominalError
+from inspection.kernels.surfaces import PatchTables, project_on_patches
+from inspection.kernels.surfaces.layout import BOX_AXES, BOX_HALF, BOX_MIDDLE
+from inspection.surface.feet import KILOMETRE_MM, SurfaceFeet, points_in_space, surface_feet
+from inspection.surface.item_tree import item_tree
+from inspection.surface.orientation import which_to_turn
+from inspection.surface.patch_borders import agreeing_faces, border_rows, find_adjoining, find_borders, vertex_rows
+from inspection.surface.patch_pieces import PatchPieces, cut_into_patches, piece_rows
+from inspection.surface.spline_face import SplineFace
+
+Array = NDArray[np.float64]
+
+_ADJOINS = 1e-5  # of the size: borders that are nearer to each other are one edge, as CAD systems promise it
+_GRAIN = 1e-12  # of the size
+_GAUSS = np.array([-np.sqrt(0.6), 0.0, np.sqrt(0.6)]) / 2
+_GAUSS_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18
+
+
+class PatchSurface:
+    """A surface of whole spline faces; `project` gives exact closest points. It satisfies `NominalSurface`.
+
+    edge_tolerance_mm : borders of faces nearer to each other are one edge; None for a hundred-thousandth of the size
+    nominal_error_mm  : 0, for the faces are the nominal
+
+    Raises NominalError where there is no face, or faces have no two sides.
+    """
+
+    __slots__ = ("_area", "_pieces", "_tables", "faces", "is_closed", "nominal_error_mm", "notes", "size_mm")
+
+    def __init__(self, faces: Sequence[SplineFace], edge_tolerance_mm: float | None = None) -> None:
+        if not faces:
+            raise NominalError("there is no face")
+        if not all((np.abs(face.control_points_mm) <= KILOMETRE_MM).all() for face in faces):
+            raise NominalError("a control point is farther than a kilometre from zero")
+        every = np.concatenate([face.control_points_mm.reshape(-1, 3) for face in faces])
+        self.faces = tuple(faces)
+        self.size_mm = float(np.ptp(every, axis=0).max())
+        self.nominal_error_mm = 0.0
+        pieces = self._pieces = cut_into_patches(faces, self.size_mm)
+        self._area, flux = _areas(pieces, every.mean(axis=0))
+        near_mm = _ADJOINS * self.size_mm if edge_tolerance_mm is None else edge_tolerance_mm
+        outward, notes = np.where([face.reversed for face in faces], -1.0, 1.0), []
+        borders = find_borders(pieces)
+        adjoining = find_adjoining(pieces, borders, near_mm)
+        by_face = np.bincount(pieces.face, self._area).astype(np.float64)
+        turned, hopeless = which_to_turn(by_face, *agreeing_faces(pieces, borders, adjoining, outward))
+        if len(hopeless):
+            raise NominalError(f"the surface has no two sides at face {hopeless[0] + 1}: it cannot be turned to agree with its neighbours")
+        outward[turned] *= -1.0
+        if turned.any():
+            notes.append(f"{np.count_nonzero(turned)} faces were turned over, so that they agree with their neighbours")
+        sides = border_rows(pieces, borders, adjoining, outward)
+        self.is_closed = not sides[:, :, 3].any()
+        if self.is_closed and float((flux * outward[pieces.face]).sum()) < 0:
+            outward, sides = -outward, sides * np.array([-1.0, -1.0, -1.0, 1.0])
+            notes.append("the surface is closed and its faces faced inwards: all were turned over")
+        vertices = vertex_rows(pieces, borders, sides, outward, near_mm)
+        self.notes = tuple(notes)
+        rows = piece_rows(pieces, outward[pieces.face])
+        low, high = _bounding(rows)
+        tree = item_tree(rows[:, BOX_MIDDLE:BOX_AXES], low, high, 1)
+        self._tables = PatchTables(
+            nodes=tree.nodes,
+            links=tree.links,
+            members=tree.members.ravel().astype(np.int32),
+            rows=rows.ravel(),
+            beyond=borders.links.ravel().astype(np.int32),
+            borders=sides.ravel(),
+            vertices=vertices.ravel(),
+            width=pieces.coefficients.shape[-1],
+            row_width=rows.shape[1],
+            grain_mm=_GRAIN * self.size_mm,
+        )
+
+    def __len__(self) -> int:
+        return len(self.faces)
+
+    @property
+    def area_mm2(self) -> float:
+        """Area of all faces."""
+        return float(self._area.sum())
+
+    def project(self, points_mm: ArrayLike, threads: int | None = None) -> SurfaceFeet:
+        """Closest points of the surface to points (m, 3); see `NominalSurface`. The number of threads changes no bit."""
+        found = project_on_patches(points_in_space(points_mm), self._tables, threads)
+        return surface_feet(found, self._pieces.face.astype(np.int32))
+
+    def sample(self, count: int) -> tuple[Array, Array]:
+        """At least `count` places (n, 3) spread over the area, and the outward normals (n, 3) there."""
+        share = count * self._area / self._area.sum()
+        before = np.floor(np.cumsum(share) - share + 0.5).astype(np.int64)
+        wanted = np.diff(np.append(before, max(count, before[-1])))
+        owner = np.repeat(np.arange(len(share)), wanted)
+        within = np.arange(len(owner)) - np.repeat(np.cumsum(wanted) - wanted, wanted)
+        s, t = (within + 0.5) / wanted[owner] - 0.5, (within * 0.6180339887498949 + 0.5) % 1.0 - 0.5
+        places, _, _ = self._pieces.at(owner, s, t)
+        return places, self.project(places).normal
+
+
+def _areas(pieces: PatchPieces, middle_mm: Array) -> tuple[Array, Array]:
+    """The area (p,) of each piece, and three times the volume (p,) of the cone from a place to it, by Gauss's rule."""
+    every = np.arange(len(pieces.face))
+    area, flux = np.zeros(len(every)), np.zeros(len(every))
+    for s, weight_s in zip(_GAUSS, _GAUSS_WEIGHTS, strict=True):
+        for t, weight_t in zip(_GAUSS, _GAUSS_WEIGHTS, strict=True):
+            value, by_s, by_t = pieces.at(every, np.full(len(every), s), np.full(len(every), t))
+            normal = np.cross(by_s, by_t)
+            area += weight_s * weight_t * np.linalg.norm(normal, axis=1)
+            flux += weight_s * weight_t * ((value - middle_mm) * normal).sum(axis=1)
+    return area, flux
+
+
+def _bounding(rows: Array) -> tuple[Array, Array]:
+    """Boxes along x, y and z around those of the pieces: low (p, 3) and high (p, 3)."""
+    middle, axes, half = rows[:, BOX_MIDDLE:BOX_AXES], rows[:, BOX_AXES:BOX_HALF].reshape(-1, 3, 3), rows[:, BOX_HALF : BOX_HALF + 3]
+    reach = np.einsum("pa,pad->pd", half, np.abs(axes)) * (1 + 1e-12)
+    return middle - reach, middle + reach
