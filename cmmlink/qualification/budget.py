@@ -9,7 +9,9 @@ from typing import Any
 from cmmlink.qualification_keys import QualifiedKind
 from cmmlink.result_json import number
 
-_FINEST = "a millionth of a micrometre, which no machine resolves, and ten thousand times the round-off of coordinates of a metre"
+_PICOMETRE = "a picometre: no machine resolves it, and it is ten thousand times the round-off of coordinates of a metre"
+_FIT = "ten picometres: a fit ends when no point moves by more than one"
+_RIGHT = "a verdict is right or wrong"
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,23 +34,30 @@ class Quantity:
         return f"{self.limit:g}" if self.unit == "count" else f"{self.limit:g} {self.unit}"
 
 
-DEVIATION = Quantity("deviation", "deviation of a point at a known pose", "mm", 1e-9, _FINEST)
-RMS = Quantity("deviation", "root mean square of the deviations", "mm", 1e-9, "the same as of each deviation")
-POSE = Quantity("pose", "a point from where the best fit brings it", "mm", 1e-6, "a nanometre, far below every U")
-MINIMUM_ZONE = Quantity("zone", "width of the minimum zone", "mm", 1e-6, "a nanometre, to which placements are searched")
-CONSUMPTION = Quantity("zone", "least consumption of the tolerance", "share", 1e-5, "a thousandth of a per cent of the tolerance")
-PART_VERDICTS = Quantity("zone", "wrong verdicts of parts", "count", 0, "a verdict is right or wrong")
-POINT_VERDICTS = Quantity("zone", "wrong verdicts of points at a known pose", "count", 0, "a verdict is right or wrong")
+DEVIATION = Quantity("deviation", "deviation of a point at a known pose", "mm", 1e-9, _PICOMETRE)
+RMS = Quantity("deviation", "root mean square of the deviations", "mm", 1e-9, "that of each deviation")
+POSE = Quantity("pose", "a point from where the best fit brings it", "mm", 1e-8, _FIT)
+MINIMUM_ZONE = Quantity("zone", "width of the minimum zone", "mm", 1e-8, _FIT)
+CONSUMPTION = Quantity(
+    "zone", "least consumption of the tolerance", "share", 2.5e-7, "ten picometres in a zone of 0.04 mm, the narrowest of the set"
+)
+PART_VERDICTS = Quantity("zone", "wrong verdicts of parts", "count", 0, _RIGHT)
+POINT_VERDICTS = Quantity("zone", "wrong verdicts of points at a known pose", "count", 0, _RIGHT)
 EDGE_VERDICTS = Quantity("zone", "wrong verdicts 10 pm inside or outside of a limit", "count", 0, "a zone is as wide as it is stated")
-FILTERED = Quantity("filter", "deviation behind a filter", "mm", 1e-6, "a nanometre")
-LENGTHS = Quantity("characteristics", "lengths of the section", "mm", 1e-6, "a nanometre")
-ANGLES = Quantity("characteristics", "angles of the section", "deg", 1e-6, "a nanometre at the end of a chord of 60 mm")
-LOST = Quantity("wire to verdict", "points lost, damaged or rejected", "count", 0, "what a device sends arrives, or is counted as lost")
+FILTERED = Quantity("filter", "deviation behind a filter", "mm", 1e-6, "a nanometre: a filter ends where its weights fall below 2e-6")
+LENGTHS = Quantity(
+    "characteristics", "chords, radii, thicknesses and displacements", "mm", 1e-5, "ten nanometres: a section is drawn through its points"
+)
+BENDS = Quantity(
+    "characteristics", "radii by curvature, largest thicknesses", "mm", 1e-4, "0.1 um: they hang on how the drawn section bends"
+)
+ANGLES = Quantity("characteristics", "angles of the section", "deg", 1e-8, "ten picometres at the end of a chord of 60 mm")
+LOST = Quantity("wire to verdict", "points lost, damaged or rejected", "count", 0, "what a device sends is judged")
 ARRIVED = Quantity("wire to verdict", "a point from where it was sent", "mm", 1e-6, "the last digit that the line carries")
-WIRE_DEVIATION = Quantity("wire to verdict", "deviation of a point that arrived", "mm", 1e-9, _FINEST)
-WIRE_VERDICTS = Quantity("wire to verdict", "wrong verdicts of points", "count", 0, "a verdict is right or wrong")
+WIRE_DEVIATION = Quantity("wire to verdict", "deviation of a point that arrived", "mm", 1e-9, _PICOMETRE)
+WIRE_VERDICTS = Quantity("wire to verdict", "wrong verdicts of points", "count", 0, _RIGHT)
 QUANTITIES = (
-    DEVIATION, RMS, POSE, MINIMUM_ZONE, CONSUMPTION, PART_VERDICTS, POINT_VERDICTS, EDGE_VERDICTS, FILTERED, LENGTHS, ANGLES,
+    DEVIATION, RMS, POSE, MINIMUM_ZONE, CONSUMPTION, PART_VERDICTS, POINT_VERDICTS, EDGE_VERDICTS, FILTERED, LENGTHS, BENDS, ANGLES,
     LOST, ARRIVED, WIRE_DEVIATION, WIRE_VERDICTS,
 )  # fmt: skip
 

@@ -16,6 +16,7 @@ from cmmlink.from_plan import profile_of
 from cmmlink.plan import Plan, load_plan
 from cmmlink.qualification.budget import (
     ANGLES,
+    BENDS,
     CONSUMPTION,
     DEVIATION,
     EDGE_VERDICTS,
@@ -31,7 +32,16 @@ from cmmlink.qualification.budget import (
 )
 from cmmlink.reference import CaseKind, KnownPose, ReferenceCase
 from cmmlink.run import FinishedRun, carry_out
-from inspection import InspectionResult, NominalProfile, ProfileFilter, RigidTransform, Verdict, filter_profile
+from inspection import (
+    CharacteristicResult,
+    InspectionResult,
+    NominalProfile,
+    ProfileFilter,
+    Registration,
+    RigidTransform,
+    Verdict,
+    filter_profile,
+)
 
 Array = NDArray[np.float64]
 
@@ -44,7 +54,7 @@ _ABOUT: Mapping[CaseKind, Quantity] = {
     "consumption": CONSUMPTION,
     "filter": FILTERED,
     "section": LENGTHS,
-    "placement": POSE,
+    "placement": LENGTHS,
     "disturbed": PART_VERDICTS,
 }
 _log = logging.getLogger(__name__)
@@ -82,16 +92,13 @@ def _judged(plan: Plan, profile: NominalProfile) -> FinishedRun:
 
 
 def _errors_of_points(case: ReferenceCase, plan: Plan, result: InspectionResult) -> Iterator[FoundError]:
-    """Where the pose is known, the error of every deviation and verdict; where it was found, how far the farthest point is off."""
+    """Where the pose is known, the error of every deviation and verdict; at a best fit how far the farthest point is off."""
     truth, scale = case.truth, case.mm_per_unit
-    if plan.registration.datum is None and plan.registration.fit != "none":
-        if truth.pose is not None and case.kind in ("best-fit", "placement"):
-            found, known = result.registration.nominal_from_section, _transform(truth.pose, scale)
-            points = case.points * scale
-            away = np.linalg.norm(found.apply(points) - known.apply(points), axis=1)
-            yield FoundError(POSE, float(away.max()), case.name, len(points))
+    if plan.registration.datum is None:
+        if truth.pose is not None and case.kind in ("best-fit", "disturbed"):
+            yield FoundError(POSE, _farthest_from(truth.pose, case, result.registration), case.name, len(case.points))
         return
-    if truth.deviation is None:
+    if truth.deviation is None or case.kind == "placement":  # which has its truth where the part was moved to
         return
     known_mm = truth.deviation * scale
     part = np.isfinite(known_mm)  # an outlier is no point of the part
@@ -105,8 +112,12 @@ def _errors_of_points(case: ReferenceCase, plan: Plan, result: InspectionResult)
     yield FoundError(POINT_VERDICTS, float(wrong.sum()), case.name, int(clear.sum()))
 
 
-def _transform(pose: KnownPose, mm_per_unit: float) -> RigidTransform:
-    return RigidTransform(math.radians(pose.rotation_deg), np.array(pose.translation) * mm_per_unit)
+def _farthest_from(pose: KnownPose, case: ReferenceCase, found: Registration) -> float:
+    """How far any point lies from where the known pose brings it; of a symmetric part at the nearest of the poses that fit as well."""
+    known = RigidTransform(math.radians(pose.rotation_deg), np.array(pose.translation) * case.mm_per_unit)
+    points = case.points * case.mm_per_unit
+    there = known.apply(points)
+    return min(float(np.linalg.norm(one.apply(points) - there, axis=1).max()) for one in (found.nominal_from_section, *found.rivals))
 
 
 def _errors_of_zones(case: ReferenceCase, run: FinishedRun) -> Iterator[FoundError]:
@@ -129,29 +140,32 @@ def _farthest(found: list[float], known: float) -> float:
 
 def _errors_behind_filters(case: ReferenceCase, plan: Plan, profile: NominalProfile, result: InspectionResult) -> Iterator[FoundError]:
     """The error of every deviation behind the filters that the plan asks for."""
-    asked = [one.filter for one in plan.characteristics if one.type == "line-profile" and one.filter is not None]
-    for wanted, known in zip(asked, case.truth.filtered, strict=True):
-        corners = profile.curve.station_mm(profile.curve.corners)
-        found = filter_profile(
-            result.station_mm,
-            result.deviation_mm,
-            profile.length_mm,
-            profile.curve.closed,
-            ProfileFilter(wanted.cutoff_mm, wanted.order, wanted.robust),
-            corners,
-        ).waviness_mm
-        known_mm = known.deviation * case.mm_per_unit
-        told = np.isfinite(known_mm)
-        yield FoundError(FILTERED, float(np.abs(found - known_mm)[told].max()), case.name, int(told.sum()))
+    known_mm = {one.name: one.deviation * case.mm_per_unit for one in case.truth.filtered}
+    corners = profile.curve.station_mm(profile.curve.corners)
+    for asked in plan.characteristics:
+        if asked.type == "line-profile" and asked.filter is not None:
+            wanted = ProfileFilter(asked.filter.cutoff_mm, asked.filter.order, asked.filter.robust)
+            along = (result.station_mm, result.deviation_mm, profile.length_mm, profile.curve.closed)
+            away = filter_profile(*along, wanted, corners).waviness_mm - known_mm[f"Gaussian regression of order {wanted.order}"]
+            yield FoundError(FILTERED, float(np.abs(away).max()), case.name, len(away))
 
 
 def _errors_of_values(case: ReferenceCase, run: FinishedRun) -> Iterator[FoundError]:
     """The error of every number of the section."""
-    found = {one.name: one.value for one in run.characteristics}
+    found = {one.name: one for one in run.characteristics}
     for known in case.truth.values:
         scale = {"mm": 1.0, "inch": 25.4, "deg": 1.0}[known.unit]
-        quantity = ANGLES if known.unit == "deg" else LENGTHS
-        yield FoundError(quantity, abs(found.get(known.name, math.inf) - known.value * scale), case.name)
+        one = found[known.name]
+        yield FoundError(_quantity_of(one), abs(one.value - known.value * scale), case.name)
+
+
+def _quantity_of(found: CharacteristicResult) -> Quantity:
+    """What a number of the section is held against."""
+    if found.type == "line-profile":
+        return FILTERED
+    if found.unit == "deg":
+        return ANGLES
+    return BENDS if found.type == "thickness" or found.method.startswith("curvature") else LENGTHS
 
 
 def _wrong_at_edges(case: ReferenceCase, plan: Plan, profile: NominalProfile) -> Iterator[bool]:

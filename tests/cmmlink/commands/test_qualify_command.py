@@ -13,13 +13,12 @@ from cmmlink import installation
 from cmmlink.commands import setup
 from cmmlink.installation import Installation
 from cmmlink.last_qualification import LastQualification, keep_as_last, last_qualification
-from cmmlink.qualification import budget, certificate, is_unaltered, wire
+from cmmlink.qualification import certificate, is_unaltered, wire
 from cmmlink.qualification.wire import WireToVerdict, scan_on_the_wire
 from cmmlink.qualification_keys import Qualified
-from cmmlink.reference import ReferenceCase, reference_cases
+from cmmlink.reference import ReferenceCase
 from tests.cmmlink.command import cmmlink as run
-
-CASES = ("circle", "best-fit-closed", "minimum-zone-closed")
+from tests.cmmlink.qualification.few_cases import NAMES, case_named
 
 
 @pytest.fixture
@@ -28,7 +27,7 @@ def station(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     here = Installation({"Python": "3", "processor": "any"})
 
     def few_cases() -> Iterator[ReferenceCase]:
-        return (case for case in reference_cases() if case.name in CASES)
+        return map(case_named, NAMES)
 
     def short_scan(folder: Path, _: int) -> WireToVerdict:
         return scan_on_the_wire(folder, 300)
@@ -41,8 +40,6 @@ def station(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr(installation, "read_installation", read)
     monkeypatch.setattr(cmmlink.reference, "reference_cases", few_cases)
     monkeypatch.setattr(certificate, "scan_on_the_wire", short_scan)
-    not_in_these = {budget.CONSUMPTION, budget.FILTERED, budget.LENGTHS, budget.ANGLES}
-    monkeypatch.setattr(budget, "QUANTITIES", [one for one in budget.QUANTITIES if one not in not_in_these])
     return folder
 
 
@@ -57,7 +54,7 @@ def test_a_sound_installation_passes_and_its_certificate_tells_why(station: Path
     told = json.loads(written.read_bytes())
     Qualified.model_validate_json(json.dumps(told))
     assert is_unaltered(told)
-    assert (told["result"], told["outside"], told["set"]["cases"]) == ("passed", [], len(CASES))
+    assert (told["result"], told["outside"], told["set"]["cases"]) == ("passed", [], len(NAMES))
     last = last_qualification(station)
     assert last is not None
     assert (last.result, last.certificate_sha256, last.certificate) == ("passed", told["certificate_sha256"], str(written))

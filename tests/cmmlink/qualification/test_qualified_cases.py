@@ -1,26 +1,31 @@
 """A wrong program does not qualify: with a mistake of one kind, the errors of that kind are outside their limits."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+import inspection.filters
+import inspection.fine
 import inspection.scan_rows
 from cmmlink.qualification.budget import QUANTITIES, FoundError
 from cmmlink.qualification.cases import errors_of_case
-from cmmlink.reference import ReferenceCase, reference_cases, write_reference
-from inspection import ToleranceZone
+from cmmlink.reference import ReferenceCase, write_reference
+from inspection import RigidTransform, ToleranceZone
+from tests.cmmlink.qualification.few_cases import case_named
 
-NAMES = ("circle", "best-fit-closed", "minimum-zone-closed")
-Judged = Callable[..., None]
+USED = ("open-curve", "best-fit-closed", "minimum-zone-closed", "filter-gaussian", "section-too-large")
+chord_file = import_module("inspection.characteristics.chord")  # whose name is a function's at the front door
 
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, ReferenceCase]]:
     """A few cases of the set, one of a kind, as files."""
     folder = tmp_path_factory.mktemp("qualified") / "set"
-    cases = {case.name: case for case in reference_cases() if case.name in NAMES}
+    cases = {name: case_named(name) for name in USED}
     write_reference(folder, cases.values())
     return folder, cases
 
@@ -48,8 +53,8 @@ def test_a_sound_program_is_inside_every_limit_by_far(written: tuple[Path, dict[
     folder, cases = written
     found = [error for case in cases.values() for error in errors_of_case(case, folder)]
     assert {error.quantity for error in found} <= set(QUANTITIES)
-    assert {error.quantity.kind for error in found} == {"deviation", "pose", "zone"}
-    assert [error for error in found if error.error > error.quantity.limit / 100] == []
+    assert {error.quantity.kind for error in found} == {"deviation", "pose", "zone", "filter", "characteristics"}
+    assert [error for error in found if error.error > error.quantity.limit / 2] == []
     assert {error.problem for error in found} == {""}
 
 
@@ -60,7 +65,7 @@ def test_a_projection_that_is_off_by_a_nanometre_does_not_qualify(
         deviation += 1e-6
 
     _mistaken(monkeypatch, add)
-    assert "deviation" in outside(written, "circle")
+    assert "deviation" in outside(written, "open-curve")
 
 
 def test_a_sign_that_is_flipped_does_not_qualify(written: tuple[Path, dict[str, ReferenceCase]], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -68,7 +73,7 @@ def test_a_sign_that_is_flipped_does_not_qualify(written: tuple[Path, dict[str, 
         deviation *= -1
 
     _mistaken(monkeypatch, flip)
-    assert "deviation" in outside(written, "circle")
+    assert "deviation" in outside(written, "open-curve")
 
 
 @pytest.mark.parametrize("wider_mm", [1e-6, -1e-6])
@@ -79,7 +84,40 @@ def test_a_zone_that_is_a_nanometre_wider_or_narrower_does_not_qualify(
         return ToleranceZone(lower_mm - wider_mm, upper_mm + wider_mm, uncertainty_mm)
 
     monkeypatch.setattr("cmmlink.plan.deciding.ToleranceZone", wider)
-    assert outside(written, "circle") == {"zone"}
+    assert outside(written, "open-curve") == {"zone"}
+
+
+def test_a_cutoff_that_is_wrong_by_a_ten_thousandth_does_not_qualify(
+    written: tuple[Path, dict[str, ReferenceCase]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(inspection.filters, "_GAMMA", {order: 1.0001 * gamma for order, gamma in inspection.filters._GAMMA.items()})
+    assert outside(written, "filter-gaussian") == {"filter"}
+
+
+def test_a_fit_that_ends_twenty_picometres_off_does_not_qualify(
+    written: tuple[Path, dict[str, ReferenceCase]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pose_of = inspection.fine._pose_of
+
+    def a_little_off(fit: Any) -> RigidTransform:
+        pose = pose_of(fit)
+        return RigidTransform(pose.rotation_rad, pose.translation_mm + 2e-8)
+
+    monkeypatch.setattr(inspection.fine, "_pose_of", a_little_off)
+    assert outside(written, "best-fit-closed") == {"pose"}
+
+
+def test_a_chord_that_is_wrong_by_a_millionth_does_not_qualify(
+    written: tuple[Path, dict[str, ReferenceCase]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    between = chord_file._between
+
+    def longer(*given: Any) -> Any:
+        found = between(*given)
+        return replace(found, value=found.value * (1 + 1e-6))
+
+    monkeypatch.setattr(chord_file, "_between", longer)
+    assert outside(written, "section-too-large") == {"characteristics"}
 
 
 def test_whatever_a_case_raises_is_told_and_does_not_qualify(
