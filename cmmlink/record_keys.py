@@ -104,7 +104,7 @@ class KeySigned(JsonObject):
 
     key_id: str = Field(description="what the key is called")
     public_key: str = Field(description="the public key, 64 hexadecimal digits")
-    runs: int = Field(description="how many of the runs it signed")
+    runs: int = Field(description="how many of the runs it signed, or something that was added to them later")
     known_as: Literal["given", "station", "handed over", "another", "evidence"] = Field(
         description="from where it is known: given with `--key`; the station's own; an earlier or later one of the station; another than "
         "those that are known; or evidence: the evidence itself names it, and there is nothing to compare it with"
@@ -114,8 +114,8 @@ class KeySigned(JsonObject):
 class Signatures(JsonObject):
     """Who signed the runs."""
 
-    signed: int = Field(description="how many runs are signed")
-    unsigned: list[str] = Field(description="the ids of the runs that nobody signed")
+    signed: int = Field(description="how many runs are signed, with all that was added to them later")
+    unsigned: list[str] = Field(description="the ids of the runs that are not, or to which something was added later that nobody signed")
     keys: list[KeySigned] = Field(description="the keys")
 
 

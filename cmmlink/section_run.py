@@ -104,7 +104,7 @@ class StackRecord:
 
     def tell_ends(self, places: Sequence[Path], sections: Sequence[RecordReference]) -> tuple[Told, ...]:
         """Tell every place outside how the runs of the sections ended; see `anchor_ends`."""
-        return anchor_ends(self.store, places, self.seal.station, utc_words(self.now()), sections)
+        return anchor_ends(self.store, self.seal, places, utc_words(self.now()), sections)
 
 
 @contextmanager

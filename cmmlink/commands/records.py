@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from cmmlink.commands.exit_codes import EXIT_OF, NO_RECORD, UNUSABLE, fail
+from cmmlink.commands.exit_codes import EXIT_OF, NO_RECORD, UNUSABLE, fail, say
 from cmmlink.commands.options import Json, Out, Records, RunName, RunOrFolder, records_folder, who_asks
 from cmmlink.commands.output import now, print_json, terminal
 from cmmlink.commands.progress import progress
@@ -146,7 +146,7 @@ def replay(
     here: `cmmlink merge FOLDER` adds it to them.
     """
     from cmmlink.devices import decoder_of
-    from cmmlink.record import keep_judgement, open_to_record, recorded_run, replay_run
+    from cmmlink.record import keep_judgement, open_to_record, recorded_run, replay_run, seal_of
     from cmmlink.result_json import number
 
     changes = _settings_in(settings or ())
@@ -167,7 +167,10 @@ def replay(
     kept = None
     if reason is not None:
         with open_to_record(folder, now) as store:
-            kept = keep_judgement(store, recorded, again, who=who_asks(operator), why=reason.strip(), now=now())
+            seal = seal_of(store, station=None, key=again.plan.records.key)
+            kept = keep_judgement(store, recorded, again, who=who_asks(operator), why=reason.strip(), now=now(), seal=seal)
+        for note in seal.notes:
+            say(note.replace("the run is", "the judgement is"))
     document = {"schema": RESULT_SCHEMA, **again.result_json} | {
         "replay_of": recorded.run,
         "chain_sha256": recorded.chain_sha256 if evidence is None else evidence.chain_sha256,

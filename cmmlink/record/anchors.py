@@ -20,6 +20,7 @@ from cmmlink.errors import PlanError, StoreError
 from cmmlink.record.bodies import pack_document, unpack_document
 from cmmlink.record.chain import Draft
 from cmmlink.record.recorder import RecordReference
+from cmmlink.record.seal import Seal
 from cmmlink.record.shapes import checked
 from cmmlink.record.store import Store, name_record
 
@@ -74,16 +75,17 @@ def tell_heads(folder: Path, places: Sequence[Path], heads: Sequence[Head], pati
     return tuple(Told(place=str(place), problem=". ".join(filter(None, [problems[str(place)], lost]))) for place in places)
 
 
-def anchor_ends(store: Store, places: Sequence[Path], station: str, ended: str, runs: Sequence[RecordReference]) -> tuple[Told, ...]:
+def anchor_ends(store: Store, seal: Seal, places: Sequence[Path], ended: str, runs: Sequence[RecordReference]) -> tuple[Told, ...]:
     """Tell every place how some runs of these records ended, and note behind each of them what came of it. Never raises.
 
     ended : the moment, in UTC
     """
-    heads = [Head(ended, station, one.run, one.chain_sha256, (one.signature or {}).get("key_id", "")) for one in runs]
+    heads = [Head(ended, seal.station, one.run, one.chain_sha256, (one.signature or {}).get("key_id", "")) for one in runs]
     told = tell_heads(store.path.parent, places, heads)
     if told and heads:
         try:
-            store.append([_draft(head.run, told) for head in heads])
+            for head in heads:
+                store.append([_draft(head.run, told)], seal.countersign)
         except StoreError as error:  # the runs themselves are on record
             _log.warning("that the anchors were told cannot be noted: %s", error)
     return told

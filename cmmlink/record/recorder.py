@@ -21,7 +21,7 @@ from cmmlink.record.bodies import JUDGED_ROWS, PlacedArrival, pack_arrivals, pac
 from cmmlink.record.chain import Draft, Kind, Record
 from cmmlink.record.run_inputs import RunInputs
 from cmmlink.record.seal import Seal
-from cmmlink.record.signature import Signature
+from cmmlink.record.signature import signature_in
 from cmmlink.record.store import Store
 from cmmlink.result_json import number, result_json
 from cmmlink.words import utc_words
@@ -112,7 +112,6 @@ class Recorder:
         self.began = now()
         self._store, self._inputs, self._clock, self._now = store, inputs, clock, now
         self._commit_s, self._acknowledge, self._seal = commit_s, acknowledge, seal
-        self._signature: Signature | None = None
         self._queue: Buffer[Arrived | _Pose] = Buffer(queue_bytes)
         self._pack = _Packing()
         self._last_pose: tuple[str, float] = ("", float("-inf"))
@@ -220,21 +219,18 @@ class Recorder:
             sha256 = self._keep_judged(result, finished.result)
             drafts = [self._draft("result", pack_document(result))] if finished.result is not None else []
             drafts.append(self._end_draft(finished.ending, finished.message, result, sha256))
-            end = self._store.append(drafts, self._sign)[len(drafts) - 1]
+            end, *signed = self._store.append(drafts, self._sign)[len(drafts) - 1 :]
         except StoreError as error:
             self._failure = error
             raise self._no_record() from error
         plan_sha256 = hashlib.sha256(self._inputs.plan.encode()).hexdigest()
         nominal_sha256 = hashlib.sha256(self._inputs.nominal).hexdigest()
-        signature = self._signature.beside_result() if self._signature else None
+        signature = signature_in(self._store, signed[0]).beside_result() if signed else None
         self.evidence = RecordReference(self.run, end.sha256.hex(), plan_sha256, nominal_sha256, self._inputs.software, signature)
 
     def _sign(self, end: Record) -> list[Draft]:
         """The signature of the run, which is committed together with its end: no run that was signed is ever found without it."""
-        if self._seal is None or self._seal.sign is None:
-            return []
-        self._signature = self._seal.sign(self.run, end.sha256.hex())
-        return [self._signature.draft()]
+        return [] if self._seal is None else self._seal.sign(end)
 
     def _keep_judged(self, document: Mapping[str, Any], result: "InspectionResult | None") -> str:
         """Write the judged rows, some megabytes at a time, and return the hash of the result. They count once the result follows."""

@@ -28,6 +28,7 @@ from cmmlink.record.derived import Change, derived_draft
 from cmmlink.record.reader import RecordedRun, arrivals_of, points_of, reads_of
 from cmmlink.record.recorder import judged_bodies, result_sha256
 from cmmlink.record.run_inputs import software
+from cmmlink.record.seal import Seal
 from cmmlink.record.shapes import plain_name
 from cmmlink.record.store import Store
 from cmmlink.result_json import density_notes, density_of, result_json, stations_of
@@ -176,12 +177,13 @@ def _decoder_of(plan: Plan, recorded: RecordedRun, decoder_of: Callable[[Plan], 
         raise StoreError(f"the device in the plan of run {recorded.run} cannot be read by this version of cmmlink: {error}") from None
 
 
-def keep_judgement(store: Store, recorded: RecordedRun, again: Replay, *, who: str, why: str, now: datetime) -> dict[str, Any]:
+def keep_judgement(
+    store: Store, recorded: RecordedRun, again: Replay, *, who: str, why: str, now: datetime, seal: Seal | None = None
+) -> dict[str, Any]:
     """Add what a replay with changes found to the records, chained to them and to its run. Returns what says where it stands.
 
     Raises StoreError where it cannot be kept.
     """
-    bodies = (body for _, body in judged_bodies(again.outcome.result))
     draft = derived_draft(
         recorded.run,
         recorded.chain_sha256,
@@ -192,9 +194,9 @@ def keep_judgement(store: Store, recorded: RecordedRun, again: Replay, *, who: s
         plan=again.plan.effective_yaml(),
         software=software(),
         result=again.result_json,
-        result_sha256=result_sha256(again.result_json, bodies),
+        result_sha256=result_sha256(again.result_json, (body for _, body in judged_bodies(again.outcome.result))),
     )
-    (kept,) = store.append([draft])
+    kept = store.append([draft], *([seal.countersign] if seal else []))[0]
     return {"when": utc_words(now), "who": who, "why": why, "record": kept.number, "chain_sha256": kept.sha256.hex()}
 
 

@@ -5,16 +5,17 @@ verifies. A key that somebody else keeps, as on a stick, signs in its place whil
 measured and judged all the same: it is not signed, and a note beside its verdict says why.
 """
 
+import hashlib
 import logging
 import platform
 import re
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cmmlink.errors import PlanError
-from cmmlink.record.signature import Signature, signed_message
+from cmmlink.record.chain import Draft, Record
+from cmmlink.record.signature import Countersignature, Signature, signed_message
 from cmmlink.record.store import Store
 
 if TYPE_CHECKING:
@@ -30,13 +31,31 @@ class Seal:
     """How the runs of a station end.
 
     station : its name, one word
-    sign    : signs the id of a run and the hash of its end; None where no key can be used
+    key     : what signs; None where no key can be used
     notes   : what the reader of a verdict has to know of that
     """
 
     station: str
-    sign: Callable[[str, str], Signature] | None
+    key: "SigningKey | None"
     notes: tuple[str, ...] = ()
+
+    def sign(self, end: Record) -> list[Draft]:
+        """The signature of a run, to stand behind its end; nothing where no key can be used."""
+        if self.key is None:
+            return []
+        run, chain_sha256 = end.run, end.sha256.hex()
+        signed = self.key.sign(signed_message(run, chain_sha256))
+        public_key, key_id = self.key.public_key, self.key.key_id
+        return [Signature(run=run, chain_sha256=chain_sha256, public_key=public_key, signature=signed, key_id=key_id).draft()]
+
+    def countersign(self, record: Record) -> list[Draft]:
+        """The signature of a record that is added to a run which has ended, to stand behind it; nothing where no key can be used."""
+        if self.key is None:
+            return []
+        told = {"run": record.run, "kind": record.kind, "time_s": record.time_s, "count": record.count}
+        told |= {"body_sha256": hashlib.sha256(record.body).hexdigest(), "public_key": self.key.public_key, "key_id": self.key.key_id}
+        unsigned = Countersignature.model_validate({**told, "signature": "0" * 128})
+        return [unsigned.model_copy(update={"signature": self.key.sign(unsigned.message)}).draft()]
 
 
 def seal_of(store: Store, *, station: str | None, key: Path | None) -> Seal:
@@ -52,18 +71,13 @@ def seal_of(store: Store, *, station: str | None, key: Path | None) -> Seal:
         return Seal(name, None, (f"the run is not signed: {error}",))
     except ImportError as error:
         return Seal(name, None, (f"the run is not signed: the library of signatures cannot be used here ({error})",))
-    return Seal(name, lambda run, chain_sha256: _signature(signing, run, chain_sha256), notes)
+    return Seal(name, signing, notes)
 
 
 def station_name(station: str | None) -> str:
     """The name of a station as one word, None for that of this computer."""
     word = re.sub(r"[^\w.-]+", "_", (station or platform.node()).strip(), flags=re.ASCII)
     return word[:_LONGEST_NAME].strip("_.") or "station"
-
-
-def _signature(signing: "SigningKey", run: str, chain_sha256: str) -> Signature:
-    signed = signing.sign(signed_message(run, chain_sha256))
-    return Signature(run=run, chain_sha256=chain_sha256, public_key=signing.public_key, signature=signed, key_id=signing.key_id)
 
 
 def _own_key(store: Store) -> tuple["SigningKey", tuple[str, ...]]:

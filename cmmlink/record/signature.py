@@ -1,11 +1,10 @@
 """What a signed run says: who signed the hash of its end. The record of it stands behind the end, written together with it.
 
 Signed is `cmmlink run`, the id of the run and the hash of its end, a line each. That hash follows from every record of the run and from
-every run before it.
+every run before it. What is added behind the end later has a signature of its own, which goes with it when the run is merged.
 """
 
 import hashlib
-from collections.abc import Callable
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -16,8 +15,9 @@ from cmmlink.record.shapes import checked
 from cmmlink.record.store import Store, name_record
 
 _SHORT = 16  # digits of a key's id
-Sign = Callable[[str, bytes], "Signature"]
-"""Signs a run: of its id and the hash of its end."""
+_Digits64 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+_Digits128 = Annotated[str, Field(pattern=r"^[0-9a-f]{128}$")]
+_KeyId = Annotated[str, Field(pattern=r"^[0-9a-f]{16}$")]
 
 
 def key_id_of(public_key: str) -> str:
@@ -35,10 +35,10 @@ class Signature(BaseModel):
 
     algorithm: Literal["Ed25519"] = "Ed25519"
     run: str
-    chain_sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
-    public_key: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
-    signature: Annotated[str, Field(pattern=r"^[0-9a-f]{128}$")]
-    key_id: Annotated[str, Field(pattern=r"^[0-9a-f]{16}$")]
+    chain_sha256: _Digits64
+    public_key: _Digits64
+    signature: _Digits128
+    key_id: _KeyId
 
     @property
     def message(self) -> bytes:
@@ -54,6 +54,39 @@ class Signature(BaseModel):
         return self.model_dump(exclude={"run", "chain_sha256"})
 
 
+class Countersignature(BaseModel):
+    """The signature of one record that was added behind the end of a run.
+
+    body_sha256 : the hash of its body alone, so that it holds wherever the record stands
+    """
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+    algorithm: Literal["Ed25519"] = "Ed25519"
+    run: str
+    kind: str
+    time_s: float
+    count: int
+    body_sha256: _Digits64
+    public_key: _Digits64
+    signature: _Digits128
+    key_id: _KeyId
+
+    @property
+    def message(self) -> bytes:
+        """What was signed."""
+        return f"cmmlink record\n{self.run}\n{self.kind}\n{self.time_s!r}\n{self.count}\n{self.body_sha256}\n".encode()
+
+    def draft(self) -> Draft:
+        """The record that keeps it."""
+        return Draft(self.run, "countersignature", pack_document(self.model_dump()))
+
+    def is_of(self, record: Record) -> bool:
+        """Whether it says that it signs this record."""
+        said = (self.run, self.kind, self.time_s, self.count, self.body_sha256)
+        return said == (record.run, record.kind, record.time_s, record.count, hashlib.sha256(record.body).hexdigest())
+
+
 def signed_message(run: str, chain_sha256: str) -> bytes:
     """What is signed of a run."""
     return f"cmmlink run\n{run}\n{chain_sha256}\n".encode()
@@ -63,6 +96,12 @@ def signature_in(store: Store, record: Record) -> Signature:
     """The signature in its record. Raises StoreError for what no signature looks like."""
     with name_record(store.path, record):
         return checked(Signature, unpack_document(record.body))
+
+
+def countersignature_in(store: Store, record: Record) -> Countersignature:
+    """The signature of another record in its own. Raises StoreError for what no such signature looks like."""
+    with name_record(store.path, record):
+        return checked(Countersignature, unpack_document(record.body))
 
 
 def signature_of(store: Store, run: str) -> Signature | None:

@@ -18,7 +18,7 @@ from cmmlink.record.handover import handovers_of, is_sound, of_one_station
 from cmmlink.record.origin import origin_of, original_chain_sha256
 from cmmlink.record.seal import PUBLIC_FILE, station_name
 from cmmlink.record.shapes import Header, checked
-from cmmlink.record.signature import Signature, key_id_of, signature_in
+from cmmlink.record.signature import Signature, countersignature_in, key_id_of, signature_in
 from cmmlink.record.store import Store
 
 State = Literal["intact and signed", "signed by another key", "intact but unsigned", "altered", "cut off"]
@@ -40,6 +40,8 @@ class RunTrusted:
     end       : the number of the record that ends it, 0 where it has no end
     head      : the hash of its end at the station that measured it, empty where it has no end
     signature : None where nobody signed it
+    later     : how many records that were added behind the end are not signed
+    keys      : the public keys of those that are
     merged    : whether it was taken over from another station
     """
 
@@ -48,7 +50,19 @@ class RunTrusted:
     end: int
     head: str
     signature: Signature | None
+    later: int
+    keys: tuple[str, ...]
     merged: bool
+
+    @property
+    def is_signed(self) -> bool:
+        """Whether the run is signed, and everything that was added to it later."""
+        return self.signature is not None and not self.later
+
+    @property
+    def signed_by(self) -> set[str]:
+        """The public keys of whoever signed its end, and what was added later."""
+        return {*self.keys, *([self.signature.public_key] if self.signature else [])}
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +129,7 @@ def _trusted(store: Store, begin: Record, end: Record | None) -> RunTrusted:
     if end is None:
         if signatures:
             raise AlteredError(Alteration(signatures[0].number, run, "signature", "stands in a run that has no end"))
-        return RunTrusted(run, _station_of(begin), 0, "", None, merged=False)
+        return RunTrusted(run, _station_of(begin), 0, "", None, 0, (), merged=False)
     added = store.added_behind(run, end.number)
     if added is not None:
         raise AlteredError(Alteration(added, run, "", "was added to a run that had ended"))
@@ -131,7 +145,31 @@ def _trusted(store: Store, begin: Record, end: Record | None) -> RunTrusted:
     if len(signatures) > 1:
         raise AlteredError(Alteration(signatures[1].number, run, "signature", "is a second signature of the run"))
     signature = _signature(store, signatures[0], end, head) if signatures else None
-    return RunTrusted(run, _station_of(begin), end.number, head, signature, origin is not None)
+    later, keys = _countersigned(store, run)
+    return RunTrusted(run, _station_of(begin), end.number, head, signature, later, keys, origin is not None)
+
+
+def _countersigned(store: Store, run: str) -> tuple[int, tuple[str, ...]]:
+    """How many records behind the end of a run nobody signed, and the keys of the others. Raises AlteredError for a wrong signature."""
+    left = [record for kind in ("anchors", "derived") for record in store.records(run, kind)]
+    found, keys = list(store.records(run, "countersignature")), []
+    if not found:
+        return len(left), ()
+    from cmmlink.record.keys import is_signed  # noqa: PLC0415 - as above
+
+    for record in found:
+        try:
+            told = countersignature_in(store, record)
+        except StoreError:
+            raise AlteredError(Alteration(record.number, run, record.kind, "is no signature")) from None
+        signed = next((one for one in left if told.is_of(one)), None)
+        if signed is None or record.body != told.draft().body or (record.count, record.time_s) != (1, signed.time_s):
+            raise AlteredError(Alteration(record.number, run, record.kind, "signs a record that is not as it was written, or is gone"))
+        if told.key_id != key_id_of(told.public_key) or not is_signed(told.message, told.public_key, told.signature):
+            raise AlteredError(Alteration(record.number, run, record.kind, "was not made with the key that it names"))
+        left.remove(signed)
+        keys.append(told.public_key)
+    return len(left), tuple(keys)
 
 
 def _signature(store: Store, record: Record, end: Record, head: str) -> Signature:
@@ -192,17 +230,17 @@ def _public_key(file: Path) -> str:
 
 def _state(runs: Sequence[RunTrusted], keys: Keys) -> State:
     """How much is proven of runs that are as they were written: of several the least."""
-    if not runs or any(one.signature is None for one in runs):
+    if not runs or not all(one.is_signed for one in runs):
         return "intact but unsigned"
-    another = any(one.signature is not None and keys.known_as(one.signature.public_key) == "another" for one in runs)
+    another = any(keys.known_as(key) == "another" for one in runs for key in one.signed_by)
     return "signed by another key" if another else "intact and signed"
 
 
 def _signatures(runs: Sequence[RunTrusted], keys: Keys) -> dict[str, Any]:
     """Who signed how many runs, and which nobody did."""
-    signed = Counter(one.signature.public_key for one in runs if one.signature is not None)
+    signed = Counter(key for one in runs for key in one.signed_by)
     told = [{"key_id": key_id_of(key), "public_key": key, "runs": signed[key], "known_as": keys.known_as(key)} for key in sorted(signed)]
-    return {"signed": signed.total(), "unsigned": [one.run for one in runs if one.signature is None], "keys": told}
+    return {"signed": sum(one.is_signed for one in runs), "unsigned": [one.run for one in runs if not one.is_signed], "keys": told}
 
 
 def _heads_of(store: Store, runs: Sequence[RunTrusted], run: str | None, heads: Sequence[Head]) -> list[Head]:

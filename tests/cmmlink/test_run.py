@@ -75,7 +75,8 @@ def test_without_a_folder_nothing_is_recorded_and_the_result_is_the_same(tmp_pat
     assert unkept.evidence is None
     assert kept.evidence is not None
     assert unkept.result_json().items() <= kept.result_json().items()
-    assert set(kept.result_json()) - set(unkept.result_json()) == {"run", "chain_sha256", "plan_sha256", "nominal_sha256", "software"}
+    tied = {"run", "chain_sha256", "plan_sha256", "nominal_sha256", "software", "signature", "anchors"}
+    assert set(kept.result_json()) - set(unkept.result_json()) == tied
 
 
 def test_ready_is_said_before_the_device_is_asked_and_sinks_hear_after_the_recorder(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from cmmlink.record.chain import Draft
 from cmmlink.record.reader import check_chain, open_to_read
 from cmmlink.record.recorder import RecordReference, end_draft
 from cmmlink.record.seal import seal_of
+from cmmlink.record.signature import signature_in
 from cmmlink.record.store import FILE_NAME, Store
 from cmmlink.record.trust import trust_in
 from tests.integration.damaged import chain_anew
@@ -50,17 +51,11 @@ def add_signed(folder: Path, run: str, *, key: Path | None = None, station: str 
         seal = seal_of(store, station=station, key=key)
         header = json.dumps({"run": run, "station": seal.station, **HEADER}).encode()
         store.append([Draft(run, "run", header), Draft(run, "plan", b"part: {}"), Draft(run, "points", b"p" * 40)])
-        signed: list[dict[str, Any]] = []
-
-        def behind(end: Any) -> list[Draft]:
-            if seal.sign is None:
-                return []
-            signature = seal.sign(run, end.sha256.hex())
-            signed.append(signature.beside_result())
-            return [signature.draft()]
-
-        end = store.append([end_draft(run, "complete", "", clock(), {"received": 1})], behind)[0] if ended else None
-        return RecordReference(run, end.sha256.hex() if end else "", "", "", {}, signed[0] if signed else None)
+        if not ended:
+            return RecordReference(run, "", "", "", {})
+        end, *signed = store.append([end_draft(run, "complete", "", clock(), {"received": 1})], seal.sign)
+        signature = signature_in(store, signed[0]).beside_result() if signed else None
+        return RecordReference(run, end.sha256.hex(), "", "", {}, signature)
 
 
 def trust(folder: Path, run: str | None = None, given: Sequence[str] = (), anchor: Path | None = None) -> dict[str, Any]:

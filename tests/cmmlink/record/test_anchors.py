@@ -14,6 +14,7 @@ from cmmlink.record import anchors
 from cmmlink.record.anchors import WAITING, Head, anchor_ends, anchors_of, heads_in, tell_heads
 from cmmlink.record.backup import back_up, merge
 from cmmlink.record.recorder import RecordReference
+from cmmlink.record.seal import seal_of
 from cmmlink.record.store import FILE_NAME, Store
 from tests.cmmlink.record.sealed import Clock, add_signed, forge, state_of, trust
 
@@ -23,7 +24,7 @@ MOMENT = "2026-03-14T15:09:27.000Z"
 def tell(folder: Path, place: Path, *runs: RecordReference, station: str = "cmm-1") -> list[str]:
     """Tell one place the ends of runs; the problems of that."""
     with Store(folder, writing=True, epoch_s=lambda: 7.0) as store:
-        return [told.problem for told in anchor_ends(store, [place], station, MOMENT, runs)]
+        return [told.problem for told in anchor_ends(store, seal_of(store, station=station, key=None), [place], MOMENT, runs)]
 
 
 @pytest.fixture
@@ -76,7 +77,7 @@ def test_what_waits_for_a_place_that_the_next_plan_does_not_name_is_told_all_the
     assert tell(tmp_path, share / "heads.txt", add_signed(tmp_path, "a-0001")) != [""]
     share.mkdir()
     with Store(tmp_path, writing=True, epoch_s=lambda: 7.0) as store:
-        assert anchor_ends(store, [], "cmm-1", MOMENT, [add_reference()]) == ()
+        assert anchor_ends(store, seal_of(store, station="cmm-1", key=None), [], MOMENT, [add_reference()]) == ()
     assert [head.run for head in heads_in(share / "heads.txt")] == ["a-0001"]
 
 

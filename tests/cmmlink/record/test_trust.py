@@ -8,7 +8,9 @@ from pathlib import Path
 import pytest
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
 
+from cmmlink.record.anchors import anchor_ends
 from cmmlink.record.backup import back_up, merge, restore
+from cmmlink.record.chain import Draft
 from cmmlink.record.handover import rotate_key
 from cmmlink.record.keys import make_key, public_key_given, write_public_key
 from cmmlink.record.reader import open_to_record
@@ -30,7 +32,11 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
         add_signed(folder, run)
     with Store(folder, writing=True, epoch_s=lambda: 99.0) as store:
         rotate_key(store, who="me", why="yearly", now=BEGAN)
-    add_signed(folder, "c-0003")
+    last = add_signed(folder, "c-0003")
+    with Store(folder, writing=True, epoch_s=lambda: 101.0) as store:
+        seal = seal_of(store, station="cmm-1", key=None)
+        anchor_ends(store, seal, [folder.parent / "heads.txt"], "2026-03-14T15:09:27.000Z", [last])
+        store.append([Draft("c-0003", "derived", b'{"verdict":"conform"}')], seal.countersign)
     return folder
 
 
@@ -65,7 +71,7 @@ def test_no_byte_of_any_value_can_be_altered_and_the_records_stay_signed(station
     sound = file.read_bytes()
     with closing(sqlite3.connect(file)) as connection:
         rows = connection.execute("SELECT number, run, kind, time_s, count, body FROM record").fetchall()
-    assert {row[2] for row in rows} == {"run", "plan", "points", "end", "signature", "key"}
+    assert {row[2] for row in rows} == {"run", "plan", "points", "end", "signature", "key", "anchors", "derived", "countersignature"}
     tried = 0
     for number, *values in rows:
         for column, value in zip(("run", "kind", "time_s", "count", "body"), values, strict=True):
@@ -127,15 +133,23 @@ def test_who_signs_anew_with_a_key_of_his_own_is_told_by_it(station: Path) -> No
     forge(station, "UPDATE record SET body = ? WHERE kind = 'signature' AND run = 'c-0003'", parameters=(forged.draft().body,))
     assert state_of(station, "c-0003") == ANOTHER
     assert {one["public_key"] for one in trust(station)["signatures"]["keys"] if one["known_as"] == "another"} == {public}
+    right = public_key_given(str(station / PUBLIC_FILE))
     (station / PUBLIC_FILE).unlink()
-    assert [one["known_as"] for one in trust(station, "c-0003")["signatures"]["keys"]] == ["evidence"]
-    assert state_of(station, "c-0003", [public]) == SIGNED
+    assert [one["known_as"] for one in trust(station, "c-0003")["signatures"]["keys"]] == ["evidence"] * 2
+    assert [state_of(station, "c-0003", given) for given in ([right], [public], [right, public])] == [ANOTHER, ANOTHER, SIGNED]
 
 
 def test_a_stripped_signature_leaves_the_run_unsigned(station: Path) -> None:
     forge(station, "DELETE FROM record WHERE kind = 'signature' AND run = 'c-0003'", number_anew=True)
     assert state_of(station, "c-0003") == state_of(station) == NONE_SIGNED
     assert trust(station)["signatures"]["unsigned"] == ["c-0003"]
+
+
+def test_what_was_added_later_and_not_signed_leaves_the_run_unsigned(station: Path) -> None:
+    forge(station, "DELETE FROM record WHERE number = (SELECT max(number) FROM record)")
+    assert (state_of(station), trust(station)["signatures"]["unsigned"]) == (NONE_SIGNED, ["c-0003"])
+    forge(station, "DELETE FROM record WHERE kind = 'derived'")
+    assert state_of(station) == SIGNED, "a judgement that is gone as a whole is what an anchor or a later run shows"
 
 
 def test_with_keys_given_no_other_counts(made: Path) -> None:
@@ -209,6 +223,6 @@ def test_a_key_that_was_lost_is_made_anew_and_told(station: Path) -> None:
     (station / KEY_FILE).unlink()
     with Store(station, writing=True, epoch_s=lambda: 1.0) as store:
         seal = seal_of(store, station=None, key=None)
-    assert seal.sign is not None
+    assert seal.key is not None
     assert any("a new key was made" in note for note in seal.notes)
     assert state_of(station) == ANOTHER
