@@ -18,7 +18,18 @@ from tests.cmmlink.judged_oval import bumped, inspect_oval
 from tests.cmmlink.oval_part import COUNT, LENGTH_MM, oval_curve, oval_feet, oval_points, station_mm, write_nominal, write_points
 
 KNOWN: dict[str, Any] = {"registration": {"fit": "none"}}
-OF_THE_SURROUNDINGS = ("measured_at", "part", "device", "run", "chain_sha256", "plan_sha256", "nominal_sha256", "software", "signature", "anchors")
+OF_THE_SURROUNDINGS = (
+    "measured_at",
+    "part",
+    "device",
+    "run",
+    "chain_sha256",
+    "plan_sha256",
+    "nominal_sha256",
+    "software",
+    "signature",
+    "anchors",
+)
 
 
 @pytest.fixture(scope="module")
