@@ -8,19 +8,38 @@ TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer 
 if TYPE_CHECKING:
     from inspection.surface.feet import FootKind, NominalSurface, SurfaceFeet, rejections
     from inspection.surface.patches import PatchSurface
+    from inspection.surface.rigid_motion import RigidMotion
     from inspection.surface.spline_face import SplineFace
+    from inspection.surface.surface_fit import SurfaceFreedom, SurfaceRegistration, register_surface
     from inspection.surface.triangles import TriangleSurface
+    from inspection.surface.weakness import Weakness
 else:
     from inspection.front_door import load_on_use
 
     _PLACES = {
         "inspection.surface.feet": ("FootKind", "NominalSurface", "SurfaceFeet", "rejections"),
         "inspection.surface.patches": ("PatchSurface",),
+        "inspection.surface.surface_fit": ("SurfaceFreedom", "SurfaceRegistration", "register_surface"),
+        "inspection.surface.rigid_motion": ("RigidMotion",),
         "inspection.surface.spline_face": ("SplineFace",),
         "inspection.surface.triangles": ("TriangleSurface",),
+        "inspection.surface.weakness": ("Weakness",),
     }
 
     __getattr__ = load_on_use(__name__, _PLACES)
 
 
-__all__ = ["FootKind", "NominalSurface", "PatchSurface", "SplineFace", "SurfaceFeet", "TriangleSurface", "rejections"]
+__all__ = [
+    "FootKind",
+    "NominalSurface",
+    "PatchSurface",
+    "RigidMotion",
+    "SplineFace",
+    "SurfaceFeet",
+    "SurfaceFreedom",
+    "SurfaceRegistration",
+    "TriangleSurface",
+    "Weakness",
+    "register_surface",
+    "rejections",
+]
