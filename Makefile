@@ -7,7 +7,7 @@ INSTALL := $(PIP) --no-build-isolation --editable
 # The tests start a hundred processes; where Python may keep no compiled files, each of them compiles every file anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo install test checks compiled lowest lowest-compiled lowest-drivers platforms upgrade bench slower paper faults powercuts kills fuzz soak damage memory elsewhere proofs stops machines laws audit uncertainty supply-chain docs bundle page-tools screenshots
+.PHONY: demo install test checks compiled lowest lowest-compiled lowest-drivers platforms upgrade bench slower paper faults powercuts kills fuzz soak damage memory elsewhere proofs stops machines laws audit reference uncertainty supply-chain docs bundle page-tools screenshots
 demo: .venv/installed
 	$(BIN)/cmmlink demo --out demo-result
 
@@ -149,6 +149,10 @@ laws: .venv/test-installed
 # The audit of verdicts: live scans, minimum zones, partial scans and mirrored parts whose truth is known.
 audit: .venv/test-installed
 	$(BIN)/python -m tests.benchmarks.verdict_audit
+
+# Every point of every case of the reference set, and every number that is stated of it, found anew by mpmath; takes some minutes.
+reference: .venv/test-installed
+	$(BIN)/python -m tests.cmmlink.reference.every_point
 
 # The audit of U: ten numbers of four sections, measured anew with drawn errors; less may not be stated than they scatter by.
 uncertainty: .venv/test-installed

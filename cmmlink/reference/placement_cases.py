@@ -7,7 +7,7 @@ from cmmlink.reference.balance import without_motion
 from cmmlink.reference.case import KnownValue, ReferenceCase
 from cmmlink.reference.deviation_cases import COUNT, Build, feet_of, form
 from cmmlink.reference.exact_curve import ExactCurve
-from cmmlink.reference.exact_numbers import PI, Number, Pair, as_float, cosine_and_sine
+from cmmlink.reference.exact_numbers import PI, Number, Pair, as_float, cosine_and_sine, rounded
 from cmmlink.reference.laying import Asked, Pose, case_of, lay
 from cmmlink.reference.shapes import cam, drop
 
@@ -29,7 +29,8 @@ def _moved(
     pose = _undoing(turned, place, (Decimal(shift[0]), Decimal(shift[1])))
     feet = feet_of(curve, 2 * COUNT)
     laid = lay(feet, without_motion(feet, form(len(feet), size)), pose)
-    dx, dy = (Decimal(each) for each in shift)
+    ((x, y),) = pose.undo([place])
+    dx, dy = x - place[0], y - place[1]  # of the pose as it is written, whose digits are fifteen
     values = {
         "twist": ("deg", turned),
         "displacement along x": ("mm", dx),
@@ -56,4 +57,4 @@ def _undoing(degrees: Decimal, pivot: Pair, shift: Pair) -> Pose:
     """The pose that turns a part back about where its pivot has come to, and shifts it back."""
     c, s = cosine_and_sine(-degrees * PI / 180)
     x, y = pivot[0] + shift[0], pivot[1] + shift[1]
-    return Pose(-degrees, pivot[0] - (c * x - s * y), pivot[1] - (s * x + c * y))
+    return Pose(-degrees, rounded(pivot[0] - (c * x - s * y)), rounded(pivot[1] - (s * x + c * y)))
