@@ -107,9 +107,10 @@ def main() -> int:
         late_ms = np.array([1000.0 * (one.heard_s - one.asked_s[0]) for one in stops])
         lines.append(f"{name} to AbortE: median {np.median(late_ms):.0f} ms, p99 {np.percentile(late_ms, 99):.0f} ms, {STOPS} runs")
     good = [run(seed, (0.0, 0.0), None, form_mm=GOOD_MM).outcome for seed in range(-(-parts // 5))]
-    wrong = any(one.result is None or not one.result.complete or one.result.verdict is not Verdict.CONFORM for one in good)
+    passed = sum(one.result is not None and one.result.complete and one.result.verdict is Verdict.CONFORM for one in good)
+    wrong = passed < len(good)
     lines.append(
-        f"{len(good)} parts that use {GOOD_MM / ZONE.upper_mm:.0%} of their zone, {'not ' if wrong else ''}all measured to the end"
+        f"of parts that pass with {GOOD_MM / ZONE.upper_mm:.0%} of their zone used, {passed} of {len(good)} were measured to the end"
     )
     saved = list[float]()
     for seed in range(parts):
