@@ -54,6 +54,8 @@ class Source:
     follows  : the position x comes from a device of its own
     sound    : damage to the bytes shows, so that no point is ever a wrong one
     upright  : the section's y comes as z
+    faults   : the faults that it may meet; empty: those that all streams, or all registers, may meet
+    comes_back : a lost link is tried again while the run goes on
     """
 
     encode: Callable[[Array, Sequence[Fault], int], Transcript]
@@ -62,6 +64,8 @@ class Source:
     follows: bool = False
     sound: bool = False
     upright: bool = False
+    faults: tuple[str, ...] = ()
+    comes_back: bool = True
 
 
 def ticks() -> Callable[[], float]:
@@ -219,6 +223,8 @@ def decode(source: Source, transcript: Transcript, count: int, cuts: np.random.G
     arrivals: list[Arrival | Exception] = []
     try:
         for number, data in enumerate(_cut_anew(transcript, cuts)):
+            if data is None and not source.comes_back:
+                return [*arrivals, *made.break_off(), LinkError("the link was lost")]
             if data is None:
                 arrivals += [*made.break_off(), LinkDown("the link was lost"), LinkUp(0.1)]
                 continue
@@ -277,12 +283,20 @@ def _beside_an_axis(arrivals: list[Arrival | Exception], step_mm: float) -> Iter
     yield Delivery(False, None)
 
 
-def _stream(device: Callable[[], Device], made: Callable[[int], Decoder], **kind: bool) -> Source:
-    return Source(streaming(device, made), made, **kind)
+def _stream(device: Callable[[], Device], made: Callable[[int], Decoder], *, flat: bool = False, sound: bool = False) -> Source:
+    return Source(streaming(device, made), made, flat=flat, sound=sound)
 
 
-def _registers(device: Callable[[Walk, Injector, bool], RegisterDevice], made: Callable[[int], Decoder], **kind: bool) -> Source:
-    return Source(registers(device, made), made, **kind)
+def _registers(
+    device: Callable[[Walk, Injector, bool], RegisterDevice],
+    made: Callable[[int], Decoder],
+    *,
+    flat: bool = False,
+    follows: bool = False,
+    sound: bool = False,
+    upright: bool = False,
+) -> Source:
+    return Source(registers(device, made), made, flat, follows, sound, upright)
 
 
 SOURCES: dict[str, Source] = {

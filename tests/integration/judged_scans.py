@@ -14,8 +14,9 @@ from inspection import LiveInspection, NominalProfile, NurbsCurve, SectionPlane,
 from inspection.methods import FitName
 from tests.cmmlink.oval_part import oval_profile
 from tests.inspection import profiles
-from tests.integration.encoded_scans import SOURCES, Source, Transcript, decode, placed
+from tests.integration.encoded_scans import Source, Transcript, decode, placed
 from tests.integration.listed import Listed
+from tests.integration.machine_scans import EVERY_SOURCE
 
 Array = NDArray[np.float64]
 
@@ -108,5 +109,5 @@ def _adds_up(counts: Counts) -> bool:
 
 def judge(name: str, transcript: Transcript, fit: FitName = "none", cuts: np.random.Generator | None = None, count: int = COUNT) -> Said:
     """What a run says of what passed over the wire of a source."""
-    source = SOURCES[name]
+    source = EVERY_SOURCE[name]
     return judged(placed(source, decode(source, transcript, count, cuts), STEP_MM), source.flat, source.upright, fit)
