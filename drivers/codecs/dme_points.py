@@ -113,13 +113,21 @@ class PointReader:
         self.out.append(Damaged(byte_count, reason))
 
     def _take_rows(self, numbers: list[float], width: int, size: int) -> None:
-        rows = [numbers[at : at + width] for at in range(0, len(numbers), width)]
-        for row in rows:
-            values, at = dict[str, Sequence[float]](), 0
-            for name in self.columns:
-                values[name] = row[at : at + WIDTHS[name]]
-                at += WIDTHS[name]
-            self._take(values, size // len(rows))
+        """Take whole points. Of lines that were put together, one that cannot be used shows that they may not belong together."""
+        points = [self._values_of(numbers[at : at + width]) for at in range(0, len(numbers), width)]
+        if self._held and not all(_are_sound(values) and not self._check.refusal(values) for values in points):
+            self.damage(size, "scan data that hold no whole number of points")
+            return
+        for values in points:
+            self._take(values, size // len(points))
+
+    def _values_of(self, row: Sequence[float]) -> dict[str, Sequence[float]]:
+        """The values of a point by the names of their columns."""
+        values, at = dict[str, Sequence[float]](), 0
+        for name in self.columns:
+            values[name] = row[at : at + WIDTHS[name]]
+            at += WIDTHS[name]
+        return values
 
     def _take(self, values: Mapping[str, Sequence[float]], size: int) -> None:
         if not _are_sound(values):
