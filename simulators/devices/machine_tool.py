@@ -178,10 +178,17 @@ class PrintingControl(InspectingControl):
 class OwnLines(PrintingControl):
     """Prints lines of the user's own, as a camera or a line scanner sends them; the last one is END."""
 
-    def __init__(self, line: str, quirks: Quirks, injector: Injector) -> None:
+    def __init__(
+        self,
+        line: str,
+        nominal_mm: NDArray[np.float64],
+        outward: NDArray[np.float64],
+        quirks: Quirks,
+        injector: Injector,
+        request: int | None = None,
+    ) -> None:
         """Take the line of a point with the fields number, x, y and z. Raises ValueError for one that cannot be filled in."""
-        nobody = np.zeros((0, 3))
-        super().__init__(nobody, nobody, 0.0, quirks, injector)
+        super().__init__(nominal_mm, outward, 0.0, quirks, injector, request)
         self._line = line
         try:
             self.point_line(0, (0.0, 0.0, 0.0)).encode("ascii")
@@ -189,8 +196,8 @@ class OwnLines(PrintingControl):
             raise ValueError(f"line {line!r}: expected ASCII with the fields number, x, y and z, like {{x:.4f}} ({error!r})") from None
 
     def opening(self, count: int) -> bytes:
-        """A camera says nothing before its first point."""
-        return b""
+        """A camera says nothing before its first point, unless it asks for the verdict."""
+        return self._quirks.bytes_of(*self.request_lines())
 
     def point_line(self, index: int, centre_mm: Sequence[float]) -> str:
         """One point in the line of the user's own."""
@@ -206,16 +213,16 @@ def serve(settings: SimulatorSettings, announce: Announce, control: type[Inspect
     """Probe a part and print it; the address may also be `to:host:port` or `file:PATH`. A control that asks then waits for the verdict."""
     injector = Injector(settings.faults, settings.motion.seed)
     quirks = Quirks.asked_for(injector)
-    if control is PrintingControl and settings.line:
-        stream(settings, OwnLines(settings.line, quirks, injector), announce, open_line=open_line_of_control)
-        return
     ideal = replace(settings.motion, noise_mm=0.0, form_error_mm=0.0, defect_mm=0.0, tip_radius_mm=0.0, resolution_mm=0.0)
     nominal_mm = walk(settings.path_mm, ideal).points_mm
     outward = walk(settings.path_mm, replace(ideal, tip_radius_mm=1.0)).points_mm - nominal_mm
     request = settings.request
     if request is None and settings.answer is not None:
         request = int(time.time()) % LAST_REQUEST + 1
-    made = control(nominal_mm, outward, settings.motion.tip_radius_mm, quirks, injector, request)
+    if control is PrintingControl and settings.line:
+        made: InspectingControl = OwnLines(settings.line, nominal_mm, outward, quirks, injector, request)
+    else:
+        made = control(nominal_mm, outward, settings.motion.tip_radius_mm, quirks, injector, request)
     stream(settings, made, announce, open_line=open_line_of_control)
     if settings.answer is not None and request is not None:
         stopped = f"request {request}: emergency stop: {STOPPED}"

@@ -84,13 +84,15 @@ def measured(points_mm: Array, faults: Sequence[Fault], seed: int) -> Transcript
     return wire.transcript
 
 
+FLAT, UP = np.zeros((MOST_POINTS, 3)), np.tile([0.0, 1.0, 0.0], (MOST_POINTS, 1))  # nominal points and directions, which no law is about
+
+
 def _inspecting(injector: Injector) -> Device:
-    flat = np.zeros((MOST_POINTS, 3))
-    return InspectingControl(flat, np.tile([0.0, 1.0, 0.0], (MOST_POINTS, 1)), 0.0, Quirks.asked_for(injector), injector)
+    return InspectingControl(FLAT, UP, 0.0, Quirks.asked_for(injector), injector)
 
 
 def _camera(injector: Injector) -> Device:
-    return OwnLines("{number};{x:.5f};{y:.5f}", Quirks.asked_for(injector), injector)
+    return OwnLines("{number};{x:.5f};{y:.5f}", FLAT, UP, Quirks.asked_for(injector), injector)
 
 
 def _printed(device: Callable[[Injector], Device], made: Callable[[int], Decoder]) -> Source:

@@ -46,13 +46,18 @@ def test_every_quirk_shows_in_the_bytes() -> None:
     assert bytes(byte & 0x7F for byte in with_parity) == b"END\x14\r\n"
 
 
+def camera(line: str, *faults: str, request: int | None = None) -> OwnLines:
+    return OwnLines(line, NOMINAL_MM, OUTWARD, Quirks(), Injector([Fault.parse(fault) for fault in faults], 0), request)
+
+
 def test_a_camera_sends_the_lines_that_it_was_told() -> None:
-    made = OwnLines("{number:04d};{x:+.3f};{y:.2f}", Quirks(), Injector([], 0))
+    made = camera("{number:04d};{x:+.3f};{y:.2f}")
     assert made.opening(1) + made.frame(SAMPLES[:1]) + made.closing(1) == b"0001;-10.635;12.80\r\nEND\r\n"
-    assert OwnLines("{z}", Quirks(), Injector([Fault.parse("no-contact:1")], 0)).frame(SAMPLES[:1]) == b""
+    assert camera("{z}", "no-contact:1").frame(SAMPLES[:1]) == b""
+    assert camera("{z}", request=7).opening(1) == b"REQUEST       7\r\n"
 
 
 @pytest.mark.parametrize("line", ["{a}", "{}", "{x.real.y}", "{x:q}", "{x", "\u00b5{x}"])
 def test_a_line_that_cannot_be_filled_in_is_refused(line: str) -> None:
     with pytest.raises(ValueError, match="expected ASCII with the fields number, x, y and z"):
-        OwnLines(line, Quirks(), Injector([], 0))
+        camera(line)
