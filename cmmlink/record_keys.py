@@ -35,7 +35,7 @@ class RunSigned(JsonObject):
 class AnchorTold(JsonObject):
     """A place outside the computer that was to be told how the run ended."""
 
-    place: str = Field(description="the file")
+    place: str = Field(description="the file, or the address of the authority that was asked for a time stamp")
     problem: str = Field(description="what kept it from being told, empty where nothing did; it is then told at the next run")
 
 
@@ -128,6 +128,14 @@ class Anchored(JsonObject):
     others: dict[str, int] = Field(description="how many heads of other stations they hold, by the name of the station")
 
 
+class Stamped(JsonObject):
+    """A time stamp by RFC 3161; `openssl ts -verify` shows whether its authority made it."""
+
+    run: str = Field(description="the run whose end was stamped")
+    chain_sha256: str = Field(description="the hash that was stamped")
+    stamped: str = Field(description="when, as the authority says, in UTC")
+
+
 class KeyShown(JsonObject):
     """The answer of `key new`, and the beginning of that of `key show`."""
 
@@ -167,4 +175,5 @@ class Verified(JsonObject):
     )
     signatures: Signatures | None = Field(description="who signed the runs; null where something was altered")
     anchors: Anchored | None = Field(description="with `--anchors`: what they say of these records")
+    timestamps: list[Stamped] = Field(description="the time stamps of the runs")
     against: Against | None = Field(default=None, description="with `--against`: whether the result file and the records agree")

@@ -102,7 +102,7 @@ class StackRecord:
         place["doubt"] = doubt.words if doubt else None
         return Recorder(self.store, RunInputs.of(plan, {**self.facts, **place}), clock=self.clock, now=self.now, seal=self.seal)
 
-    def tell_ends(self, places: Sequence[Path], sections: Sequence[RecordReference]) -> tuple[Told, ...]:
+    def tell_ends(self, places: Sequence[str], sections: Sequence[RecordReference]) -> tuple[Told, ...]:
         """Tell every place outside how the runs of the sections ended; see `anchor_ends`."""
         return anchor_ends(self.store, self.seal, places, utc_words(self.now()), sections)
 

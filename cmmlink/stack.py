@@ -248,7 +248,7 @@ def inspect_stack(
             if stop.is_set():
                 notes.append(f"aborted by the operator after {len(sections)} of {len(heights)} sections")
                 break
-        told = record.tell_ends(plan.records.anchor, [one.evidence for one in sections if one.evidence]) if record else ()
+        told = record.tell_ends(plan.records.places, [one.evidence for one in sections if one.evidence]) if record else ()
     if all(section.run.result is None for section in sections) and sections[0].run.refusal is not None:
         raise sections[0].run.refusal
     judged = [JudgedSection(section.slice.asked_mm, section.slice.height_mm, section.run) for section in sections]

@@ -136,6 +136,7 @@ def _words(found: Mapping[str, Any]) -> list[str]:
     """What was found of records that nobody altered, and what that proves."""
     lines = [f"nothing was altered: {found['records']} records, chain {found['chain_sha256']}", f"{found['state']}: "]
     lines[1] += "; ".join(_signature_words(found))
+    lines += _stamp_words(found["timestamps"])
     anchors = found["anchors"]
     if anchors is not None:
         lines.append(_anchor_words(anchors))
@@ -156,6 +157,17 @@ def _signature_words(found: Mapping[str, Any]) -> list[str]:
     if told["unsigned"]:
         words.append(f"{_named(told['unsigned'])} not signed: whoever may write the file could have written that anew")
     return words or ["there is no run"]
+
+
+def _stamp_words(stamps: Sequence[Mapping[str, str]]) -> list[str]:
+    if not stamps:
+        return []
+    last = stamps[-1]
+    check = f"openssl ts -verify -digest {last['chain_sha256']} -in timestamp.tsr -CAfile CERTIFICATE"
+    return [
+        f"time stamps: {len(stamps)}, the last of run {last['run']}, which its authority says it saw at {last['stamped']}; of what "
+        f"`cmmlink export` writes, `{check}` shows whether it does"
+    ]
 
 
 def _anchor_words(anchors: Mapping[str, Any]) -> str:

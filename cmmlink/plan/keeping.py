@@ -8,7 +8,7 @@ from pydantic import BeforeValidator, Field
 from cmmlink.plan.yaml_model import Settings, Text
 
 RECORDS = (
-    "where runs are recorded: a folder, null, or a mapping with folder, key, anchor and station; null: the user's own folder. "
+    "where runs are recorded: a folder, null, or a mapping with folder, key, anchor, timestamp and station; null: the user's own folder. "
     "A console keeps all its runs in one folder"
 )
 
@@ -32,9 +32,19 @@ class RecordKeeping(Settings):
         description="a file outside this computer, or several, to which a line with the hash of every run is added, like "
         "//server/share/heads.txt; one that cannot be reached is told at the next run",
     )
+    timestamp: Annotated[str, Field(pattern=r"^https?://[!-~]+$", max_length=500)] | None = Field(
+        default=None,
+        description="the address of an authority that stamps the hash of every run with the time (RFC 3161), like https://tsa.example; "
+        "one that cannot be reached is asked at the next run",
+    )
     station: Text | None = Field(
         default=None, description="the name of the station in the records and in the lines of anchor; null: the name of this computer"
     )
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """Every place outside that is told how a run ended."""
+        return (*map(str, self.anchor), *filter(None, [self.timestamp]))
 
     def with_path_from(self, folder: Path) -> "RecordKeeping":
         """Give the same with its paths absolute, seen from a folder."""

@@ -23,10 +23,12 @@ from cmmlink.record.recorder import RecordReference
 from cmmlink.record.seal import Seal
 from cmmlink.record.shapes import checked
 from cmmlink.record.store import Store, name_record
+from cmmlink.record.timestamps import ask_stamp
 
 WAITING = "heads-waiting.json"
 PATIENCE_S = 5.0  # for all places together: whoever writes to a share whose server is gone may be held for minutes
 _HEAD = re.compile(r"(\S+) (\S+) (\S+) ([0-9a-f]{64}) ([0-9a-f]{16}|-)")
+_AUTHORITIES = ("http://", "https://")
 _log = logging.getLogger(__name__)
 
 
@@ -55,39 +57,46 @@ class Told(BaseModel):
     problem: str
 
 
-def tell_heads(folder: Path, places: Sequence[Path], heads: Sequence[Head], patience_s: float = PATIENCE_S) -> tuple[Told, ...]:
-    """Add the lines of some runs to every place, behind those that it could not be told before. Returns what came of it; never raises.
+def tell_heads(
+    folder: Path, places: Sequence[str], heads: Sequence[Head], patience_s: float = PATIENCE_S
+) -> tuple[tuple[Told, ...], dict[str, bytes]]:
+    """Add the lines of some runs to every place, behind those that it could not be told before. Never raises.
 
     folder     : of the records, beside which lines wait
+    places     : files, or addresses of authorities that stamp the newest of the heads, from which those before it follow
     patience_s : how long all places together may take
+
+    Returns what came of it, and the time stamps by the run whose end was stamped.
     """
     waiting = _waiting_in(folder)
     if not places and not waiting:
-        return ()
+        return (), {}
     for place in places:
-        waiting.setdefault(str(place), []).extend(head.line for head in heads)
+        waiting.setdefault(place, []).extend(head.line for head in heads)
     lost = _keep_waiting(folder, waiting)  # before anything is tried: whatever ends the program now, the lines are not lost
-    problems = _tell_all(waiting, patience_s)
+    problems, stamps = _tell_all(waiting, patience_s)
     left = {place: lines for place, lines in waiting.items() if problems[place]}
     lost = _keep_waiting(folder, left) or lost
     for unreached in left:
         _log.warning("heads of runs were not told to %s: %s. %s", unreached, problems[unreached], lost or "They are told at the next run")
-    return tuple(Told(place=str(place), problem=". ".join(filter(None, [problems[str(place)], lost]))) for place in places)
+    told = (Told(place=place, problem=". ".join(filter(None, [problems[place], lost if problems[place] else ""]))) for place in places)
+    return tuple(told), stamps
 
 
-def anchor_ends(store: Store, seal: Seal, places: Sequence[Path], ended: str, runs: Sequence[RecordReference]) -> tuple[Told, ...]:
+def anchor_ends(store: Store, seal: Seal, places: Sequence[str], ended: str, runs: Sequence[RecordReference]) -> tuple[Told, ...]:
     """Tell every place how some runs of these records ended, and note behind each of them what came of it. Never raises.
 
     ended : the moment, in UTC
     """
     heads = [Head(ended, seal.station, one.run, one.chain_sha256, (one.signature or {}).get("key_id", "")) for one in runs]
-    told = tell_heads(store.path.parent, places, heads)
-    if told and heads:
-        try:
-            for head in heads:
-                store.append([_draft(head.run, told)], seal.countersign)
-        except StoreError as error:  # the runs themselves are on record
-            _log.warning("that the anchors were told cannot be noted: %s", error)
+    told, stamps = tell_heads(store.path.parent, places, heads)
+    drafts = [_draft(head.run, told) for head in heads if told]
+    try:
+        drafts += [Draft(run, "timestamp", stamp) for run, stamp in stamps.items() if "end" in store.totals(run)]
+        for draft in drafts:
+            store.append([draft], seal.countersign)
+    except StoreError as error:  # the runs themselves are on record
+        _log.warning("that the anchors were told cannot be noted: %s", error)
     return told
 
 
@@ -117,12 +126,13 @@ def heads_in(file: Path) -> list[Head]:
     return heads
 
 
-def _tell_all(waiting: Mapping[str, Sequence[str]], patience_s: float) -> dict[str, str]:
-    """Tell every place its lines, all at once. Returns what kept each from being told, empty where nothing did."""
+def _tell_all(waiting: Mapping[str, Sequence[str]], patience_s: float) -> tuple[dict[str, str], dict[str, bytes]]:
+    """Tell every place its lines, all at once. Returns what kept each from being told, empty where nothing did, and the time stamps."""
+    stamps: dict[str, bytes] = {}
     problems = dict.fromkeys(waiting, f"it did not answer within {patience_s:g} s")
     threads = []
     for place, lines in waiting.items():
-        thread = threading.Thread(target=_tell, args=(place, tuple(lines), problems), name="anchor", daemon=True)
+        thread = threading.Thread(target=_tell, args=(place, tuple(lines), patience_s, problems, stamps), name="anchor", daemon=True)
         try:
             thread.start()
             threads.append(thread)
@@ -131,11 +141,20 @@ def _tell_all(waiting: Mapping[str, Sequence[str]], patience_s: float) -> dict[s
     deadline = time.monotonic() + patience_s
     for thread in threads:
         thread.join(max(0.0, deadline - time.monotonic()))
-    return dict(problems)
+    return dict(problems), dict(stamps)
 
 
-def _tell(place: str, lines: Sequence[str], problems: dict[str, str]) -> None:
-    problems[place] = _add_lines(Path(place), lines)
+def _tell(place: str, lines: Sequence[str], patience_s: float, problems: dict[str, str], stamps: dict[str, bytes]) -> None:
+    if not place.startswith(_AUTHORITIES):
+        problems[place] = _add_lines(Path(place), lines)
+        return
+    newest = _HEAD.fullmatch(lines[-1])
+    assert newest is not None, "a line was made from a head"
+    try:
+        stamps[newest[3]] = ask_stamp(place, bytes.fromhex(newest[4]), patience_s)
+        problems[place] = ""
+    except StoreError as error:
+        problems[place] = str(error).removeprefix(f"{place}: ")
 
 
 def _add_lines(place: Path, lines: Sequence[str]) -> str:

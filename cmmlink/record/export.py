@@ -41,7 +41,7 @@ def export_run(store: Store, run: str, folder: Path) -> list[Path]:
     wire.bin, the bytes as they arrived, and wire.csv, when; plan.yaml; the nominal's file; of a run with a result
     deviations.csv and result.json, and zone.json where it has a certificate. nominal.json is the curve that was made of the nominal's
     file; records.bin, the records as they are hashed, and chain.csv, their hashes, are what somebody else recomputes the chain from;
-    signature.json says who signed the run, where somebody did.
+    signature.json says who signed the run, where somebody did, timestamp.tsr when an authority stamped its end.
     """
     try:
         with new_files(folder) as files:
@@ -109,6 +109,9 @@ def _signature(store: Store, run: str, files: NewFiles) -> None:
     signature = signature_of(store, run)
     if signature is not None:
         _json(files("signature.json"), signature.model_dump())
+    stamps = [record.body for record in store.records(run, "timestamp")]
+    if stamps:
+        files("timestamp.tsr").write_bytes(stamps[-1])
 
 
 def _json(path: Path, document: Any) -> None:

@@ -7,6 +7,7 @@ signed, signed by another key, intact but unsigned, altered, and cut off after a
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal
 
@@ -20,6 +21,8 @@ from cmmlink.record.seal import PUBLIC_FILE, station_name
 from cmmlink.record.shapes import Header, checked
 from cmmlink.record.signature import Signature, countersignature_in, key_id_of, signature_in
 from cmmlink.record.store import Store
+from cmmlink.record.timestamps import read_stamp
+from cmmlink.words import utc_words
 
 State = Literal["intact and signed", "signed by another key", "intact but unsigned", "altered", "cut off"]
 Known = Literal["given", "station", "handed over", "another", "evidence"]
@@ -40,6 +43,7 @@ class RunTrusted:
     end       : the number of the record that ends it, 0 where it has no end
     head      : the hash of its end at the station that measured it, empty where it has no end
     signature : None where nobody signed it
+    stamped   : when authorities stamped its end, as they say
     later     : how many records that were added behind the end are not signed
     keys      : the public keys of those that are
     merged    : whether it was taken over from another station
@@ -50,6 +54,7 @@ class RunTrusted:
     end: int
     head: str
     signature: Signature | None
+    stamped: tuple[datetime, ...]
     later: int
     keys: tuple[str, ...]
     merged: bool
@@ -98,7 +103,7 @@ def trust_in(store: Store, found: Mapping[str, Any], run: str | None, given: Seq
     """
     cut = found["altered"] and bool(heads) and _is_cut_off(store, found)
     if found["altered"] and not cut:
-        return {**found, "state": "altered", "signatures": None, "anchors": None}
+        return {**found, "state": "altered", "signatures": None, "anchors": None, "timestamps": []}
     try:
         runs = list(_trusted_runs(store, None if cut else run))
         keys = _keys(store, given)
@@ -106,12 +111,18 @@ def trust_in(store: Store, found: Mapping[str, Any], run: str | None, given: Seq
         _compare(runs, ours)
     except AlteredError as error:
         first = found["first"] or {**asdict(error.alteration), "message": str(error)}
-        return {**found, "altered": True, "first": first, "state": "altered", "signatures": None, "anchors": None}
+        return {**found, "altered": True, "first": first, "state": "altered", "signatures": None, "anchors": None, "timestamps": []}
     here = {one.run for one in runs if one.end}
     lost = list(dict.fromkeys(head.run for head in ours if head.run not in here))
     state: State = "cut off" if lost else "altered" if cut else _state(runs, keys)
-    anchors = None if heads is None else _anchors(heads, ours, lost)
-    return {**found, "altered": cut or bool(lost), "state": state, "signatures": _signatures(runs, keys), "anchors": anchors}
+    return {
+        **found,
+        "altered": cut or bool(lost),
+        "state": state,
+        "signatures": _signatures(runs, keys),
+        "anchors": None if heads is None else _anchors(heads, ours, lost),
+        "timestamps": [{"run": one.run, "chain_sha256": one.head, "stamped": utc_words(moment)} for one in runs for moment in one.stamped],
+    }
 
 
 def _trusted_runs(store: Store, run: str | None) -> Iterator[RunTrusted]:
@@ -129,7 +140,7 @@ def _trusted(store: Store, begin: Record, end: Record | None) -> RunTrusted:
     if end is None:
         if signatures:
             raise AlteredError(Alteration(signatures[0].number, run, "signature", "stands in a run that has no end"))
-        return RunTrusted(run, _station_of(begin), 0, "", None, 0, (), merged=False)
+        return RunTrusted(run, _station_of(begin), 0, "", None, (), 0, (), merged=False)
     added = store.added_behind(run, end.number)
     if added is not None:
         raise AlteredError(Alteration(added, run, "", "was added to a run that had ended"))
@@ -146,12 +157,26 @@ def _trusted(store: Store, begin: Record, end: Record | None) -> RunTrusted:
         raise AlteredError(Alteration(signatures[1].number, run, "signature", "is a second signature of the run"))
     signature = _signature(store, signatures[0], end, head) if signatures else None
     later, keys = _countersigned(store, run)
-    return RunTrusted(run, _station_of(begin), end.number, head, signature, later, keys, origin is not None)
+    return RunTrusted(
+        run, _station_of(begin), end.number, head, signature, tuple(_stamps(store, run, head)), later, keys, origin is not None
+    )
+
+
+def _stamps(store: Store, run: str, head: str) -> Iterator[datetime]:
+    """When authorities stamped the end of a run. Raises AlteredError for a time stamp of anything else."""
+    for record in store.records(run, "timestamp"):
+        try:
+            stamp = read_stamp(record.body)
+        except StoreError as error:
+            raise AlteredError(Alteration(record.number, run, record.kind, str(error))) from None
+        if stamp.sha256.hex() != head:
+            raise AlteredError(Alteration(record.number, run, record.kind, "stamps another end of the run, or another run"))
+        yield stamp.moment
 
 
 def _countersigned(store: Store, run: str) -> tuple[int, tuple[str, ...]]:
     """How many records behind the end of a run nobody signed, and the keys of the others. Raises AlteredError for a wrong signature."""
-    left = [record for kind in ("anchors", "derived") for record in store.records(run, kind)]
+    left = [record for kind in ("anchors", "timestamp", "derived") for record in store.records(run, kind)]
     found, keys = list(store.records(run, "countersignature")), []
     if not found:
         return len(left), ()

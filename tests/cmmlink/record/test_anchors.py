@@ -24,7 +24,7 @@ MOMENT = "2026-03-14T15:09:27.000Z"
 def tell(folder: Path, place: Path, *runs: RecordReference, station: str = "cmm-1") -> list[str]:
     """Tell one place the ends of runs; the problems of that."""
     with Store(folder, writing=True, epoch_s=lambda: 7.0) as store:
-        return [told.problem for told in anchor_ends(store, seal_of(store, station=station, key=None), [place], MOMENT, runs)]
+        return [told.problem for told in anchor_ends(store, seal_of(store, station=station, key=None), [str(place)], MOMENT, runs)]
 
 
 @pytest.fixture
@@ -94,7 +94,7 @@ def test_a_place_that_does_not_answer_keeps_nobody_waiting(tmp_path: Path, monke
 
     monkeypatch.setattr(anchors, "_add_lines", held)
     begin_s = time.monotonic()
-    told = tell_heads(tmp_path, [dead, well], [Head(MOMENT, "cmm-1", "a-0001", "0" * 64, "")], patience_s=0.1)
+    told, _ = tell_heads(tmp_path, [str(dead), str(well)], [Head(MOMENT, "cmm-1", "a-0001", "0" * 64, "")], patience_s=0.1)
     assert time.monotonic() - begin_s < 5.0
     assert [one.problem for one in told] == ["it did not answer within 0.1 s", ""]
     assert list(json.loads((tmp_path / WAITING).read_text(encoding="utf-8"))) == [str(dead)]

@@ -35,7 +35,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     last = add_signed(folder, "c-0003")
     with Store(folder, writing=True, epoch_s=lambda: 101.0) as store:
         seal = seal_of(store, station="cmm-1", key=None)
-        anchor_ends(store, seal, [folder.parent / "heads.txt"], "2026-03-14T15:09:27.000Z", [last])
+        anchor_ends(store, seal, [str(folder.parent / "heads.txt")], "2026-03-14T15:09:27.000Z", [last])
         store.append([Draft("c-0003", "derived", b'{"verdict":"conform"}')], seal.countersign)
     return folder
 
