@@ -50,7 +50,7 @@ LIBRARIES_IN_ONE_FILE = {
     "serial": {"drivers/links/serial_scanner.py"},
     "numba": {"inspection/kernels/compiling.py"},
     "ezdxf": {"cmmlink/nominal_files/dxf.py"},
-    "OCP": {"drivers/cad/occt_reader.py"},
+    "OCP": {"drivers/cad/occt_reader.py", "drivers/cad/occt_faces.py"},
     "xlsxwriter": {"cmmlink/exports/workbook.py"},
 }
 

@@ -55,6 +55,40 @@ class CadCurves:
     left_out: tuple[str, ...]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class CadFace:
+    """A whole face, exact: degrees, poles (a, b, 4) in homogeneous form as of a curve, clamped knots; its outside is S_u x S_v.
+
+    reversed : the outside is the other side
+    """
+
+    degree: tuple[int, int]
+    poles: Array
+    knots_u: Array
+    knots_v: Array
+    reversed: bool
+
+    def __post_init__(self) -> None:
+        for array in (self.poles, self.knots_u, self.knots_v):
+            array.setflags(write=False)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CadFaces:
+    """The faces of a CAD file.
+
+    faces        : a face for each that is whole, None for each that is trimmed
+    triangles_mm : (t, 3, 3) all faces as triangles, outsides out; none where every face is whole
+    face         : (t,) the number of the face of each, from 0
+    error_mm     : bound of how far the triangles lie off the faces
+    """
+
+    faces: tuple[CadFace | None, ...]
+    triangles_mm: Array
+    face: NDArray[np.int64]
+    error_mm: float
+
+
 class OcctProcess:
     """A running child with Open CASCADE in it. Use as a context manager; one that broke down on a file is started again for the next.
 
@@ -80,10 +114,33 @@ class OcctProcess:
 
     def read(self, path: Path, kind: Kind, origin_mm: Sequence[float], normal: Sequence[float]) -> CadCurves:
         """Read the curves of a file; of faces alone, those of their section by the plane. Raises CadError: the cause and what to do."""
+        request = {"do": kind, "path": str(path.resolve()), "origin_mm": list(origin_mm), "normal": list(normal)}
+        answer, arrays = self._ask(request)
+        curves = [CadCurve(degree, *arrays[2 * i : 2 * i + 2]) for i, degree in enumerate(answer["degrees"])]
+        return CadCurves(tuple(curves), answer["faces"], answer["cut"], answer["residual_mm"], tuple(answer["left_out"]))
+
+    def read_faces(self, path: Path, kind: Kind, chord_mm: float) -> CadFaces:
+        """Read the faces of a file; where one is trimmed all come as triangles as well, no farther off than about `chord_mm`.
+
+        Raises CadError: the cause and what to do.
+        """
+        answer, arrays = self._ask({"do": kind, "path": str(path.resolve()), "chord_mm": chord_mm})
+        given = iter(arrays)
+        faces = tuple(
+            None
+            if each["trimmed"]
+            else CadFace((each["degree"][0], each["degree"][1]), next(given), next(given), next(given), each["reversed"])
+            for each in answer["faces"]
+        )
+        rest = list(given)
+        triangles, owner = rest or (np.empty((0, 3, 3)), np.empty(0, dtype=np.int64))
+        return CadFaces(faces, triangles, owner, answer["error_mm"])
+
+    def _ask(self, request: dict[str, Any]) -> tuple[dict[str, Any], list[NDArray[Any]]]:
+        """Ask the child, a new one where it broke down on an earlier file. Raises CadError for what it complains of."""
         if self._child.ended:
             self._child.start_again()
             self._greeted = False
-        request = {"do": kind, "path": str(path.resolve()), "origin_mm": list(origin_mm), "normal": list(normal)}
         try:
             self._greet()
             answer, arrays = self._child.ask(request)
@@ -93,8 +150,7 @@ class OcctProcess:
             ) from error
         if "error" in answer:
             raise CadError(str(answer["error"]))
-        curves = [CadCurve(degree, *arrays[2 * i : 2 * i + 2]) for i, degree in enumerate(answer["degrees"])]
-        return CadCurves(tuple(curves), answer["faces"], answer["cut"], answer["residual_mm"], tuple(answer["left_out"]))
+        return answer, arrays
 
     def _greet(self) -> None:
         """Wait until Open CASCADE is loaded. Raises CadError where it cannot be."""
@@ -110,6 +166,12 @@ def read_cad(path: Path, kind: Kind, origin_mm: Sequence[float], normal: Sequenc
     """Read one file in a process that ends with it: see `OcctProcess.read`."""
     with OcctProcess() as process:
         return process.read(path, kind, origin_mm, normal)
+
+
+def read_cad_faces(path: Path, kind: Kind, chord_mm: float) -> CadFaces:
+    """Read the faces of one file in a process that ends with it: see `OcctProcess.read_faces`."""
+    with OcctProcess() as process:
+        return process.read_faces(path, kind, chord_mm)
 
 
 def _how_to_install(hello: dict[str, Any]) -> str:

@@ -1,7 +1,7 @@
 """The child of occt_process.py: it reads STEP and IGES by Open CASCADE, and cuts what has faces.
 
-This is the only file that imports OCP, when it serves. Lengths are mm whatever the unit of the file, and assemblies are placed: the
-kernel sees to both. Poles and knots are read one by one, because the array classes have other names in OCCT 7 than in 8.
+This and occt_faces.py are the only files that import OCP, when it serves. Lengths are mm whatever the unit of the file, and assemblies
+are placed: the kernel sees to both. Poles and knots are read one by one, because the array classes have other names in OCCT 7 than in 8.
 """
 
 import importlib.util
@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.cad.occt_faces import faces_of
 from drivers.cad.occt_process import CadCurve, Kind
 from drivers.errors import CadError
 from drivers.helper_process import Answer, answer_questions
@@ -44,6 +45,8 @@ def _answer(request: dict[str, Any], arrays: list[NDArray[Any]]) -> tuple[dict[s
     del arrays
     try:
         shape = _shape(request["path"], request["do"])
+        if "chord_mm" in request:
+            return _faces(shape, request["chord_mm"])
         return _curves(shape, np.array(request["origin_mm"]), np.array(request["normal"]))
     except CadError as error:
         return {"error": str(error)}, []
@@ -94,6 +97,13 @@ def _curves(shape: Any, origin: Array, normal: Array) -> tuple[dict[str, Any], l
         "left_out": left_out,
     }
     return told, arrays
+
+
+def _faces(shape: Any, chord_mm: float) -> tuple[dict[str, Any], list[NDArray[Any]]]:
+    """All faces of a shape."""
+    from OCP.TopAbs import TopAbs_FACE
+
+    return faces_of([_cast(face, "Face") for face in _parts(shape, TopAbs_FACE)], shape, chord_mm)
 
 
 def _parts(shape: Any, kind: Any, *but_in: Any) -> Iterator[Any]:

@@ -1,0 +1,109 @@
+"""Nominal surfaces from files: faces of STEP and IGES, exact where all are whole; triangles of STL, OBJ and PLY."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers import CadError, MeshError
+from drivers.cad import CadFace, CadFaces, Kind, read_cad_faces
+from drivers.surface import Open3DMissing, Open3DProcess, SurfaceMesh, read_obj, read_stl
+from inspection import NominalError
+from inspection.surface import NominalSurface, PatchSurface, SplineFace, TriangleSurface
+
+Array = NDArray[np.float64]
+
+CHORD_MM = 0.001  # between trimmed faces and their triangles: well below what is measured, and counted against the verdict
+SURFACE_SUFFIXES = (".stl", ".obj", ".ply", ".step", ".stp", ".p21", ".igs", ".iges")
+_CAD: dict[str, Kind] = {".step": "step", ".stp": "step", ".p21": "step", ".igs": "iges", ".iges": "iges"}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SurfaceFile:
+    """A nominal surface as its file was understood.
+
+    nominal       : in mm
+    source_format : the name of the format
+    faces         : how many faces, or triangles
+    notes         : what was assumed, and what was done to it, in sentences
+    """
+
+    nominal: NominalSurface
+    source_format: str
+    faces: int
+    notes: tuple[str, ...]
+
+
+def load_surface(
+    path: Path,
+    scale: float = 1.0,
+    nominal_error_mm: float | None = None,
+    chord_mm: float = CHORD_MM,
+    read_faces: Callable[[Path, Kind, float], CadFaces] = read_cad_faces,
+) -> SurfaceFile:
+    """Read a nominal surface. Raises NominalError, which names the file and what to do.
+
+    scale            : mm that one unit of a mesh is; CAD files state their own unit
+    nominal_error_mm : the chord tolerance with which a mesh was exported from CAD; None takes the mesh for the nominal itself
+    chord_mm         : how far triangles may lie off trimmed faces
+    """
+    kind = path.suffix.lower()
+    if kind in _CAD:
+        return _of_cad(path, _CAD[kind], chord_mm, read_faces)
+    if kind not in SURFACE_SUFFIXES:
+        raise NominalError(f"{path}: not a format of surfaces; known are {', '.join(SURFACE_SUFFIXES)}")
+    mesh = _read_mesh(path, kind, scale)
+    triangles = np.concatenate([np.array(piece, dtype=np.float64) for piece in mesh.pieces()])
+    rounding = _rounding_mm(triangles, scale) if mesh.kind == "binary STL" else 0.0
+    notes = list(mesh.warnings)
+    if nominal_error_mm is None:
+        notes.append(
+            "the mesh is taken for the nominal itself: if it was exported from CAD, state the chord tolerance, or bring the STEP file"
+        )
+    surface = TriangleSurface(triangles, (nominal_error_mm or 0.0) + rounding)
+    return SurfaceFile(surface, mesh.kind, len(surface), (*notes, *surface.notes))
+
+
+def _read_mesh(path: Path, kind: str, scale: float) -> SurfaceMesh:
+    try:
+        if kind == ".stl":
+            return read_stl(path, scale)
+        if kind == ".obj":
+            return read_obj(path, scale)
+        with Open3DProcess() as process:
+            return process.read(path, scale)
+    except (MeshError, Open3DMissing) as error:
+        raise NominalError(str(error)) from None
+
+
+def _rounding_mm(triangles: Array, scale: float) -> float:
+    """How far float32 may round a corner from where it was."""
+    largest = float(np.abs(triangles).max()) / scale
+    return float(np.spacing(np.float32(largest))) / 2 * scale * 3**0.5
+
+
+def _of_cad(path: Path, kind: Kind, chord_mm: float, read_faces: Callable[[Path, Kind, float], CadFaces]) -> SurfaceFile:
+    try:
+        found = read_faces(path, kind, chord_mm)
+        whole = [_spline_face(face, number) for number, face in enumerate(found.faces, 1) if face is not None]
+        if len(whole) == len(found.faces):
+            patches = PatchSurface(whole)
+            return SurfaceFile(patches, kind, len(whole), patches.notes)
+        trimmed = len(found.faces) - len(whole)
+        triangles = TriangleSurface(found.triangles_mm, found.error_mm, found.face)
+    except (CadError, NominalError) as error:
+        raise NominalError(f"{path}: {error}") from None
+    words = (
+        f"{trimmed} of {len(found.faces)} faces are trimmed: the part is taken as {len(triangles)} triangles, which lie up to "
+        f"{found.error_mm:.2g} mm off the faces; that counts against every verdict as U does"
+    )
+    return SurfaceFile(triangles, kind, len(found.faces), (words, *triangles.notes))
+
+
+def _spline_face(face: CadFace, number: int) -> SplineFace:
+    weights = face.poles[:, :, 3]
+    rational = None if (weights == weights.flat[0]).all() else np.ascontiguousarray(weights)
+    points = np.ascontiguousarray(face.poles[:, :, :3] / weights[:, :, None])
+    return SplineFace(face.degree, points, face.knots_u, face.knots_v, rational, face.reversed, str(number))

@@ -1,0 +1,78 @@
+"""Nominal surfaces from files: whole faces of STEP exact, trimmed ones as triangles with a bound that holds, meshes as they are."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cmmlink.nominal_files.surface_file import load_surface
+from drivers.cad import OcctProcess
+from inspection import NominalError
+from inspection.surface import PatchSurface, TriangleSurface
+from tests.drivers.surface.meshes import binary_stl, write
+
+TORUS_MM = (30.0, 8.0)  # these are what occt_writer.py makes
+BOX_MM = (40.0, 30.0, 20.0)
+BORE_PLACE, BORE_AXIS, BORE_RADIUS = np.array([20.0, 15.0, -5.0]), np.array([0.2, 0.0, 1.0]), 8.0
+
+
+def test_a_torus_of_step_is_exact(cad_files: Path, occt_process: OcctProcess) -> None:
+    found = load_surface(cad_files / "torus.step", read_faces=occt_process.read_faces)
+    assert isinstance(found.nominal, PatchSurface)
+    assert found.nominal.is_closed
+    assert found.nominal.nominal_error_mm == 0.0
+    assert (found.source_format, found.faces, found.notes) == ("step", 1, ())
+    ring, tube = TORUS_MM
+    rng = np.random.default_rng(1)
+    angle, about, off = rng.uniform(0, 2 * np.pi, (2, 100)), rng.uniform(0, 2 * np.pi, 100), rng.uniform(-3, 3, 100)
+    radius = ring + (tube + off) * np.cos(about)
+    points = np.column_stack([radius * np.cos(angle[0]), radius * np.sin(angle[0]), (tube + off) * np.sin(about)])
+    assert np.abs(found.nominal.project(points).distance_mm - off).max() < 1e-9
+
+
+def test_trimmed_faces_come_as_triangles_whose_bound_holds_and_is_told(cad_files: Path, occt_process: OcctProcess) -> None:
+    found = load_surface(cad_files / "part.step", chord_mm=0.01, read_faces=occt_process.read_faces)
+    surface = found.nominal
+    assert isinstance(surface, TriangleSurface)
+    assert surface.is_closed
+    assert found.faces == 7
+    assert "3 of 7 faces are trimmed" in found.notes[0]
+    assert 0 < surface.nominal_error_mm < 0.05
+    assert f"{surface.nominal_error_mm:.2g} mm" in found.notes[0]
+    rng = np.random.default_rng(2)
+    axis = BORE_AXIS / np.linalg.norm(BORE_AXIS)
+    across = np.linalg.svd(axis[None])[2][1:]
+    height, angle, off = rng.uniform(9, 20, 300), rng.uniform(0, 2 * np.pi, 300), rng.uniform(-1, 1, 300)
+    around = np.cos(angle)[:, None] * across[0] + np.sin(angle)[:, None] * across[1]
+    inside = surface.project(BORE_PLACE + height[:, None] * axis + (BORE_RADIUS - off)[:, None] * around)
+    error = np.abs(inside.distance_mm - off)
+    assert 1e-6 < error.max() <= surface.nominal_error_mm  # off a bore, the outside is towards its axis
+    corner = surface.project([(-1.0, -1.0, -1.0), (1.0, 1.0, 1.0), (BOX_MM[0] + 2, 3, 4)])
+    assert corner.distance_mm == pytest.approx([3**0.5, -1, 2], abs=1e-9)
+    assert np.unique(inside.face).size == 1
+
+
+def test_a_mesh_is_taken_as_it_is_and_what_it_stands_for_is_asked(tmp_path: Path) -> None:
+    square = np.array([[(0, 0, 0), (100, 0, 0), (100, 50, 0)], [(0, 0, 0), (100, 50, 0), (0, 50, 0)]], dtype=np.float32)
+    path = write(tmp_path / "sheet.stl", binary_stl(square))
+    found = load_surface(path)
+    assert isinstance(found.nominal, TriangleSurface)
+    assert (found.source_format, found.faces) == ("binary STL", 2)
+    assert "taken for the nominal itself" in found.notes[0]
+    assert found.nominal.nominal_error_mm == pytest.approx(np.spacing(np.float32(100)) / 2 * 3**0.5)
+    assert found.nominal.project([(3, 4, 0.25)]).distance_mm.tolist() == [0.25]
+    stated = load_surface(path, scale=25.4, nominal_error_mm=0.05)
+    assert stated.nominal.nominal_error_mm == pytest.approx(0.05, abs=2e-4)
+    assert stated.nominal.size_mm == pytest.approx(2540)
+    assert stated.notes == ()
+    (tmp_path / "sheet.obj").write_text("v 0 0 0\nv 100 0 0\nv 100 50 0\nv 0 50 0\nf 1 2 3 4\n", encoding="ascii")
+    assert load_surface(tmp_path / "sheet.obj").nominal.area_mm2 == pytest.approx(5000)
+
+
+def test_what_is_no_surface_is_refused_with_the_file(cad_files: Path, occt_process: OcctProcess, tmp_path: Path) -> None:
+    with pytest.raises(NominalError, match=r"wire-AP203-MM\.step: holds no face"):
+        load_surface(cad_files / "wire-AP203-MM.step", read_faces=occt_process.read_faces)
+    with pytest.raises(NominalError, match="not a format of surfaces"):
+        load_surface(tmp_path / "scan.dat")
+    with pytest.raises(NominalError, match=r"none\.stl"):
+        load_surface(tmp_path / "none.stl")
