@@ -124,9 +124,10 @@ def _poles(spline: Any) -> Array:
 
 
 def _knots(spline: Any) -> tuple[Array, Array]:
-    u = np.repeat(*zip(*((spline.UKnot(i), spline.UMultiplicity(i)) for i in range(1, spline.NbUKnots() + 1)), strict=True))
-    v = np.repeat(*zip(*((spline.VKnot(i), spline.VMultiplicity(i)) for i in range(1, spline.NbVKnots() + 1)), strict=True))
-    return u.astype(np.float64), v.astype(np.float64)
+    numbers_u, numbers_v = range(1, spline.NbUKnots() + 1), range(1, spline.NbVKnots() + 1)
+    u = np.repeat([float(spline.UKnot(i)) for i in numbers_u], [int(spline.UMultiplicity(i)) for i in numbers_u])
+    v = np.repeat([float(spline.VKnot(i)) for i in numbers_v], [int(spline.VMultiplicity(i)) for i in numbers_v])
+    return u, v
 
 
 def _triangles(faces: Sequence[Any], shape: Any, chord_mm: float) -> tuple[Array, NDArray[np.int64], float]:

@@ -6,6 +6,7 @@ This is the front door, beside that of the package around it, which holds what b
 TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer to load than all of this
 
 if TYPE_CHECKING:
+    from inspection.surface.cloud_surface import CloudSurface
     from inspection.surface.feet import FootKind, NominalSurface, SurfaceFeet, rejections
     from inspection.surface.patches import PatchSurface
     from inspection.surface.rigid_motion import RigidMotion
@@ -17,6 +18,7 @@ else:
     from inspection.front_door import load_on_use
 
     _PLACES = {
+        "inspection.surface.cloud_surface": ("CloudSurface",),
         "inspection.surface.feet": ("FootKind", "NominalSurface", "SurfaceFeet", "rejections"),
         "inspection.surface.patches": ("PatchSurface",),
         "inspection.surface.surface_fit": ("SurfaceFreedom", "SurfaceRegistration", "register_surface"),
@@ -30,6 +32,7 @@ else:
 
 
 __all__ = [
+    "CloudSurface",
     "FootKind",
     "NominalSurface",
     "PatchSurface",

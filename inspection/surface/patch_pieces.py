@@ -243,3 +243,10 @@ def _boxes(c: Array) -> tuple[Array, Array, Array]:
     low = np.where(even > 0, np.minimum(np.sign(along), 0) * most, -most).sum(axis=(2, 3))
     middle = c[:, :, 0, 0] + np.einsum("pa,pad->pd", (high + low) / 2, axes)
     return middle, axes, (high - low) / 2 + _BOX_ROUND_OFF * np.abs(c[:, :, 0, 0]).max()
+
+
+def boxes_along_axes(rows: Array) -> tuple[Array, Array, Array]:
+    """The middles (p, 3) of pieces, and boxes along x, y and z around their own ones: low (p, 3) and high (p, 3)."""
+    middle, axes, half = rows[:, BOX_MIDDLE:BOX_AXES], rows[:, BOX_AXES:BOX_HALF].reshape(-1, 3, 3), rows[:, BOX_HALF : BOX_HALF + 3]
+    reach = np.einsum("pa,pad->pd", half, np.abs(axes)) * (1 + 1e-12)
+    return middle, middle - reach, middle + reach

@@ -7,13 +7,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from inspection.errors import NominalError
 from inspection.kernels.surfaces import PatchTables, project_on_patches
-from inspection.kernels.surfaces.layout import BOX_AXES, BOX_HALF, BOX_MIDDLE
 from inspection.surface.feet import KILOMETRE_MM, SurfaceFeet, points_in_space, surface_feet
 from inspection.surface.item_tree import item_tree
 from inspection.surface.orientation import which_to_turn
 from inspection.surface.patch_borders import agreeing_faces, border_rows, find_adjoining, find_borders, vertex_rows
-from inspection.surface.patch_pieces import PatchPieces, cut_into_patches, piece_rows
+from inspection.surface.patch_pieces import PatchPieces, boxes_along_axes, cut_into_patches, piece_rows
 from inspection.surface.spline_face import SplineFace
+from inspection.surface.spread import shares_of, spread_within
 
 Array = NDArray[np.float64]
 
@@ -64,8 +64,8 @@ class PatchSurface:
         vertices = vertex_rows(pieces, borders, sides, outward, near_mm)
         self.notes = tuple(notes)
         rows = piece_rows(pieces, outward[pieces.face])
-        low, high = _bounding(rows)
-        tree = item_tree(rows[:, BOX_MIDDLE:BOX_AXES], low, high, 1)
+        middle, low, high = boxes_along_axes(rows)
+        tree = item_tree(middle, low, high, 1)
         self._tables = PatchTables(
             nodes=tree.nodes,
             links=tree.links,
@@ -94,13 +94,9 @@ class PatchSurface:
 
     def sample(self, count: int) -> tuple[Array, Array]:
         """At least `count` places (n, 3) spread over the area, and the outward normals (n, 3) there."""
-        share = count * self._area / self._area.sum()
-        before = np.floor(np.cumsum(share) - share + 0.5).astype(np.int64)
-        wanted = np.diff(np.append(before, max(count, before[-1])))
-        owner = np.repeat(np.arange(len(share)), wanted)
-        within = np.arange(len(owner)) - np.repeat(np.cumsum(wanted) - wanted, wanted)
-        s, t = (within + 0.5) / wanted[owner] - 0.5, (within * 0.6180339887498949 + 0.5) % 1.0 - 0.5
-        places, _, _ = self._pieces.at(owner, s, t)
+        owner = shares_of(self._area, count)
+        s, t = spread_within(owner)
+        places, _, _ = self._pieces.at(owner, s - 0.5, t - 0.5)
         return places, self.project(places).normal
 
 
@@ -115,10 +111,3 @@ def _areas(pieces: PatchPieces, middle_mm: Array) -> tuple[Array, Array]:
             area += weight_s * weight_t * np.linalg.norm(normal, axis=1)
             flux += weight_s * weight_t * ((value - middle_mm) * normal).sum(axis=1)
     return area, flux
-
-
-def _bounding(rows: Array) -> tuple[Array, Array]:
-    """Boxes along x, y and z around those of the pieces: low (p, 3) and high (p, 3)."""
-    middle, axes, half = rows[:, BOX_MIDDLE:BOX_AXES], rows[:, BOX_AXES:BOX_HALF].reshape(-1, 3, 3), rows[:, BOX_HALF : BOX_HALF + 3]
-    reach = np.einsum("pa,pad->pd", half, np.abs(axes)) * (1 + 1e-12)
-    return middle - reach, middle + reach

@@ -8,6 +8,7 @@ from inspection.kernels.surfaces import TriangleTables, project_on_triangles
 from inspection.kernels.surfaces.layout import CLUSTER_ROWS, CORNER_A, EDGE_AB, EDGE_AC, PER_AB, PER_AC, PER_BC, PER_NORMAL, WAYS
 from inspection.surface.feet import KILOMETRE_MM, SurfaceFeet, points_in_space, surface_feet
 from inspection.surface.item_tree import item_tree
+from inspection.surface.spread import shares_of, spread_within
 from inspection.surface.welding import WeldedTriangles, weld
 
 Array = NDArray[np.float64]
@@ -61,14 +62,8 @@ class TriangleSurface:
         """At least `count` places (n, 3) spread over the area, and the normals (n, 3) there: each triangle is cut into like ones."""
         corners = self.welded.corners_mm[self.welded.triangles]
         a, e, g = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-        area = np.linalg.norm(np.cross(e, g), axis=1) / 2
-        share = count * area / area.sum()  # an even walk through the area gives each triangle its share of places
-        before = np.floor(np.cumsum(share) - share + 0.5).astype(np.int64)
-        wanted = np.diff(np.append(before, max(count, before[-1])))
-        owner = np.repeat(np.arange(len(a)), wanted)
-        within = np.arange(len(owner)) - np.repeat(np.cumsum(wanted) - wanted, wanted)
-        first = (within + 0.5) / wanted[owner]
-        second = (within * 0.6180339887498949 + 0.5) % 1.0  # the golden section spreads them in the other direction
+        owner = shares_of(np.linalg.norm(np.cross(e, g), axis=1), count)
+        first, second = spread_within(owner)
         root = np.sqrt(first)
         places = a[owner] + (root * (1 - second))[:, None] * e[owner] + (root * second)[:, None] * g[owner]
         return places, self._tables.normals.reshape(-1, 3)[owner]

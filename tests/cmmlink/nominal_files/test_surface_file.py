@@ -53,7 +53,7 @@ def test_trimmed_faces_come_as_triangles_whose_bound_holds_and_is_told(cad_files
 
 
 def test_a_mesh_is_taken_as_it_is_and_what_it_stands_for_is_asked(tmp_path: Path) -> None:
-    square = np.array([[(0, 0, 0), (100, 0, 0), (100, 50, 0)], [(0, 0, 0), (100, 50, 0), (0, 50, 0)]], dtype=np.float32)
+    square = np.array([[(0, 0, 0), (100, 0, 0), (100, 50, 0)], [(0, 0, 0), (100, 50, 0), (0, 50, 0)]], dtype=np.float64)
     path = write(tmp_path / "sheet.stl", binary_stl(square))
     found = load_surface(path)
     assert isinstance(found.nominal, TriangleSurface)
