@@ -2,7 +2,7 @@
 
 import logging
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from itertools import islice
@@ -10,6 +10,7 @@ from itertools import islice
 from cmmlink.console.protocol import AlarmList, AlarmRow, Severity
 from cmmlink.console.refused import without_folders
 from cmmlink.events import Answered, Arrived, Event, Judged, RunFinished, RunStarted
+from cmmlink.words import anchor_words
 from drivers import Damaged, LinkDown, LinkUp, Lost, Rejected
 
 _log = logging.getLogger(__name__)
@@ -74,6 +75,12 @@ class Alarms:
                 )
                 self._drop_oldest()
             self._publish()
+
+    def take_anchors(self, anchors: Sequence[Mapping[str, str]]) -> None:
+        """Warn of the places outside that were not told how the run ended; its verdict stands."""
+        for told in anchors:
+            if told["problem"]:
+                self.raise_alarm("warning", "An anchor was not told", anchor_words(told["place"], told["problem"]))
 
     def acknowledge(self, number: int | None = None) -> int:
         """Mark one alarm, or all, as seen; returns how many were not seen before."""

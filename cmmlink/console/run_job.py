@@ -13,7 +13,6 @@ from cmmlink.errors import PlanError, StoreError
 from cmmlink.events import Answered, Event, Sink
 from cmmlink.run import carry_out
 from cmmlink.run_view import RunView
-from cmmlink.words import anchor_words
 from drivers import DeviceError
 
 _log = logging.getLogger(__name__)
@@ -61,9 +60,7 @@ def measure(job: Job, view: RunView, checked: CheckedPlan, setup: StationSetup, 
         job.detach()
     if finished.evidence is not None:
         view.name_record(finished.evidence.run)
-        for told in finished.evidence.anchors:
-            if told["problem"]:
-                alarms.raise_alarm("warning", "An anchor was not told", anchor_words(told["place"], told["problem"]))
+        alarms.take_anchors(finished.evidence.anchors)
     try:
         setup.write(plan, finished)
     except PlanError as error:

@@ -85,3 +85,10 @@ def test_an_answer_that_was_not_sent_is_a_fault_and_one_that_was_is_none(alarms:
     alarms(Answered("not sent", 7, moment, "no folder"))
     told = [(alarm.what, alarm.severity) for alarm in alarms.newest_first()]
     assert told == [("Not sent to the machine", "fault"), ("Earlier answer to the machine not withdrawn", "fault")]
+
+
+def test_an_anchor_that_was_not_told_is_a_warning_and_no_fault(alarms: Alarms) -> None:
+    alarms.take_anchors([{"place": "heads.txt", "problem": ""}, {"place": "far.txt", "problem": "it did not answer within 5 s"}])
+    (alarm,) = alarms.newest_first()
+    assert (alarm.severity, alarm.what, alarms.fault) == ("warning", "An anchor was not told", False)
+    assert "far.txt: it did not answer" in alarm.detail
