@@ -29,14 +29,14 @@ from tests.integration.killed import record_machine
 from tests.integration.simulated import Simulated, simulated
 from tests.integration.split_off import split_off
 
-TURN = np.linspace(0.0, 2.0 * np.pi, 4001)
+TURN = np.linspace(0.0, 2.0 * np.pi, 1001)
 PART_MM = np.column_stack([40.0 * np.cos(TURN) + 4.0 * np.cos(2.0 * TURN), 15.0 * np.sin(TURN)])
 LENGTH_MM = float(np.hypot(*np.diff(PART_MM, axis=0).T).sum())
 STEP_MM, RATE_HZ, RADIUS_MM = 0.25, 2000.0, 1.5
 COUNT = round(LENGTH_MM / STEP_MM)
 _OUTWARD = np.gradient(PART_MM[:, 1]), -np.gradient(PART_MM[:, 0])
 _COLUMNS = [*PART_MM.T, np.zeros(len(PART_MM)), *(_OUTWARD / np.hypot(*_OUTWARD)), np.zeros(len(PART_MM))]
-[COURSE] = scans_on_curve(np.column_stack(_COLUMNS)[:-1:20], closed=True)
+[COURSE] = scans_on_curve(np.column_stack(_COLUMNS)[:-1:5], closed=True)
 JOB = DmeJob(PointCheck(RADIUS_MM, 0.001, 50.0), (COURSE,), preparations=(curve_density(STEP_MM, 10.0),))
 PLAN = """\
 part: {{name: oval}}
@@ -60,7 +60,7 @@ def measured(
     before: Callable[[str], None] = lambda _: None,
 ) -> tuple[int, dict[str, Any], str]:
     """Exit status, result and messages of a run against a simulated device; the same options are the same part."""
-    np.savetxt(folder / "nominal.csv", PART_MM[::40], delimiter=",")
+    np.savetxt(folder / "nominal.csv", PART_MM[::10], delimiter=",")
     with simulated(
         name,
         "127.0.0.1:0",
@@ -271,7 +271,7 @@ def test_a_machine_that_is_not_homed_is_sent_home_where_the_plan_allows_it(tmp_p
 
 
 def test_a_test_of_the_device_asks_the_machine_and_moves_nothing(tmp_path: Path) -> None:
-    np.savetxt(tmp_path / "nominal.csv", PART_MM[::40], delimiter=",")
+    np.savetxt(tmp_path / "nominal.csv", PART_MM[::10], delimiter=",")
     with simulated("dme", "127.0.0.1:0", tmp_path, *PART, path_mm=PART_MM) as machine:
         device = DME.format(address=machine.address)
         (tmp_path / "plan.yaml").write_text(PLAN.format(device=device, radius=RADIUS_MM), encoding="utf-8")
@@ -301,8 +301,8 @@ def test_a_course_that_no_single_line_holds_is_scanned_piece_by_piece(tmp_path: 
 
 @pytest.mark.parametrize("order", [1, -1])
 def test_an_open_profile_is_scanned_from_end_to_end(order: int, tmp_path: Path) -> None:
-    half_mm = PART_MM[:2001]  # from the right end over the top to the left one, the material on its left
-    np.savetxt(tmp_path / "nominal.csv", half_mm[:: 40 * order], delimiter=",")
+    half_mm = PART_MM[:501]  # from the right end over the top to the left one, the material on its left
+    np.savetxt(tmp_path / "nominal.csv", half_mm[:: 10 * order], delimiter=",")
     with simulated("dme", "127.0.0.1:0", tmp_path, *PART, "--open", path_mm=half_mm, noise_mm=0.001) as machine:
         side = "left" if order == 1 else "right"
         plan = PLAN.format(device=DME.format(address=machine.address), radius=RADIUS_MM)
@@ -324,7 +324,7 @@ AROUND = "start_mm: [20, 0, 0], start_direction: [1, 0, 0], towards_mm: [19.9, 2
 )
 def test_a_round_part_is_scanned_by_its_axis_or_as_a_contour_that_nobody_knows(scan: str, points: int | None, tmp_path: Path) -> None:
     circle_mm = 20.0 * np.column_stack([np.cos(TURN), np.sin(TURN)])
-    np.savetxt(tmp_path / "nominal.csv", circle_mm[::20], delimiter=",")
+    np.savetxt(tmp_path / "nominal.csv", circle_mm[::5], delimiter=",")
     with simulated("dme", "127.0.0.1:0", tmp_path, *PART, path_mm=circle_mm, noise_mm=0.001) as machine:
         device = f"{{type: dme, address: '{machine.address}', scan: {{{scan}}}}}"
         plan = PLAN.format(device=device, radius=RADIUS_MM) + "registration: {fit: none}\n"
