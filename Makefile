@@ -7,7 +7,7 @@ INSTALL := $(PIP) --no-build-isolation --editable
 # The tests start a hundred processes; where Python may keep no compiled files, each of them compiles every file anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo install test checks compiled lowest lowest-compiled lowest-drivers platforms upgrade bench slower paper faults powercuts kills fuzz soak damage memory elsewhere proofs stops machines laws audit reference uncertainty supply-chain docs bundle page-tools screenshots
+.PHONY: demo install test checks compiled lowest lowest-compiled lowest-drivers platforms upgrade bench slower paper faults powercuts kills fuzz soak damage memory elsewhere proofs mutants stops machines laws audit reference uncertainty supply-chain docs bundle page-tools screenshots
 demo: .venv/installed
 	$(BIN)/cmmlink demo --out demo-result
 
@@ -136,6 +136,10 @@ proofs: .venv/test-installed
 # A million points with faults by I++ DME and by text lines of a machine tool: no wrong one, and what is missing is told.
 machines: .venv/test-installed
 	$(BIN)/python -m tests.benchmarks.machine_faults 1e6
+
+# Copies of the program with one line changed qualify themselves: each mistake must be found, and named by its kind.
+mutants: .venv/test-installed
+	$(BIN)/python -m tests.benchmarks.qualified_mutants
 
 # How soon a measuring machine is told to stop, and how much of the scans of 100 bad parts stop_when_failed saves.
 stops: .venv/test-installed

@@ -145,7 +145,7 @@ def _is_compiled(name: str) -> bool:
 
 def _stamps(paths: Iterable[str]) -> str:
     """A hash of the sizes and times of files and folders; empty where one of them is gone."""
-    told = array("Q")
+    told = array("q")
     try:
         for path in paths:
             found = os.stat(path)
