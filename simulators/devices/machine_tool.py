@@ -16,7 +16,7 @@ from simulators.answers import STOPPED, await_answer
 from simulators.faults import Injector
 from simulators.line import open_line_of_control
 from simulators.motion import walk
-from simulators.settings import LAST_REQUEST, Announce, SimulatorSettings
+from simulators.settings import LAST_REQUEST, Announce, SimulatorSettings, refuse_answer
 from simulators.stream import Device, Sample, stream
 
 _MM_PER_INCH = 25.4
@@ -220,6 +220,9 @@ def serve(settings: SimulatorSettings, announce: Announce, control: type[Inspect
     if request is None and settings.answer is not None:
         request = int(time.time()) % LAST_REQUEST + 1
     if control is PrintingControl and settings.line:
+        refuse_answer(settings)
+        if injector.expects("tool-change"):
+            raise ValueError("fault 'tool-change' strikes no device that prints --line: nobody changes its tool")
         made: InspectingControl = OwnLines(settings.line, nominal_mm, outward, quirks, injector, request)
     else:
         made = control(nominal_mm, outward, settings.motion.tip_radius_mm, quirks, injector, request)

@@ -1,10 +1,13 @@
 """What a simulated machine tool prints, byte for byte as the transcripts of the language say."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from simulators.devices.machine_tool import InspectingControl, OwnLines, PrintingControl, Quirks, bare, dprnt, short
+from simulators.devices.machine_tool import InspectingControl, OwnLines, PrintingControl, Quirks, bare, dprnt, serve_dprnt, short
 from simulators.faults import Fault, Injector
+from simulators.settings import settings_from
 from simulators.stream import Sample
 from tests.drivers.codecs.g800_transcript import INCHES, POINTS, RADIUS_MM
 
@@ -61,3 +64,38 @@ def test_a_camera_sends_the_lines_that_it_was_told() -> None:
 def test_a_line_that_cannot_be_filled_in_is_refused(line: str) -> None:
     with pytest.raises(ValueError, match="expected ASCII with the fields number, x, y and z"):
         camera(line)
+
+
+def test_a_control_that_asks_prints_the_number_of_its_request_first() -> None:
+    asking = InspectingControl(NOMINAL_MM, OUTWARD, RADIUS_MM, Quirks(old_set=True), Injector([], 0), request=4711)
+    old, _, own = asking.opening(2).partition(b"REQUEST    4711\r\n")
+    assert old.endswith(b"END\r\n")
+    assert own.startswith(b"\x12START\r\n")
+    plain = PrintingControl(NOMINAL_MM, OUTWARD, RADIUS_MM, Quirks(), Injector([], 0), request=9_999_999)
+    assert plain.opening(2) == b"\x12\r\nREQUEST 9999999\r\n"
+    assert b"REQUEST" not in control(Quirks()).opening(2)
+
+
+def test_behind_an_emergency_stop_nothing_is_printed() -> None:
+    for kind in (InspectingControl, PrintingControl):
+        stopped = control(Quirks(), "emergency-stop@1", kind=kind)
+        assert stopped.frame(SAMPLES[:1])
+        assert not stopped.stands
+        assert stopped.frame(SAMPLES[1:]) + stopped.closing(2) == b""
+        assert stopped.stands
+
+
+def test_a_larger_ball_touches_from_farther_away() -> None:
+    changed = control(Quirks(), "tool-change@1")
+    assert changed.frame(SAMPLES[:1]) == control(Quirks()).frame(SAMPLES[:1])
+    before, behind = (made.frame(SAMPLES[1:]).splitlines()[1].decode("ascii") for made in (control(Quirks()), changed))
+    assert before == f"G801 N2 X{bare(-0.3655 * 25.4, 4)} Y{bare(0.5 * 25.4, 4)} Z.0000 R{bare(RADIUS_MM, 4)}"
+    assert behind == f"G801 N2 X{bare(-0.3655 * 25.4 + 0.5, 4)} Y{bare(0.5 * 25.4, 4)} Z.0000 R{bare(RADIUS_MM + 0.5, 4)}"
+
+
+@pytest.mark.parametrize("options", [("--answer", "O9100.nc"), ("--request", "7"), ("--fault", "tool-change")])
+def test_a_camera_asks_for_no_verdict_and_has_no_tool(options: tuple[str, str], tmp_path: Path) -> None:
+    (tmp_path / "path.csv").write_text("0,0\n1,0\n0,1\n", encoding="utf-8")
+    words = ["--address", "127.0.0.1:0", "--path", str(tmp_path / "path.csv"), "--line", "{x};{y}", *options]
+    with pytest.raises(ValueError, match=r"machine tools|nobody changes its tool"):
+        serve_dprnt(settings_from(words), lambda _: None)
