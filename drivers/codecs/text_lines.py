@@ -5,7 +5,7 @@ are, and NUL) mean nothing here, and may stand anywhere. Where seven data bits a
 here: the systems' serial ports do not tell of it. A line that holds any other character is damaged as a whole.
 
 Numbers are as DPRNT prints them: leading zeros may be missing or blanks, also between the sign and the first digit, and the point may be
-missing where no decimals were asked for.
+missing where no decimals were asked for. In a field of a pattern an exponent may follow, as computers print it.
 """
 
 import re
@@ -17,6 +17,7 @@ MM_PER_UNIT: Mapping[str, float] = MappingProxyType({"mm": 1.0, "inch": 25.4})
 NUMBER = r"[+-]? *(?:[0-9]{1,9}(?:\.[0-9]{0,9})?|\.[0-9]{1,9})"
 _REQUEST = re.compile(r"0*[1-9][0-9]{0,6}")  # controls hold seven digits exactly
 NO_REQUEST = "line whose number of a request is none from 1 to 9999999"
+_FIELD = re.compile(rf"{NUMBER}(?:[eE][+-]?0{{0,2}}[0-9])?")  # computers print exponents, controls do not
 _UNSEEN_BYTES = bytes((0x00, 0x11, 0x12, 0x13, 0x14))
 _PRINTABLE = bytes(range(0x20, 0x7F))
 _WITHOUT_PARITY = bytes(byte & 0x7F for byte in range(256))
@@ -38,9 +39,9 @@ FEATURES = (
 
 
 def number_of(text: str) -> float | None:
-    """Return the number that stands in a field; None where none does."""
+    """Return the number that stands in a field, which may end with an exponent of one digit; None where none does."""
     bare = text.strip(" ")
-    return float(bare.replace(" ", "")) if re.fullmatch(NUMBER, bare) else None
+    return float(bare.replace(" ", "")) if _FIELD.fullmatch(bare) else None
 
 
 def request_in(text: str) -> int | None:

@@ -52,6 +52,22 @@ def test_what_the_pattern_does_not_describe_is_damage_unless_it_is_passed_over()
     assert decoded(PatternDecoder(NUMBERED, "mm", end="M30"), data).total("Damaged") == len("O1234(PROBE)N 2 X1.2.3 Z0.N 3 X. Z0.") + 4
 
 
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [("1.5E+01", 15.0), ("-2.5e-001", -0.25), ("+0012.345", 12.345), ("3e2", 300.0), ("\t7.5", 7.5), ("1e10", None), ("1e", None)],
+)
+def test_numbers_of_computers_are_read_beside_those_of_controls(text: str, value: float | None) -> None:
+    book = decoded(PatternDecoder("(?P<seq>[0-9]+);(?P<x>[^;]+);(?P<y>[^;]+)", "mm", end="M30"), lines(f"1;{text};0"))
+    assert book.points_mm == ([] if value is None else [(value, 0.0, 0.0)])
+    assert (book.total("Damaged") > 0) == (value is None)
+
+
+@pytest.mark.parametrize("text", ["1,5", "1.234,5", "nan", "inf", "0x1F", "1_000", "--1", "1.5.2", "ERR", "*****"])
+def test_what_is_no_number_of_anybody_gives_no_point(text: str) -> None:
+    book = decoded(PatternDecoder("(?P<seq>[0-9]+);(?P<x>[^;]+);(?P<y>[^;]+)", "mm", end="M30"), lines(f"1;{text};0"))
+    assert (book.points_mm, book.total("Damaged")) == ([], len(f"1;{text};0") + 1)
+
+
 def test_a_print_out_of_features_is_refused_by_name() -> None:
     with pytest.raises(ProtocolError, match="prints features"):
         PatternDecoder(NUMBERED, "mm", end="M30", pass_over="-+").feed(PRINT_OUT)
