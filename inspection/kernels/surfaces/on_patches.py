@@ -126,16 +126,15 @@ def _square_from_box(rows: Any, row: int, x: float, y: float, z: float) -> float
     return square
 
 
-@inner_kernel
-def normal_at(rows: Any, row: int, width: int, s: float, t: float) -> tuple[float, float, float]:
-    """The unit normal out of material at a place of a piece; at a pole that of a place beside it."""
-    for _ in range(3):
-        px, py, pz = piece_at(rows, row, width, s, t)
+@inlined_kernel
+def _normal(px: Any, py: Any, pz: Any, rows: Any, row: int, width: int, s: float, t: float) -> tuple[float, float, float]:
+    """The unit normal out of material at a place of a piece by its derivatives; at a pole that of a place beside it."""
+    nx, ny, nz = py[1] * pz[2] - pz[1] * py[2], pz[1] * px[2] - px[1] * pz[2], px[1] * py[2] - py[1] * px[2]
+    length = np.sqrt(nx * nx + ny * ny + nz * nz)
+    if length <= _DEGENERATE * rows[row + M10] * rows[row + M01]:
+        px, py, pz = piece_at(rows, row, width, s * (1.0 - _INWARD), t * (1.0 - _INWARD))
         nx, ny, nz = py[1] * pz[2] - pz[1] * py[2], pz[1] * px[2] - px[1] * pz[2], px[1] * py[2] - py[1] * px[2]
         length = np.sqrt(nx * nx + ny * ny + nz * nz)
-        if length > _DEGENERATE * rows[row + M10] * rows[row + M01]:
-            break
-        s, t = s * (1.0 - _INWARD), t * (1.0 - _INWARD)
     outward = rows[row + PIECE_OUTWARD] / length
     return nx * outward, ny * outward, nz * outward
 
@@ -148,7 +147,7 @@ def _store_foot(x: float, y: float, z: float, tables: Any, piece: int, s: float,
     px, py, pz = piece_at(rows, row, width, s, t)
     dx, dy, dz = x - px[0], y - py[0], z - pz[0]
     distance = np.sqrt(dx * dx + dy * dy + dz * dz)
-    nx, ny, nz = normal_at(rows, row, width, s, t)
+    nx, ny, nz = _normal(px, py, pz, rows, row, width, s, t)
     push_s, push_t = dx * px[1] + dy * py[1] + dz * pz[1], dx * px[2] + dy * py[2] + dz * pz[2]
     grain = tables.grain_mm
     beyond_s = abs(s) == HALF and push_s * s > grain * np.sqrt(px[1] * px[1] + py[1] * py[1] + pz[1] * pz[1])

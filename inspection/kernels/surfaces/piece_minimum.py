@@ -33,6 +33,7 @@ _FINEST = 1e-8  # half a side of a rectangle that is taken for a point
 _CONVEX = 0.02  # part of the metric that curvature must leave over
 _DETERMINANT = 0.9
 _AS_NEAR = 2e-10  # times the distance: what a square must be less by to be looked for; 1e-10 mm of distance
+_MANY, _MORE = 4096, 128  # rectangles after which what is ten times less near will do, and again: at the middle of a sphere
 _STILL_MM = 1e-12  # a step after which nothing changes; in mm, since the round-off of s and t grows as a piece gets narrower
 _UPHILL, _UPHILL_MM2 = 1.0 + 1e-12, 1e-24  # by less a square of a distance grows through round-off alone
 
@@ -68,7 +69,7 @@ def piece_at(rows: Any, row: int, width: int, s: float, t: float) -> tuple[tuple
 
 @inner_kernel
 def _square_at(rows: Any, row: int, width: int, x: float, y: float, z: float, s: float, t: float) -> tuple[float, ...]:
-    """Square of the distance, then half its gradient (2), half its Hessian (ss, st, tt), and the metric's S_s . S_s and S_t . S_t."""
+    """Square of the distance, half its gradient (2), half its Hessian (ss, st, tt), and the squares of S_s, S_t, S_ss, S_st, S_tt."""
     px, py, pz = piece_at(rows, row, width, s, t)
     rx, ry, rz = px[0] - x, py[0] - y, pz[0] - z
     g = rx * px[1] + ry * py[1] + rz * pz[1]
@@ -78,18 +79,18 @@ def _square_at(rows: Any, row: int, width: int, x: float, y: float, z: float, s:
     a = e + rx * px[3] + ry * py[3] + rz * pz[3]
     b = px[1] * px[2] + py[1] * py[2] + pz[1] * pz[2] + rx * px[4] + ry * py[4] + rz * pz[4]
     c = k + rx * px[5] + ry * py[5] + rz * pz[5]
-    return rx * rx + ry * ry + rz * rz, g, h, a, b, c, e, k
+    ss = px[3] * px[3] + py[3] * py[3] + pz[3] * pz[3]
+    st = px[4] * px[4] + py[4] * py[4] + pz[4] * pz[4]
+    tt = px[5] * px[5] + py[5] * py[5] + pz[5] * pz[5]
+    return rx * rx + ry * ry + rz * rz, g, h, a, b, c, e, k, ss, st, tt
 
 
-@inner_kernel
-def _strays(rows: Any, row: int, width: int, distance: float, s: float, t: float, hs: float, ht: float) -> tuple[float, float, float]:
-    """How far the Hessian's a, b and c may stray from their values at (s, t) over a rectangle of half sides hs and ht."""
-    px, py, pz = piece_at(rows, row, width, s, t)
-    su = np.sqrt(px[1] * px[1] + py[1] * py[1] + pz[1] * pz[1])
-    sv = np.sqrt(px[2] * px[2] + py[2] * py[2] + pz[2] * pz[2])
-    suu = np.sqrt(px[3] * px[3] + py[3] * py[3] + pz[3] * pz[3])
-    suv = np.sqrt(px[4] * px[4] + py[4] * py[4] + pz[4] * pz[4])
-    svv = np.sqrt(px[5] * px[5] + py[5] * py[5] + pz[5] * pz[5])
+@inlined_kernel
+def _strays(
+    rows: Any, row: int, distance: float, e: float, k: float, ss: float, st: float, tt: float, hs: float, ht: float
+) -> tuple[float, float, float]:
+    """How far the Hessian may stray over a rectangle of half sides hs and ht, by the squares of the derivatives in its middle."""
+    su, sv, suu, suv, svv = np.sqrt(e), np.sqrt(k), np.sqrt(ss), np.sqrt(st), np.sqrt(tt)
     du, dv = rows[row + M20] * hs + rows[row + M11] * ht, rows[row + M11] * hs + rows[row + M02] * ht
     dr = rows[row + M10] * hs + rows[row + M01] * ht
     da, db = rows[row + M30] * hs + rows[row + M21] * ht, rows[row + M21] * hs + rows[row + M12] * ht
@@ -109,28 +110,30 @@ def closest_on_piece(rows: Any, row: int, width: int, x: float, y: float, z: flo
     best, best_s, best_t = np.inf, 0.0, 0.0
     at = SCRATCH
     memory[at], memory[at + 1], memory[at + 2], memory[at + 3] = 0.0, 0.0, HALF, HALF
-    waiting = 1
+    waiting, looked_at, as_near = 1, 0, _AS_NEAR
     while waiting:
-        waiting -= 1
+        waiting, looked_at = waiting - 1, looked_at + 1
+        if looked_at > _MANY and looked_at % _MORE == 0:
+            as_near *= 10.0
         at = SCRATCH + RECTANGLE_WIDTH * waiting
         s, t, hs, ht = memory[at], memory[at + 1], memory[at + 2], memory[at + 3]
-        square, g, h, a, b, c, e, k = _square_at(rows, row, width, x, y, z, s, t)
+        square, g, h, a, b, c, e, k, ss, st, tt = _square_at(rows, row, width, x, y, z, s, t)
         if square < best:
             best, best_s, best_t = square, s, t
         distance = np.sqrt(square)
-        wanted = best - _AS_NEAR * np.sqrt(best)
+        wanted = best - as_near * np.sqrt(best)
         nearest = max(distance - rows[row + M10] * hs - rows[row + M01] * ht, 0.0)
         if nearest * nearest > wanted:
             continue
-        stray_a, stray_b, stray_c = _strays(rows, row, width, distance, s, t, hs, ht)
+        stray_a, stray_b, stray_c = _strays(rows, row, distance, e, k, ss, st, tt, hs, ht)
         low_a, low_c, high_b = a - stray_a, c - stray_c, abs(b) + stray_b
         if low_a > _CONVEX * e and low_c > _CONVEX * k and _DETERMINANT * low_a * low_c > high_b * high_b:
-            found, fs, ft = _newton(rows, row, width, x, y, z, s, t, hs, ht)
+            found, fs, ft = _newton(rows, row, width, x, y, z, s, t, hs, ht, (square, g, h, a, b, c))
             if found < best:
                 best, best_s, best_t = found, fs, ft
             continue
         down_s, down_t = s + _downhill(g, a, hs), t + _downhill(h, c, ht)
-        lower, _, _, _, _, _, _, _ = _square_at(rows, row, width, x, y, z, down_s, down_t)
+        lower = _square_at(rows, row, width, x, y, z, down_s, down_t)[0]
         if lower < best:
             best, best_s, best_t = lower, down_s, down_t
         gain = _gain(g, low_a, hs) + _gain(h, low_c, ht) + 2.0 * high_b * hs * ht
@@ -173,15 +176,27 @@ def _halve(memory: Any, waiting: int, s: float, t: float, hs: float, ht: float, 
 
 @inner_kernel
 def _newton(
-    rows: Any, row: int, width: int, x: float, y: float, z: float, middle_s: float, middle_t: float, hs: float, ht: float
+    rows: Any,
+    row: int,
+    width: int,
+    x: float,
+    y: float,
+    z: float,
+    middle_s: float,
+    middle_t: float,
+    hs: float,
+    ht: float,
+    there: tuple[float, float, float, float, float, float],
 ) -> tuple[float, float, float]:
     """The minimum over a rectangle on which the square of the distance is convex, by Newton's method with the sides as walls.
 
     A side holds while the gradient pushes against it. A step that leads uphill is halved.
+
+    there : what `_square_at` gives in the middle, the first six of it
     """
     low_s, high_s, low_t, high_t = middle_s - hs, middle_s + hs, middle_t - ht, middle_t + ht
     s, t = middle_s, middle_t
-    square, g, h, a, b, c, _, _ = _square_at(rows, row, width, x, y, z, s, t)
+    square, g, h, a, b, c = there
     for _ in range(_NEWTON_STEPS):
         held_s = (s <= low_s and g > 0.0) or (s >= high_s and g < 0.0)
         held_t = (t <= low_t and h > 0.0) or (t >= high_t and h < 0.0)
@@ -203,11 +218,11 @@ def _newton(
         following_s, following_t = min(max(s + ds, low_s), high_s), min(max(t + dt, low_t), high_t)
         if abs(following_s - s) * rows[row + M10] <= _STILL_MM and abs(following_t - t) * rows[row + M01] <= _STILL_MM:
             break
-        found, g_there, h_there, a_there, b_there, c_there, _, _ = _square_at(rows, row, width, x, y, z, following_s, following_t)
+        found, g_there, h_there, a_there, b_there, c_there = _square_at(rows, row, width, x, y, z, following_s, following_t)[:6]
         halvings = 0
         while found > square * _UPHILL + _UPHILL_MM2 and halvings < _HALVINGS:
             following_s, following_t = 0.5 * (s + following_s), 0.5 * (t + following_t)
-            found, g_there, h_there, a_there, b_there, c_there, _, _ = _square_at(rows, row, width, x, y, z, following_s, following_t)
+            found, g_there, h_there, a_there, b_there, c_there = _square_at(rows, row, width, x, y, z, following_s, following_t)[:6]
             halvings += 1
         s, t, square, g, h, a, b, c = following_s, following_t, found, g_there, h_there, a_there, b_there, c_there
     return square, s, t
