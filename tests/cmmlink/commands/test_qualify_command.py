@@ -14,7 +14,7 @@ from cmmlink.commands import setup
 from cmmlink.installation import Installation
 from cmmlink.last_qualification import LastQualification, keep_as_last, last_qualification
 from cmmlink.qualification import certificate, is_unaltered, wire
-from cmmlink.qualification.wire import WireToVerdict, scan_on_the_wire
+from cmmlink.qualification.wire import RATE_HZ, WireToVerdict, scan_on_the_wire
 from cmmlink.qualification_keys import Qualified
 from cmmlink.reference import ReferenceCase
 from tests.cmmlink.command import cmmlink as run
@@ -55,6 +55,9 @@ def test_a_sound_installation_passes_and_its_certificate_tells_why(station: Path
     Qualified.model_validate_json(json.dumps(told))
     assert is_unaltered(told)
     assert (told["result"], told["outside"], told["set"]["cases"]) == ("passed", [], len(NAMES))
+    wire_told = told["wire"]
+    assert (wire_told["rate_hz"], wire_told["sent"], wire_told["received"]) == (RATE_HZ, 300, 300)
+    assert 0 <= wire_told["latency_ms"]["median"] <= wire_told["latency_ms"]["p99"] <= wire_told["latency_ms"]["largest"]
     last = last_qualification(station)
     assert last is not None
     assert (last.result, last.certificate_sha256, last.certificate) == ("passed", told["certificate_sha256"], str(written))
@@ -86,14 +89,16 @@ def test_an_installation_outside_a_limit_fails_with_status_1_and_that_is_the_las
         raise OSError("no process can be started")
 
     monkeypatch.setattr(wire, "simulated_device", no_process)
+    monkeypatch.setattr(cmmlink.reference, "reference_cases", tuple)
     ended = run("qualify", "--json")
     told = ended.json()
-    assert (ended.code, told["result"], told["outside"]) == (1, "failed", ["wire to verdict"])
+    every = ["deviation", "pose", "zone", "filter", "characteristics", "wire to verdict"]
+    assert (ended.code, told["result"], told["outside"]) == (1, "failed", every), "of what was not looked at nothing is known"
     assert told["problems"] == ["wire: no process can be started"]
     Qualified.model_validate_json(json.dumps(told))
     last = last_qualification(station)
     assert last is not None
-    assert (last.result, list(last.outside)) == ("failed", ["wire to verdict"])
+    assert (last.result, list(last.outside)) == ("failed", every)
 
 
 def test_one_that_is_broken_off_leaves_the_last_one_in_its_place(station: Path, monkeypatch: pytest.MonkeyPatch) -> None:
