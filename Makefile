@@ -150,6 +150,11 @@ laws: .venv/test-installed
 	$(BIN)/pytest --hypothesis-profile=laws --timeout 7200 tests/integration/test_laws.py tests/integration/test_laws_of_files.py \
 		tests/inspection/test_coarse.py
 
+# Two hundred sound runs of every kind, exported and checked by docs/verify/verify.py, which may call nothing untrue; then some are altered.
+RUNS ?= 200
+verifier: .venv/test-installed
+	$(BIN)/python -m tests.docs.sound_runs $(RUNS)
+
 # The audit of verdicts: live scans, minimum zones, partial scans and mirrored parts whose truth is known.
 audit: .venv/test-installed
 	$(BIN)/python -m tests.benchmarks.verdict_audit

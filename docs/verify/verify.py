@@ -1,26 +1,27 @@
 """Check an inspection run without the program that made it.
 
-    python verify.py FOLDER [--head SHA256]
+    python verify.py FOLDER [--head SHA256] [--key HEX]
 
-FOLDER is what `cmmlink export RUN --out FOLDER` wrote. This file needs Python 3.11 and numpy, imports nothing of cmmlink and shares no
-algorithm with it. It says in words what it proved, what is not true, and what it did not check. Exit status: 0 nothing is untrue,
-1 something is, 2 the evidence cannot be read. --head is the hash that was printed in the report, or sent elsewhere, on the day.
-
-The formulas, in the order in which they are used:
+FOLDER is what `cmmlink export RUN --out FOLDER` wrote. This file needs Python 3.11 and numpy, and shares nothing with cmmlink. It says
+what it proved, what is not true, and what it did not check. Exit status: 0 nothing is untrue, 1 something is, 2 the evidence cannot be
+read. --head is the hash that left the station on the day, by the report or otherwise; --key is the station's public key, or the first 16
+digits of its SHA-256, as you were given it beforehand. The formulas, in their order:
 
     chain       hash_k = SHA-256(hash_{k-1}, number, run, kind, time, count, length, body)
+    signature   s B = R + SHA-512(R, key, message) A on the curve -x^2 + y^2 = 1 + d x^2 y^2 (Ed25519, RFC 8032)
     placement   p = R(angle) s + t, where s are the coordinates of a point in the section's plane
     deviation   d = sign * min_u |p - C(u)| - r, positive out of material; r is the radius of the probe's tip, 0 for surface points
     station     s(u) = integral of |C'| from the start of the curve
     coverage    sum of the gaps between neighbouring stations that are no longer than allowed, by the length of the curve
     refutation  |d(p) - d(q)| <= |p - q|. So a box of placements, in which point i moves by at most m_i, holds none that passes where
-                d_i - m_i > upper limit or d_i + m_i < lower limit for one i. Boxes that are not refuted are halved.
+                d_i is by more than m_i out of the loosest limits that it may meet, for one i. Boxes that are not refuted are halved.
 """
 
 import csv
 import hashlib
 import json
 import math
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -28,65 +29,49 @@ from typing import Any
 import numpy as np
 
 Array = Any  # of numpy; docstrings give the shapes
-Bodies = dict[str, list[bytes]]  # of the records, by kind
-Plan = dict[str, Any]  # values by their dotted paths
-
-SAME_MM = 1e-9  # two numbers of millimetres that differ by less are taken as one
-SMALLEST_MM, MOST_BOXES = 1e-6, 100_000  # boxes of placements are halved until points move by less in them, or there are more
-ZONE = ("lower_mm", "upper_mm", "uncertainty_mm")
-OTHER_REASONS = ("begun-anew", "announced", "fit", "outline", "ends")
-ORDER = ["conform", "uncertain", "nonconform"]  # from the best verdict to the worst
-GAUSS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(16)
-
-
-class Findings(dict[str, list[str]]):
-    """Sentences by what became of them: Proved, NOT TRUE, Not checked."""
-
-    def say(self, holds: object, sentence: str, detail: str = "") -> None:
-        """Put a sentence where it belongs; None says that nothing was checked."""
-        heap = "Not checked" if holds is None else "Proved" if holds else "NOT TRUE"
-        self.setdefault(heap, []).append(sentence + (f" ({detail})" if detail else ""))
+SAME_MM, FITTED_MM = 1e-9, 1e-6  # numbers of millimetres that differ by less are taken as one; those that come of a fit
+SMALLEST_MM, MOST_BOXES, BEYOND_END = 1e-6, 50_000, 3  # where a search ends; the code of a point that lies beyond an end
+HARMLESS = ("frame repeated", "point repeated", "value repeated", "older than the scan")  # of such points none is missing
+UNPROVED = ("aborted", "fit", "outline", "placement", "datum", "no-value", "proven-out")  # reasons that are taken from the record
+NUMBER = re.compile(r"-?(0|[1-9]\d*)(\.\d+)?(e[+-]?\d+)?$|(null|true|false|\[\]|\{\})$")  # what YAML and JSON spell alike
+GAUSS = np.transpose(np.polynomial.legendre.leggauss(16))  # nodes and weights of the quadrature
+PRIME, GROUP = 2**255 - 19, 2**252 + 27742317777372353535851937790883648493  # of RFC 8032: the field, and the order of B
+CURVE_D, BASE = -121665 * pow(121666, -1, 2**255 - 19) % PRIME, bytes([0x58] + [0x66] * 31)
 
 
-def read_records(folder: Path, findings: Findings, head: str | None) -> Bodies:
-    """Bodies by kind, after recomputing every hash over them."""
-    data, offset = (folder / "records.bin").read_bytes(), 0
-    bodies: Bodies = {}
-    before, last, broken = None, "", []
-    run = json.loads((folder / "run.json").read_text(encoding="utf-8"))["run"]
-    for row in csv.DictReader((folder / "chain.csv").read_text(encoding="utf-8").splitlines()):
-        number, body = int(row["number"]), data[offset : offset + int(row["bytes"])]
-        offset += int(row["bytes"])
-        stated = f"{number}\n{run}\n{row['kind']}\n{float(row['time_s'])!r}\n{int(row['count'])}\n{len(body)}\n".encode()
-        sound = hashlib.sha256(bytes.fromhex(row["previous_sha256"]) + stated + body).hexdigest() == row["sha256"]
-        if not sound or (before and not last and before != (number - 1, row["previous_sha256"])):  # others may stand behind the end
-            broken.append(f"not so: record {number}, {row['kind']}")
-        before = number, row["sha256"]
-        bodies.setdefault(row["kind"], []).append(body)
-        last = row["sha256"] if row["kind"] == "end" else last
-    findings.say(
-        not broken and offset == len(data), f"Every record of run {run} is as it was hashed, and none is missing.", "; ".join(broken[:3])
-    )
-    findings.say("end" in bodies, "The records reach to the end of the run.")
-    anew = "Nothing, hashes included, was written anew since: the last hash is the one that was kept elsewhere."
-    findings.say(last == head.lower() if head else None, anew, "" if head else "give the hash from the report with --head")
-    return bodies
+def is_signed(key: bytes, message: bytes, signature: bytes) -> bool:
+    """Whether an Ed25519 signature holds: RFC 8032, 5.1.7."""
+    digest, s = hashlib.sha512(signature[:32] + key + message).digest(), int.from_bytes(signature[32:], "little")
+    base, r, public = (unpack(data) for data in (BASE, signature[:32], key))
+    whole = (0, 0) not in (r, public) and len(signature) == 64 and s < GROUP
+    return whole and multiply(s, base) == add(r, multiply(int.from_bytes(digest, "little") % GROUP, public))
 
 
-def compare_files(folder: Path, bodies: Bodies, findings: Findings) -> Any:
-    """The files that people read, against the records that are hashed. Gives the result as recorded."""
-    for path, kind in ((folder / "plan.yaml", "plan"), (next(folder.glob("nominal-*")), "nominal")):
-        findings.say(path.read_bytes() == bodies[kind][0], f"{path.name} is what was recorded.")
-    told, kept = json.loads((folder / "result.json").read_text(encoding="utf-8")), json.loads(bodies["result"][0])
-    findings.say({**told, **kept} == told, "result.json says what was recorded.")
-    return kept
+def unpack(data: bytes) -> tuple[int, int]:
+    """The point of the curve that 32 bytes stand for, or (0, 0), which is none: RFC 8032, 5.1.3."""
+    y, odd = int.from_bytes(data, "little") % 2**255, data[-1] >> 7
+    square = (y * y - 1) * pow(CURVE_D * y * y + 1, -1, PRIME) % PRIME
+    x = pow(square, (PRIME + 3) // 8, PRIME)
+    x = x if x * x % PRIME == square else x * pow(2, (PRIME - 1) // 4, PRIME) % PRIME
+    wrong = len(data) != 32 or y >= PRIME or x * x % PRIME != square or (odd and not x)
+    return (0, 0) if wrong else (x if x % 2 == odd else PRIME - x, y)
 
 
-def read_plan(text: str) -> Plan:
+def add(p: tuple[int, int], q: tuple[int, int]) -> tuple[int, int]:
+    """The sum of two points of the curve: RFC 8032, 5.1.4."""
+    both = CURVE_D * p[0] * q[0] * p[1] * q[1]
+    x, y = (p[0] * q[1] + q[0] * p[1]) * pow(1 + both, -1, PRIME), (p[1] * q[1] + p[0] * q[0]) * pow(1 - both, -1, PRIME)
+    return x % PRIME, y % PRIME
+
+
+def multiply(factor: int, p: tuple[int, int]) -> tuple[int, int]:
+    """A multiple of a point, by doubling and adding."""
+    return add(multiply(factor // 2, add(p, p)), p if factor % 2 else (0, 1)) if factor else (0, 1)
+
+
+def read_plan(text: str) -> dict[str, Any]:
     """Values of a plan as it is recorded, YAML in block style, by their dotted paths: probe.tip_radius_mm, section.normal.0."""
-    values: Plan = {}
-    items: dict[Any, int] = {}
-    path: list[tuple[int, Any]] = []  # depth and name of every key and list item that is open
+    values, items, path = dict[str, Any](), dict[Any, int](), list[tuple[int, Any]]()  # path: depth and name of all that is open
     for row in text.splitlines():
         depth, line = len(row) - len(row.lstrip()), row.strip()
         while line.startswith("- "):
@@ -95,27 +80,18 @@ def read_plan(text: str) -> Plan:
             path.append((depth, items[tuple(path)]))
             depth, line = depth + 2, line[2:]
         key, colon, value = line.partition(":")
-        if colon:
-            path = [(d, name) for d, name in path if d < depth] + [(depth, key)]
+        path = [*((d, name) for d, name in path if d < depth), (depth, key)] if colon else path
         if value.strip() or not colon:
-            values[".".join(str(name) for _, name in path)] = read_scalar(value.strip() if colon else line)
+            text = value.strip() if colon else line
+            values[".".join(str(name) for _, name in path)] = json.loads(text) if NUMBER.match(text) else text.strip("'\"")
     return values
 
 
-def read_scalar(text: str) -> Any:
-    """A plain value of YAML."""
-    try:
-        return {"null": None, "true": True, "false": False, "[]": None, "{}": None}.get(text, text) if text[:1] in "ntf[{" else float(text)
-    except ValueError:
-        return text.strip("'\"")
-
-
 class Curve:
-    """The nominal as short Bezier pieces (n, degree + 1, 3) in homogeneous coordinates, each turning by less than a tenth of a radian."""
+    """The nominal as short Bezier pieces (degree + 1, 3, n) in homogeneous coordinates, each turning by less than a tenth of a radian."""
 
     def __init__(self, stated: dict[str, Any]) -> None:
-        degree, knots = int(stated["degree"]), np.array(stated["knots"], dtype=float)
-        weights = np.array(stated["weights"], dtype=float)
+        degree, knots, weights = int(stated["degree"]), np.array(stated["knots"], dtype=float), np.array(stated["weights"], dtype=float)
         control = np.column_stack([np.array(stated["control_points_mm"], dtype=float) * weights[:, None], weights])
         size = np.hypot(*np.ptp(control[:, :2] / weights[:, None], axis=0))
         waiting = [(k, knots[k], knots[k + 1]) for k in range(degree, len(control)) if knots[k + 1] > knots[k]][::-1]
@@ -129,268 +105,292 @@ class Curve:
                 waiting += [(span, (first + last) / 2, last), (span, first, (first + last) / 2)]
             else:
                 found.append(piece)
-        self.pieces, self.closed, self.size = np.array(found), bool(stated["closed"]), float(size)
+        self.pieces, self.closed, self.size = np.moveaxis(np.array(found), 0, 2).copy(), bool(stated["closed"]), float(size)
         self.outward = -1.0 if stated["material"] == "left" else 1.0  # how the left normal points: out of the material or into it
-        polygon = self.pieces[:, :, :2] / self.pieces[:, :, 2:]
-        self.centre, self.box = polygon.mean(axis=1), (polygon.min(axis=(0, 1)), polygon.max(axis=(0, 1)))
-        self.radius = np.linalg.norm(polygon - self.centre[:, None], axis=2).max(axis=1)
-        self.start = np.concatenate([[0.0], np.cumsum(self.arc(np.arange(len(found)), np.ones(len(found))))])
+        polygon = self.pieces[:, :2] / self.pieces[:, 2:]
+        self.ends, self.box = polygon[[0, -1], :, [0, -1]], (polygon.min(axis=(0, 2)), polygon.max(axis=(0, 2)))
+        self.centre = self.at(self.pieces, np.full(len(found), 0.5))[0]  # (2, n), places of the curve
+        self.radius = np.hypot(*np.moveaxis(polygon - self.centre, 1, 0)).max(axis=0)
+        self.start = np.concatenate([[0.0], np.cumsum(self.arc(self.pieces, np.ones(len(found))))])
         self.length = self.start[-1]
 
-    def at(self, piece: Any, t: Array) -> tuple[Array, Array]:
-        """Points and first derivatives (m, 2) at the parameters t (m,) of pieces (m,), by de Casteljau."""
-        rows, t = self.pieces[piece], np.asarray(t)[:, None, None]
-        while rows.shape[1] > 2:
-            rows = (1 - t) * rows[:, :-1] + t * rows[:, 1:]
-        value, slope = (1 - t[:, 0]) * rows[:, 0] + t[:, 0] * rows[:, 1], (self.pieces.shape[1] - 1) * (rows[:, 1] - rows[:, 0])
-        point = value[:, :2] / value[:, 2:]
-        return point, (slope[:, :2] - slope[:, 2:] * point) / value[:, 2:]
+    def at(self, rows: Array, t: Array) -> tuple[Array, Array]:
+        """Points and first derivatives (2, m) of pieces (degree + 1, 3, m) at parameters t (m,), by de Casteljau."""
+        while len(rows) > 2:
+            rows = (1 - t) * rows[:-1] + t * rows[1:]
+        value, slope = (1 - t) * rows[0] + t * rows[1], (len(self.pieces) - 1) * (rows[1] - rows[0])
+        return value[:2] / value[2], (slope[:2] - slope[2] * value[:2] / value[2]) / value[2]
 
-    def arc(self, piece: Any, t: Array) -> Array:
+    def arc(self, rows: Array, t: Array) -> Array:
         """Length (m,) of pieces from their beginning to t."""
-        total = np.zeros(len(piece))
-        for node, weight in zip(GAUSS, GAUSS_WEIGHTS, strict=True):
-            total += weight / 2 * t * np.linalg.norm(self.at(piece, t * (node + 1) / 2)[1], axis=1)
-        return total
+        return sum(weight / 2 * t * np.hypot(*self.at(rows, t * (node + 1) / 2)[1]) for node, weight in GAUSS)
 
-    def closest(self, points: Array) -> tuple[Array, Array]:
-        """Signed distances (m,), positive out of material, and stations (m,) of the closest points."""
+    def closest(self, points: Array, halvings: int = 54) -> tuple[Array, ...]:
+        """Signed distances (m,) of points (m, 2), positive out of material, stations, and whether the closest point is an open end."""
         if len(points) > 2000:
-            parts = [self.closest(points[k : k + 2000]) for k in range(0, len(points), 2000)]
-            return np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
-        apart = np.linalg.norm(points[:, None] - self.centre, axis=2)
-        row, piece = np.nonzero(apart - self.radius <= (apart + self.radius).min(axis=1)[:, None])
-        q = points[row]
+            parts = [self.closest(points[k : k + 2000], halvings) for k in range(0, len(points), 2000)]
+            return tuple(np.concatenate(column) for column in zip(*parts, strict=True))
+        apart = np.sqrt(np.maximum((points**2).sum(1)[:, None] + (self.centre**2).sum(0) - 2 * points @ self.centre, 0.0))
+        row, piece = np.nonzero(apart - self.radius <= apart.min(axis=1)[:, None] + 1e-7 * self.size)  # the last is for round-off
+        q, rows, low, high = points[row].T.copy(), self.pieces[:, :, piece], np.zeros(len(row)), np.ones(len(row))
 
         def along(t: Array) -> Array:  # of the connecting line: it changes its sign where the distance is smallest
-            point, slope = self.at(piece, t)
-            return ((point - q) * slope).sum(axis=1)
+            point, slope = self.at(rows, t)
+            return ((point - q) * slope).sum(axis=0)
 
-        low, high = np.zeros(len(row)), np.ones(len(row))
         low[along(high) <= 0] = 1.0
         high[along(low) >= 0] = low[along(low) >= 0]
-        for _ in range(54):
-            middle = (low + high) / 2
-            ahead = along(middle) < 0
-            low, high = np.where(ahead, middle, low), np.where(ahead, high, middle)
-        point, slope = self.at(piece, low)
-        away, distance = q - point, np.linalg.norm(q - point, axis=1)
-        nearest = np.full(len(points), np.inf)
+        for _ in range(halvings):
+            ahead = along((low + high) / 2) < 0
+            low, high = np.where(ahead, (low + high) / 2, low), np.where(ahead, high, (low + high) / 2)
+        (point, slope), nearest = self.at(rows, low), np.full(len(points), np.inf)
+        distance = np.hypot(*(q - point))
         np.minimum.at(nearest, row, distance)
-        chosen = distance <= nearest[row] + 1e-11 * self.size  # where two pieces meet, the mean of both normals gives the sign
-        normal = np.zeros((len(points), 2))
-        left = np.column_stack([-slope[:, 1], slope[:, 0]]) / np.linalg.norm(slope, axis=1)[:, None]
-        np.add.at(normal, row[chosen], left[chosen])
-        side, station = np.zeros(len(points)), np.zeros(len(points))
-        np.add.at(side, row[chosen], (away * normal[row]).sum(axis=1)[chosen])
-        station[row[distance == nearest[row]]] = (self.start[piece] + self.arc(piece, low))[distance == nearest[row]]
-        return self.outward * np.where(side < 0, -nearest, nearest), station
+        best, same = distance == nearest[row], distance <= nearest[row] + 1e-11 * self.size
+        side, station, left = np.zeros(len(points)), np.zeros(len(points)), np.array([-slope[1], slope[0]]) / np.hypot(*slope)
+        np.add.at(side, row[same], ((q - point) * left).sum(axis=0)[same])  # where pieces meet, the mean of both normals gives the sign
+        station[row[best]] = self.start[piece[best]] + self.arc(rows[:, :, best], low[best])
+        at_end = (not self.closed) & ((station <= SAME_MM) | (station >= self.length - SAME_MM))
+        return np.where(self.outward * side < 0, -nearest, nearest), station, at_end
+
+    def out(self, points: Array, low: float, high: float, travel: float) -> Array:
+        """How far the distances of points (m, 2) lie beyond limits, wherever they move by no more than is said; negative inside."""
+        if travel > 8 * self.radius.max():  # then circles around the pieces tell enough
+            return (np.sqrt(((points[:, None] - self.centre.T) ** 2).sum(axis=2)) - self.radius).min(axis=1) - max(-low, high)
+        signed = self.closest(points, 24)[0]
+        beside = np.linalg.norm(points[:, None] - self.ends, axis=2).min(axis=1) <= abs(signed) + 2 * travel + SAME_MM
+        out, other = np.maximum(low - signed, signed - high), np.maximum(low + signed, -signed - high)
+        return np.where(beside & (not self.closed), np.minimum(out, other), out)  # beside an end either sign may be right
+
+    def search(self, flat: Array, low: float, high: float) -> bool | None:
+        """Whether no placement brings all distances of points (m, 2) between limits; None where that remains open."""
+        arms, (left, right) = flat - flat.mean(axis=0), self.box
+        reach, boxes = np.hypot(*arms.T), np.array([[0.0, *((left + right) / 2)]])
+        step = np.array([math.pi, *((right - left) / 2 + max(-low, high))])  # all angles, the middle of the points near the curve's box
+        hits = dict.fromkeys(np.linspace(0, len(flat) - 1, 24).astype(int).tolist(), 0)
+        while True:
+            axis = np.arange(3) == np.argmax(step * [max(reach.max(), 1e-9), 1, 1])  # the side along which points move farthest
+            step = np.where(axis, step / 2, step)
+            boxes = np.concatenate([boxes + way * np.where(axis, step, 0) for way in (-1, 1)])
+            travel, worst = 2 * reach * np.sin(min(step[0], math.pi) / 2) + np.hypot(step[1], step[2]), np.full(len(boxes), -np.inf)
+            for k in sorted(hits, key=lambda k: -hits[k]):  # those first by which most boxes were refuted
+                c, s = np.cos(boxes[:, 0]), np.sin(boxes[:, 0])
+                places = boxes[:, 1:] + np.column_stack([c * arms[k, 0] - s * arms[k, 1], s * arms[k, 0] + c * arms[k, 1]])
+                out = self.out(places, low, high, travel[k])
+                held, worst = out <= travel[k] + SAME_MM, np.maximum(worst, out)
+                hits[k] += int((~held).sum())
+                boxes, worst = boxes[held], worst[held]
+            if not len(boxes):
+                return True
+            for box in boxes[np.argsort(worst)[:2]]:
+                out = self.out(placed(arms, box), low, high, 0.0)
+                if out.max() <= 0:
+                    return False
+                hits.setdefault(int(np.argmax(out)), 0)
+            if len(boxes) > MOST_BOXES or travel.max() < SMALLEST_MM:
+                return None
 
 
-def blossom(knots: Array, control: Array, degree: int, span: int, at: list[Any]) -> Array:
-    """Bezier points are values of the polar form of a B-spline, here at the arguments `at` (degree,), by de Boor's recursion."""
-    rows = control[span - degree : span + 1].copy()
-    for r in range(1, degree + 1):
-        for j in range(degree, r - 1, -1):
-            first, last = knots[j + span - degree], knots[j + 1 + span - r]
-            share = (at[r - 1] - first) / (last - first)
-            rows[j] = (1 - share) * rows[j - 1] + share * rows[j]
-    return rows[degree]
+def blossom(knots: Array, control: Array, degree: int, k: int, at: list[Any]) -> Array:
+    """Bezier points are values of the polar form of a B-spline, here at the arguments `at`, by de Boor's recursion from control points."""
+    if not at:
+        return control[k]
+    share = (at[-1] - knots[k]) / (knots[k + 1 + degree - len(at)] - knots[k])
+    return (1 - share) * blossom(knots, control, degree, k - 1, at[:-1]) + share * blossom(knots, control, degree, k, at[:-1])
 
 
-def read_deviations(bodies: Bodies) -> list[Any]:
-    """Of every received point: the actual point (m, 2), station, deviation and reason of rejection (m,), as recorded."""
-    columns = []
-    for body in bodies.get("deviations", []):
-        n = len(body) // 50
-        values = [np.frombuffer(body, "<f8", n * width, 8 * n * at).reshape(n, width) for at, width in ((0, 2), (4, 1), (5, 1))]
-        columns.append((values[0], values[1][:, 0], values[2][:, 0], np.frombuffer(body, "i1", n, 49 * n)))
-    return [np.concatenate(column) for column in zip(*columns, strict=True)]
+def placed(points: Array, pose: Any) -> Array:
+    """R(angle) s + t of points s (m, 2); pose holds the angle and both coordinates of t."""
+    return points @ [[math.cos(pose[0]), math.sin(pose[0])], [-math.sin(pose[0]), math.cos(pose[0])]] + np.asarray(pose[1:])
 
 
-def read_points(bodies: Bodies, plan: Plan) -> Array:
-    """Coordinates (m, 2) in the plane of the section as the points came, at the reference temperature where the plan says so."""
-    counts = [len(body) // 40 for body in bodies.get("points", [])]
-    parts = [np.frombuffer(body, "<f8", 3 * n, 16 * n).reshape(n, 3) for body, n in zip(bodies.get("points", []), counts, strict=True)]
-    origin, normal, x = (np.array([plan[f"section.{key}.{k}"] for k in range(3)]) for key in ("origin_mm", "normal", "x_axis"))
-    normal /= np.linalg.norm(normal)
-    x -= (x @ normal) * normal
-    x /= np.linalg.norm(x)
-    flat = (np.concatenate(parts) - origin) @ np.column_stack([x, np.cross(normal, x)])
-    if plan.get("temperature.compensate"):
-        fixed = np.array([plan["temperature.fixed_mm.0"], plan["temperature.fixed_mm.1"]])
-        growth = plan["temperature.cte_per_k"] * (plan["temperature.part_c"] - plan["temperature.reference_c"])
-        flat = fixed + (flat - fixed) / (1 + growth)
-    return flat
+class Check:
+    """The check of the evidence in a folder; `findings` are its sentences. Raises what reading raises."""
 
+    def __init__(self, folder: Path, head: str = "", key: str = "") -> None:
+        self.folder, self.findings, self.bodies = folder, dict[str, list[str]](), dict[str, list[bytes]]()
+        self.read_records(head.lower(), key.lower())
+        if "NOT TRUE" in self.findings:  # nothing that is derived from altered records would prove anything
+            return
+        for path, kind in ((folder / "plan.yaml", "plan"), (next(folder.glob("nominal-*")), "nominal")):  # the files that people read
+            self.say(path.read_bytes() == self.bodies[kind][0], f"{path.name} is what was recorded.")
+        shown, self.result = json.loads((folder / "result.json").read_text(encoding="utf-8")), json.loads(self.bodies["result"][0])
+        self.say({**shown, **self.result} == shown, "result.json says what was recorded.")
+        self.plan, told = read_plan(self.bodies["plan"][0].decode("utf-8")), self.result["characteristics"]
+        if self.result["registration"] is None:
+            self.say(self.result["verdict"] == "uncertain", "NOT PROVEN follows: no point was judged.")
+            return
+        self.curve = Curve(json.loads((folder / "nominal.json").read_text(encoding="utf-8")))
+        self.check_nominal()
+        self.check_deviations()
+        for at, one in enumerate(told, -1 if "tolerance.lower_mm" in self.plan else 0):
+            self.check_profile(one, at)
+        worst = next(verdict for verdict in ("nonconform", "uncertain", "conform") if verdict in [one["verdict"] for one in told])
+        self.say(self.result["verdict"] == worst, f"The verdict on the part is the worst of all, {worst}.")
 
-def placed(points: Array, angle: float, shift: Array) -> Array:
-    """R(angle) s + t of points s (m, 2)."""
-    c, s = math.cos(angle), math.sin(angle)
-    return points @ np.array([[c, s], [-s, c]]) + shift
+    def say(self, holds: object, sentence: str, detail: str = "") -> None:
+        """Put a sentence where it belongs; None says that nothing was checked."""
+        heap = "Not checked" if holds is None else "Proved" if holds else "NOT TRUE"
+        self.findings.setdefault(heap, []).append(sentence + (f" ({detail})" if detail else ""))
 
+    def read_records(self, head: str, key: str) -> None:
+        """The bodies of the records by kind, after recomputing every hash over them, and the signature over the last hash."""
+        data, offset, before, last, broken = (self.folder / "records.bin").read_bytes(), 0, None, "", []
+        run = json.loads((self.folder / "run.json").read_text(encoding="utf-8"))["run"]
+        for row in csv.DictReader((self.folder / "chain.csv").read_text(encoding="utf-8").splitlines()):
+            number, body = int(row["number"]), data[offset : offset + int(row["bytes"])]
+            offset += int(row["bytes"])
+            stated = f"{number}\n{run}\n{row['kind']}\n{float(row['time_s'])!r}\n{int(row['count'])}\n{len(body)}\n".encode()
+            sound = hashlib.sha256(bytes.fromhex(row["previous_sha256"]) + stated + body).hexdigest() == row["sha256"]
+            if not sound or (before and not last and before != (number - 1, row["previous_sha256"])):  # others may stand behind the end
+                broken.append(f"not so: record {number}, {row['kind']}")
+            before = number, row["sha256"]
+            self.bodies.setdefault(row["kind"], []).append(body)
+            last = row["sha256"] if row["kind"] == "end" else last
+        whole = not broken and offset == len(data) and last
+        self.say(whole, f"Every record of run {run} is as it was hashed, and none is missing up to its end.", "; ".join(broken[:3]))
+        anew = "Nothing, hashes included, was written anew since: the last hash is the one that was kept elsewhere."
+        self.say(last == head if head else None, anew, "" if head else "give the hash from the report with --head")
+        path, message = self.folder / "signature.json", f"cmmlink run\n{run}\n{last}\n".encode()
+        told = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {"public_key": "", "signature": ""}
+        public, signature = bytes.fromhex(told["public_key"]), bytes.fromhex(told["signature"])
+        name = hashlib.sha256(public).hexdigest()[:16] if public else "none"
+        self.say(is_signed(public, message, signature) if public else False if key else None, f"The run is signed, by the key {name}.")
+        self.say(key in (name, public.hex()) if key else None, "That key is the station's.", "" if key else "give it with --key")
 
-def measured_share(stations: Array, curve: Curve, allowed: float) -> tuple[float, float]:
-    """Coverage and the longest gap."""
-    s = np.sort(stations)
-    gaps = np.diff(s, append=s[0] + curve.length) if curve.closed else np.diff(s, prepend=0.0, append=curve.length)
-    return gaps[gaps <= allowed].sum() / curve.length, gaps.max()
+    def check_nominal(self) -> None:
+        """Whether the curve runs through the points of the nominal's file, where it holds pairs of numbers, a pair a line."""
+        pairs = re.findall(r"^\s*([-+.\de]+)[\s,;]+([-+.\de]+)\s*$", self.bodies["nominal"][0].decode("latin-1"), re.MULTILINE)
+        points = np.array(pairs, dtype=float).reshape(-1, 2)
+        points = points[(points % 1 != 0).any(axis=1)] * self.plan["nominal.scale"]  # whole numbers may be counts
+        known, off = len(pairs) > 9 and self.plan["nominal.unit"] in (None, "mm"), np.abs(self.curve.closest(points)[0]).max(initial=0.0)
+        self.say(off <= 1e-7 if known else None, f"The curve runs through {len(points)} points of the nominal.", f"within {off:.1e} mm")
 
+    def column(self, kind: str, of: int, at: int, numbers: str) -> Array:
+        """A column of records of points, which have `of` bytes a point and hold column after column; `at` of them stand before it."""
+        return np.concatenate([np.frombuffer(b, numbers, len(b) // of, len(b) // of * at) for b in self.bodies.get(kind, [b""])])
 
-def refute_every_placement(flat: Array, curve: Curve, radius: float, lower: float, upper: float) -> Array | None:
-    """Show that no placement has all deviations within lower .. upper. Gives None, or a placement that was not refuted.
+    def read_points(self) -> Array:
+        """Places (m, 2) in the plane of the section at the reference temperature."""
+        plan, self.radius = self.plan, self.plan["probe.tip_radius_mm"]
+        origin, normal, x = (np.array([plan[f"section.{key}.{k}"] for k in range(3)]) for key in ("origin_mm", "normal", "x_axis"))
+        x = x - (x @ normal) * normal / (normal @ normal)
+        axes = np.column_stack([x, np.cross(normal, x)])
+        flat = (self.column("points", 40, 16, "<3f8") - origin) @ (axes / np.linalg.norm(axes, axis=0))
+        if plan.get("temperature.compensate"):
+            fixed = np.array([plan["temperature.fixed_mm.0"], plan["temperature.fixed_mm.1"]])
+            size = 1 + plan["temperature.cte_per_k"] * (plan["temperature.part_c"] - plan["temperature.reference_c"])
+            flat, self.radius = fixed + (flat - fixed) / size, self.radius / size
+        return flat
 
-    Starts from all angles and all places where the middle of the points lies in the box of the curve. Few points are tried at first,
-    and of every box that resists the worst at its middle.
-    """
-    arms = flat - flat.mean(axis=0)
-    reach = np.hypot(arms[:, 0], arms[:, 1])
-    low, high = curve.box
-    step = np.array([math.pi, *((high - low) / 2 + max(abs(lower), abs(upper)) + radius)])
-    boxes, telling = np.array([[0.0, *((low + high) / 2)]]), np.unique(np.linspace(0, len(flat) - 1, 24).astype(int))
-    while len(boxes):
-        axis = int(np.argmax(step * [max(reach.max(), 1e-9), 1, 1]))  # the side along which points move farthest is halved
-        step = np.where(np.arange(3) == axis, step / 2, step)
-        offset = np.where(np.arange(3) == axis, step, 0)
-        boxes = np.concatenate([boxes - offset, boxes + offset])
-        travel = 2 * reach * np.sin(min(step[0], math.pi) / 2) + np.hypot(step[1], step[2])
-        places = np.stack([placed(arms[telling], box[0], box[1:]) for box in boxes])
-        excess = excesses(places.reshape(-1, 2), curve, radius, lower, upper).reshape(len(boxes), -1)
-        held = ~(excess > travel[telling]).any(axis=1)
-        boxes = boxes[held][np.argsort(excess[held].max(axis=1))]
-        for box in boxes[:2]:
-            beyond = excesses(placed(arms, box[0], box[1:]), curve, radius, lower, upper)
-            if beyond.max() <= 0:
-                return box
-            telling = np.union1d(telling, [np.argmax(beyond)])
-        if len(boxes) > MOST_BOXES or (len(boxes) and travel.max() < SMALLEST_MM):
-            return boxes[0]
-    return None
+    def check_counts(self, rejection: Array) -> None:
+        """Counts anew, from what arrived: points with their numbers, and what the device said."""
+        events = [one for body in self.bodies.get("events", []) for one in json.loads(body)]
+        told = {k: [e["values"] for e in events if e["event"] == k] for k in ("Rejected", "Lost", "Damaged", "ScanOpened", "ScanClosed")}
+        dropped, lost, damaged = (sum(one.get("count", one.get("byte_count")) for one in told[kind]) for kind in list(told)[:3])
+        came, harmless = len(rejection) + dropped, sum(one["count"] for one in told["Rejected"] if one["reason"] in HARMLESS)
+        judged, number = int((rejection == 0).sum()), self.column("points", 40, 0, "<i8")
+        counts = {"received": came, "judged": judged, "rejected": came - judged, "lost": lost, "damaged_bytes": damaged}
+        self.say(all(self.result[key] == value for key, value in counts.items()), f"The points are counted rightly: {counts}.")
+        holes = int(np.ptp(number)) + 1 - len(np.unique(number))
+        self.say(holes <= lost + dropped, f"Of the points' own numbers {holes} are missing, no more than were told to be lost or unusable.")
+        announced = max((one.get("expected", one.get("sent")) or 0 for one in told["ScanOpened"] + told["ScanClosed"]), default=0)
+        self.missing = lost > 0 or damaged > 0 or dropped > harmless or announced > came - harmless + max(lost, 0)
+        self.missing |= not np.isin(rejection, (0, BEYOND_END)).all()
+        anew = any(one["event"] == "ScanOpened" and one["points"] > 0 for one in events)
+        self.doubts = {"the scan did not end": not (self.result["complete"] and told["ScanClosed"]), "the device began anew": anew}
 
+    def check_deviations(self) -> None:
+        """Every deviation anew, at the recorded placement."""
+        flat, result, plan, curve = self.read_points(), self.result, self.plan, self.curve
+        places = ((0, "<2f8"), (32, "<f8"), (40, "<f8"), (49, "i1"))
+        actual, station, recorded, rejection = (self.column("deviations", 50, *place) for place in places)
+        self.say(len(flat) == len(rejection), "Every point that came has a deviation, or a reason to have none.")
+        self.check_counts(rejection)
+        kept, flat = rejection == 0, np.resize(flat, (len(rejection), 2))
+        self.placement = {key: result["registration"][key] for key in ("rotation_deg", "translation_mm")}
+        pose = np.array([math.radians(self.placement["rotation_deg"]), *self.placement["translation_mm"]])
+        datum = [plan.get(f"registration.datum.{key}") or 0.0 for key in ("rotation_deg", "translation_mm.0", "translation_mm.1")]
+        self.known = "registration.datum.rotation_deg" in plan or plan["registration.fit"] == "none"
+        same = not self.known or np.abs(pose - [math.radians(datum[0]), *datum[1:]]).max() <= SAME_MM
+        self.say(same, "The placement is the one that the plan states, where it states one.")
+        self.flat, self.station, judged = flat[kept], station[kept], placed(flat[kept], pose)
+        distance, along, at_end = curve.closest(judged)
+        apart, self.deviation = np.abs(along - self.station), recorded[kept]
+        off = np.abs([distance - self.radius - self.deviation, np.linalg.norm(actual[kept] - judged, axis=1) - self.radius]).max()
+        apart = np.minimum(apart, curve.length - apart if curve.closed else apart).max()
+        same = off <= SAME_MM and apart <= FITTED_MM if plan["registration.method"] == "exact" else None
+        self.say(same, "Every deviation, place and station follows from points, placement and nominal.", f"within {max(off, apart):.1e} mm")
+        beyond, _, there = curve.closest(placed(flat[rejection == BEYOND_END], pose))
+        self.say(there.all() and not at_end.any(), "The points that were left out as beyond an end lie there, and no others.")
+        self.beyond_mm = float((np.abs(beyond) - self.radius).max(initial=0.0))
+        d, s = self.deviation, np.sort(self.station)
+        self.gap_mm = plan["gap_max_mm"] or max(curve.length / 100, plan["allow.unseen_mm"] or 0.0)
+        gaps = np.diff(s, append=s[0] + curve.length) if curve.closed else np.diff(s, prepend=0.0, append=curve.length)
+        self.facts = {"coverage": gaps[gaps <= self.gap_mm].sum() / curve.length, "largest_gap_mm": gaps.max()}
+        self.zone = zone = [result["tolerance"][key] for key in ("lower_mm", "upper_mm", "uncertainty_mm")]
+        found = {"max_deviation_mm": d.max(), "min_deviation_mm": d.min(), "profile_error_mm": 2 * np.abs(d).max()} | self.facts
+        guard = 0.0 if plan["decision_rule"] == "simple" else zone[2]
+        out = int(((d > zone[1] + guard) | (d < zone[0] - guard)).sum())
+        same = all(abs(result[key] - value) < FITTED_MM for key, value in found.items()) and result["out_of_tolerance"] == out
+        self.say(same, f"The longest gap is {gaps.max():.3f} mm; {self.facts['coverage']:.1%} was measured; {out} points are out.")
 
-def excesses(points: Array, curve: Curve, radius: float, lower: float, upper: float) -> Array:
-    """How far (m,) the deviations of points (m, 2) lie beyond the limits, negative inside."""
-    deviation = curve.closest(points)[0] - radius
-    return np.maximum(deviation - upper, lower - deviation)
+    def zone_of(self, at: int) -> list[float] | None:
+        """Both limits of a characteristic as the plan states them; None where it is no line-profile with one zone everywhere."""
+        first = f"characteristics.{at}.zone." if at >= 0 else "tolerance."
+        told = {key.removeprefix(first).removesuffix(".0"): value for key, value in self.plan.items() if key.startswith(first)}
+        if told.get("width_mm") is not None:
+            outward = told["width_mm"] / 2 + (told["offset_mm"] or 0.0) if told["outward_mm"] is None else told["outward_mm"]
+            return [outward - told["width_mm"], outward]
+        return None if told.get("stations_mm") is not None or "lower_mm" not in told else [told["lower_mm"], told["upper_mm"]]
 
+    def check_profile(self, one: Any, at: int) -> None:
+        """A line-profile of the whole profile at the run's placement: its value, its verdict, and the proof of its minimum zone."""
+        zone, name, plan, d = self.zone_of(at), one["name"], self.plan, self.deviation
+        if zone is None or one["region"] or one["pose"] != self.placement or one["filter"] != "none":
+            self.say(None, f"{name}: its value, {one['value']} {one['unit']}, and its verdict, {one['verdict']}.")
+            return
+        u, found = one["uncertainty"], {"value": 2 * np.abs(d - sum(zone) / 2).max(), "lower": zone[0], "upper": zone[1], **self.facts}
+        same = at > 0 or [one["lower"], one["upper"], u] == self.zone  # of the first, the run's own
+        same &= all(abs(one[key] - value) < FITTED_MM for key, value in found.items())
+        self.say(same, f"{name}: it is {found['value']:.6f} mm, and its zone {zone[0]:g} .. {zone[1]:g} mm that of the plan.")
+        own = plan.get(f"characteristics.{at}.uncertainty_mm", plan.get("tolerance.uncertainty_mm"))
+        self.say(own if own is None else own == u, f"{name}: U = {u:g} mm is stated by the plan.")
+        guard, rule = 0.0 if plan["decision_rule"] == "simple" else u, plan.get(f"characteristics.{at}.rule") or plan["rule"]
+        low, high, proof = zone[0] + self.radius, zone[1] + self.radius, one["certificate"]
+        beyond = bool(((d > zone[1] + guard) | (d < zone[0] - guard)).any())
+        doubt = "; ".join(words for words, holds in self.find_doubts(one, zone, d, guard).items() if holds)
+        known, verdict = self.known and one["fit"] in ("none", "datum"), f"{name}: {one['verdict'].upper()} follows"
+        if known or one["verdict"] != "nonconform":
+            self.say(one["verdict"] == ("nonconform" if known and beyond else "uncertain" if doubt else "conform"), f"{verdict}.", doubt)
+        elif rule == "best-fit" and one["fit"] in ("best-fit", "none"):
+            self.say(None if beyond else False, f"{verdict}, as long as its placement is the best fit.")
+        else:
+            self.say(self.curve.search(self.flat, low - guard, high + guard), f"{verdict}, for no placement passes.")
+        if proof and proof["proven"]:
+            middle, half = (low + high) / 2, found["value"] / 2 - proof["gap_mm"]
+            self.say(half < 0 or self.curve.search(self.flat, middle - half, middle + half), f"{name}: no zone is below {2 * half:.6f} mm.")
 
-def check_deviations(bodies: Bodies, plan: Plan, result: Any, curve: Curve, findings: Findings) -> tuple[Array, Array, Array]:
-    """Every deviation anew. Gives the section points, and the deviations and stations of the points that were judged."""
-    flat, radius, pose = read_points(bodies, plan), plan["probe.tip_radius_mm"], result["registration"]
-    actual, station, recorded, rejection = read_deviations(bodies)
-    findings.say(len(flat) == len(rejection), "Every point that came has a deviation, or a reason to have none.")
-    kept, flat = rejection == 0, np.resize(flat, (len(rejection), 2))
-    judged = placed(flat[kept], math.radians(pose["rotation_deg"]), np.array(pose["translation_mm"]))
-    distance, along = curve.closest(judged)
-    off = np.abs(distance - radius - recorded[kept]).max(initial=0)
-    findings.say(off <= SAME_MM, "Every deviation follows from points, placement and nominal.", f"largest difference {off:.1e} mm")
-    moved = np.abs(np.linalg.norm(actual[kept] - judged, axis=1) - radius).max(initial=0)
-    apart = np.abs(along - station[kept])
-    apart = np.minimum(apart, curve.length - apart if curve.closed else apart).max(initial=0)
-    findings.say(moved <= SAME_MM and apart <= 1e-6, "So do the places and the stations.", f"largest difference {max(moved, apart):.1e} mm")
-    counts = [result[key] for key in ("received", "judged", "rejected")]
-    findings.say(counts == [len(kept), kept.sum(), (~kept).sum()], "The received, judged and rejected points are counted rightly.")
-    return flat[kept], distance - radius, along
-
-
-def stated_zone(plan: Plan, result: Any, findings: Findings) -> list[float] | None:
-    """Lower limit, upper limit and U of the first profile, held against the plan; None where that is no plain zone."""
-    wanted, found = [plan.get(f"tolerance.{key}") for key in ZONE], [result["tolerance"][key] for key in ZONE]
-    if wanted[0] is None:  # then the zone is one of the characteristics
-        first = next((f"characteristics.{k}." for k in range(999) if plan.get(f"characteristics.{k}.type") == "line-profile"), "")
-        told = {key.removeprefix(first): value for key, value in plan.items() if key.startswith(first)}
-        if not first or any(told.get(key) is not None for key in ("region", "from", "filter", "within_mm", "zone.stations_mm")):
-            return None
-        wanted = [told["zone.lower_mm"], told["zone.upper_mm"], told["uncertainty_mm"]]
-        if told["zone.width_mm"] is not None:
-            half = told["zone.width_mm"] / 2 + (told["zone.offset_mm"] or 0.0)
-            outward = half if told["zone.outward_mm"] is None else told["zone.outward_mm"]
-            wanted[:2] = [outward - told["zone.width_mm"], outward]
-    if any(key.startswith(("uncertainty.", "temperature.")) for key in plan):
-        findings.say(None, f"How U = {found[2]:g} mm follows from the budget: it is taken as stated.")
-        wanted[2] = None
-    same = all(value is None or abs(value - stated) < SAME_MM for value, stated in zip(wanted, found, strict=True))
-    findings.say(same, f"The limits, {found[0]:g} .. {found[1]:g} mm, and U are those of the plan.")
-    return found
-
-
-def check_verdict(flat: Array, deviation: Array, along: Array, plan: Plan, result: Any, curve: Curve, findings: Findings) -> None:
-    """The verdict on the first profile, from what was derived anew and from nothing else."""
-    zone = stated_zone(plan, result, findings)
-    if zone is None:
-        findings.say(None, "The verdict on the first profile: it has a region, a filter or a varying zone.")
-        return
-    lower, upper, uncertainty = zone
-    guard = 0.0 if plan["decision_rule"] == "simple" else uncertainty
-    beyond = (deviation > upper + guard) | (deviation < lower - guard)
-    extremes = {"max_deviation_mm": deviation.max(), "min_deviation_mm": deviation.min(), "profile_error_mm": 2 * abs(deviation).max()}
-    right = all(abs(result[key] - value) <= 2 * SAME_MM for key, value in extremes.items()) and result["out_of_tolerance"] == beyond.sum()
-    findings.say(right, "The extreme deviations and the number of points out of tolerance are right.")
-    allowed, unseen = plan["gap_max_mm"] or curve.length / 100, plan["allow.unseen_mm"]
-    share, gap = measured_share(along, curve, allowed)
-    same = abs(share - result["coverage"]) < 1e-6 and abs(gap - result["largest_gap_mm"]) < 1e-6
-    findings.say(same, f"{share:.1%} of the profile was measured, and the longest gap is {gap:.3f} mm.")
-    missing = result["lost"] > 0 or result["damaged_bytes"] or result["received"] != result["judged"]
-    doubts = {
-        "the scan did not come to its end": not result["complete"],
-        "points are missing": missing and (unseen is None or gap > unseen),
-        "too little was measured": share < plan["registration.coverage_min"],
-        "a gap is too long": gap > allowed * (1 + 1e-9),
-        "points are out or in doubt": ((deviation > upper - guard) | (deviation < lower + guard)).any(),
-        "the record names another reason": any(one["kind"] in OTHER_REASONS for one in result["reasons"]),
-    }
-    doubt = "; ".join(words for words, holds in doubts.items() if holds)
-    verdict = next((one["verdict"] for one in result["characteristics"] if one["type"] == "line-profile"), result["verdict"])
-    if verdict != "nonconform":
-        findings.say((verdict == "conform") != bool(doubt), f"{'CONFORM' if verdict == 'conform' else 'NOT PROVEN'} follows.", doubt)
-    elif result["fit"] == "none":
-        findings.say(beyond.any(), "NOT CONFORM follows: a point is out at the known placement.")
-    elif result["rule"] == "best-fit":
-        findings.say(None, "NOT CONFORM by the best fit: that the placement is the best fit.")
-    else:
-        left = refute_every_placement(flat, curve, plan["probe.tip_radius_mm"], lower - guard, upper + guard)
-        findings.say(left is None, "NOT CONFORM follows: no placement passes.", "" if left is None else f"not refuted: {left}")
-    worst = max((one["verdict"] for one in result["characteristics"]), key=ORDER.index, default=verdict)
-    findings.say(result["verdict"] == worst, f"The verdict on the part is the worst of all, {worst}.")
-    for one in result["characteristics"][1:]:
-        findings.say(None, f"The value of the characteristic {one['name']}.")
-
-
-def check_nominal(bodies: Bodies, plan: Plan, curve: Curve, findings: Findings) -> None:
-    """Whether the curve runs through the points of the nominal's file, where that holds a pair of numbers in every line."""
-    rows = [line.replace(",", " ").replace(";", " ").split() for line in bodies["nominal"][0].decode("latin-1").splitlines()]
-    try:
-        points = np.array([[float(a), float(b)] for a, b in [row for row in rows if row][1:]]) * float(plan["nominal.scale"])
-    except ValueError:
-        findings.say(None, "That the curve in nominal.json is the one of the nominal's file.")
-        return
-    off = np.abs(curve.closest(points)[0]).max()
-    findings.say(off <= 1e-7, f"The curve runs through the {len(points)} points of the nominal's file.", f"largest distance {off:.1e} mm")
-
-
-def check(folder: Path, head: str | None = None) -> Findings:
-    """Check the evidence in a folder. Raises what reading raises: OSError, ValueError, LookupError, TypeError."""
-    findings = Findings()
-    bodies = read_records(folder, findings, head)
-    if "NOT TRUE" in findings:  # nothing that is derived from altered records would prove anything
-        return findings
-    result = compare_files(folder, bodies, findings)
-    plan = read_plan(bodies["plan"][0].decode("utf-8"))
-    curve = Curve(json.loads((folder / "nominal.json").read_text(encoding="utf-8")))
-    check_nominal(bodies, plan, curve, findings)
-    check_verdict(*check_deviations(bodies, plan, result, curve, findings), plan, result, curve, findings)
-    return findings
+    def find_doubts(self, one: Any, zone: list[float], d: Array, guard: float) -> dict[str, bool]:
+        """What keeps a line-profile with deviations d (k,) from being proven to conform."""
+        plan, (share, gap), end_mm = self.plan, self.facts.values(), self.plan["end_allowance_mm"]
+        return self.doubts | {
+            "points are missing": self.missing and gap > (-1 if plan["allow.unseen_mm"] is None else plan["allow.unseen_mm"]),
+            "too little was measured": share < plan["registration.coverage_min"],
+            "a gap is too long": gap > self.gap_mm * (1 + 1e-9),
+            "points lie beyond an end": self.beyond_mm > ((zone[1] - zone[0]) / 2 if end_mm is None else end_mm),
+            "points are out or in doubt": bool(((d > zone[1] - guard) | (d < zone[0] + guard)).any()),
+            "the record names another reason": any(reason["kind"] in UNPROVED for reason in one["reasons"]),
+        }
 
 
 def main(arguments: list[str]) -> int:
     """Check what the command line names, print the findings and give the exit status."""
-    if len(arguments) not in (1, 3):
-        print(__doc__)
-        return 2
     try:
-        findings = check(Path(arguments[0]), arguments[2] if len(arguments) == 3 else None)
+        options = {name.removeprefix("--"): value for name, value in zip(arguments[1::2], arguments[2::2], strict=True)}
+        findings = Check(Path(arguments[0]), **options).findings
     except (OSError, ValueError, LookupError, TypeError, StopIteration) as error:
-        print(f"The evidence cannot be read: {type(error).__name__}: {error}")
+        print(f"The evidence cannot be read: {type(error).__name__}: {error}" if len(arguments) % 2 else __doc__)
         return 2
     print(*(f"{heap}: {sentence}" for heap, sentences in findings.items() for sentence in sentences), sep="\n")
     return 1 if "NOT TRUE" in findings else 0

@@ -1,13 +1,9 @@
 """The verifier of docs/verify: it derives sound runs anew, and finds every alteration, with the chain computed anew or not."""
 
-import csv
-import hashlib
 import json
-import shutil
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -16,68 +12,9 @@ import pytest
 
 from docs.verify import verify
 from tests.cmmlink.command import cmmlink
+from tests.docs.evidence import Evidence
 
 POINTS = 150
-
-
-@dataclass
-class Evidence:
-    """An exported run whose records can be altered, and hashed anew as somebody would who knows how."""
-
-    folder: Path
-    rows: list[dict[str, str]] = field(default_factory=list)
-    bodies: list[bytes] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        data, offset = (self.folder / "records.bin").read_bytes(), 0
-        with (self.folder / "chain.csv").open(newline="") as file:
-            self.rows = list(csv.DictReader(file))
-        for row in self.rows:
-            self.bodies.append(data[offset : offset + int(row["bytes"])])
-            offset += int(row["bytes"])
-
-    @property
-    def head(self) -> str:
-        return next(row["sha256"] for row in self.rows if row["kind"] == "end")
-
-    def body(self, kind: str) -> bytes:
-        return next(body for row, body in zip(self.rows, self.bodies, strict=True) if row["kind"] == kind)
-
-    def replace(self, kind: str, body: bytes) -> None:
-        """Exchange the first body of a kind, and compute the whole chain anew."""
-        at = next(k for k, row in enumerate(self.rows) if row["kind"] == kind)
-        self.bodies[at] = body
-        run, previous = json.loads(self.body("run"))["run"], self.rows[0]["previous_sha256"]
-        for row, one in zip(self.rows, self.bodies, strict=True):
-            row["bytes"], row["previous_sha256"] = str(len(one)), previous
-            head = f"{row['number']}\n{run}\n{row['kind']}\n{row['time_s']}\n{row['count']}\n{len(one)}\n".encode()
-            previous = row["sha256"] = hashlib.sha256(bytes.fromhex(previous) + head + one).hexdigest()
-        self.write()
-
-    def write(self) -> None:
-        (self.folder / "records.bin").write_bytes(b"".join(self.bodies))
-        with (self.folder / "chain.csv").open("w", newline="") as file:
-            writer = csv.DictWriter(file, list(self.rows[0]))
-            writer.writeheader()
-            writer.writerows(self.rows)
-
-    def set_result(self, **values: Any) -> None:
-        """Write another result, into the records and into the file that people read."""
-        result = json.loads(self.body("result")) | values
-        self.replace("result", json.dumps(result).encode())
-        (self.folder / "result.json").write_text(json.dumps(result))
-
-    def set_plan(self, old: str, new: str) -> None:
-        text = self.body("plan").decode()
-        assert old in text
-        self.replace("plan", text.replace(old, new).encode())
-        (self.folder / "plan.yaml").write_text(text.replace(old, new), newline="")
-
-    def move(self, kind: str, place: int, change: float) -> None:
-        """Add to one number of a body of doubles."""
-        body = bytearray(self.body(kind))
-        body[8 * place : 8 * place + 8] = (np.frombuffer(body, "<f8", 1, 8 * place) + change).tobytes()
-        self.replace(kind, bytes(body))
 
 
 def run_and_export(folder: Path, points: str, tolerance_mm: float, more: str = "") -> Evidence:
@@ -106,32 +43,77 @@ def bad(tmp_path_factory: pytest.TempPathFactory) -> Evidence:
 
 @pytest.fixture
 def altered(sound: Evidence, tmp_path: Path) -> Evidence:
-    return Evidence(Path(shutil.copytree(sound.folder, tmp_path / "evidence")))
+    return sound.copy(tmp_path / "evidence")
 
 
 def test_a_sound_run_is_proved_with_python_and_numpy_alone(sound: Evidence) -> None:
     command = [sys.executable, "-I", verify.__file__, str(sound.folder), "--head", sound.head]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert "Proved: CONFORM follows." in done.stdout
-    assert "Not checked" not in done.stdout
+    assert "Proved: profile: CONFORM follows." in done.stdout
+    assert [line for line in done.stdout.splitlines() if line.startswith("Not checked")] == [
+        "Not checked: That key is the station's. (give it with --key)"
+    ]
     lines = Path(verify.__file__).read_text().splitlines()
     assert len(lines) <= 400
     assert {line.split()[1] for line in lines if line.startswith(("import ", "from "))} == {
-        "csv", "hashlib", "json", "math", "sys", "pathlib", "typing", "numpy",
+        "csv", "hashlib", "json", "math", "re", "sys", "pathlib", "typing", "numpy",
     }  # fmt: skip
+
+
+def test_the_signature_is_held_against_a_key_that_was_given_beforehand(sound: Evidence, altered: Evidence) -> None:
+    told = json.loads((sound.folder / "signature.json").read_text())
+    for key in (told["public_key"], told["key_id"].upper()):
+        assert "NOT TRUE" not in verify.Check(sound.folder, key=key).findings
+    assert verify.Check(sound.folder, key="ab" * 32).findings["NOT TRUE"] == ["That key is the station's."]
+    (altered.folder / "signature.json").write_text(json.dumps(told | {"signature": "00" + told["signature"][2:]}))
+    assert "NOT TRUE" in verify.Check(altered.folder).findings
+    (altered.folder / "signature.json").unlink()
+    assert "NOT TRUE" not in verify.Check(altered.folder).findings
+    assert "NOT TRUE" in verify.Check(altered.folder, key=told["key_id"]).findings
+
+
+RFC_8032 = [  # section 7.1: public key, message, signature
+    (
+        "d75a980182b10ab7d54bfed3c964073a0ee172f3daa62325af021a68f707511a",
+        "",
+        "e5564300c360ac729086e2cc806e828a84877f1eb8e5d974d873e065224901555fb8821590a33bacc61e39701cf9b46bd25bf5f0595bbe24655141438e7a100b",
+    ),
+    (
+        "3d4017c3e843895a92b70aa74d1b7ebc9c982ccf2ec4968cc0cd55f12af4660c",
+        "72",
+        "92a009a9f0d4cab8720e820b5f642540a2b27b5416503f8fb3762223ebdb69da085ac1e43e15996e458f3613d0f11d8c387b2eaeb4302aeeb00d291612bb0c00",
+    ),
+    (
+        "fc51cd8e6218a1a38da47ed00230f0580816ed13ba3303ac5deb911548908025",
+        "af82",
+        "6291d657deec24024827e69c3abe01a30ce548a284743a445e3680d7db5ac3ac18ff9b538d16f290ae67f760984dc6594a7c15e9716ed28dc027beceea1ec40a",
+    ),
+]
+
+
+@pytest.mark.parametrize(("key", "message", "signature"), RFC_8032)
+def test_signatures_of_the_standard_hold_and_altered_ones_do_not(key: str, message: str, signature: str) -> None:
+    public, signed, told = (bytes.fromhex(text) for text in (key, message, signature))
+    assert verify.is_signed(public, signed, told)
+    assert not verify.is_signed(public, signed + b"x", told)
+    assert not verify.is_signed(public, signed, told[:32] + (int.from_bytes(told[32:], "little") + verify.GROUP).to_bytes(32, "little"))
+    for place in (0, 31, 32, 63):
+        assert not verify.is_signed(public, signed, told[:place] + bytes([told[place] ^ 1]) + told[place + 1 :])
+    assert not verify.is_signed(told[:32], signed, told)
+    assert not verify.is_signed(public, signed, told[:63])
 
 
 def test_a_part_that_fails_is_refuted_in_every_placement(bad: Evidence) -> None:
     assert json.loads(bad.body("result"))["verdict"] == "nonconform"
-    assert "NOT CONFORM follows: no placement passes." in verify.check(bad.folder, bad.head)["Proved"]
+    assert "profile: NONCONFORM follows, for no placement passes." in verify.Check(bad.folder, bad.head).findings["Proved"]
 
 
 def test_a_part_that_passes_is_not_refuted(altered: Evidence) -> None:
     result = json.loads(altered.body("result"))
     result["characteristics"] = [one | {"verdict": "nonconform"} for one in result["characteristics"]]
     altered.set_result(**result | {"verdict": "nonconform"})
-    assert any("no placement passes" in sentence for sentence in verify.check(altered.folder)["NOT TRUE"])
+    assert any("NONCONFORM follows" in sentence for sentence in verify.Check(altered.folder).findings["NOT TRUE"])
 
 
 def with_file(name: str, change: Callable[[bytes], bytes]) -> Callable[[Evidence], None]:
@@ -197,9 +179,12 @@ def with_row(**values: str) -> Callable[[Evidence], None]:
 
 
 def widen_everything(evidence: Evidence) -> None:
+    """Alter the zone in the plan, and all that follows from it in the result."""
     result = json.loads(evidence.body("result"))
     evidence.set_plan("upper_mm: 0.05", "upper_mm: 0.08")
-    evidence.set_result(tolerance=result["tolerance"] | {"upper_mm": 0.08})
+    value = 2 * max(result["max_deviation_mm"] - 0.015, 0.015 - result["min_deviation_mm"])
+    found = [result["characteristics"][0] | {"upper": 0.08, "value": value}]
+    evidence.set_result(tolerance=result["tolerance"] | {"upper_mm": 0.08}, characteristics=found)
 
 
 ALTERATIONS: dict[str, Callable[[Evidence], None]] = {
@@ -252,15 +237,15 @@ ALTERATIONS: dict[str, Callable[[Evidence], None]] = {
 def test_an_alteration_is_found(altered: Evidence, name: str) -> None:
     head = altered.head
     ALTERATIONS[name](altered)
-    findings = verify.check(altered.folder, None if "anew" in name else head)
+    findings = verify.Check(altered.folder, "" if "anew" in name else head).findings
     assert "NOT TRUE" in findings, findings
 
 
 def test_what_was_written_anew_as_a_whole_is_found_by_the_hash_that_was_kept_elsewhere(altered: Evidence) -> None:
     head = altered.head
     widen_everything(altered)
-    assert "NOT TRUE" not in verify.check(altered.folder)
-    assert [sentence for sentence in verify.check(altered.folder, head)["NOT TRUE"] if "kept elsewhere" in sentence]
+    assert "NOT TRUE" not in verify.Check(altered.folder).findings
+    assert [sentence for sentence in verify.Check(altered.folder, head).findings["NOT TRUE"] if "kept elsewhere" in sentence]
 
 
 @pytest.mark.parametrize("name", ["records.bin", "chain.csv", "nominal.json", "plan.yaml", "result.json", "run.json"])
