@@ -1,6 +1,8 @@
 """The verifier of docs/verify: it derives sound runs anew, and finds every alteration, with the chain computed anew or not."""
 
 import json
+import re
+import shlex
 import subprocess
 import sys
 from collections.abc import Callable
@@ -253,3 +255,29 @@ def test_evidence_that_cannot_be_read_is_said_to_be_so(altered: Evidence, name: 
     (altered.folder / name).unlink()
     assert verify.main([str(altered.folder)]) == 2
     assert capsys.readouterr().out.startswith("The evidence cannot be read: ")
+
+
+WALK = (Path(verify.__file__).parent / "walk.md").read_text(encoding="utf-8")
+
+
+def test_the_walk_of_an_auditor_is_as_its_page_tells_it(tmp_path: Path) -> None:
+    """Every command of the page but those that install numpy; the sentences are held against the page, numbers left out."""
+    commands = [line.removeprefix("$ ") for line in WALK.splitlines() if line.startswith("$ ")]
+    for command in (line for line in commands if line.startswith("cmmlink ") and "key show" not in line):
+        _, verb, *words = shlex.split(command)
+        assert cmmlink(verb, *(tmp_path / word if word[0] in "ek" and word != "export" else word for word in words)).code == 0
+    evidence = Evidence(tmp_path / "evidence")
+    told = json.loads((evidence.folder / "signature.json").read_text())
+    shown = dict(re.findall(r"^\$ (plain/bin/python verify.py \S+) .*\n((?:[A-Z].*: .*\n)+)", WALK, re.MULTILINE))
+    evidence.copy(tmp_path / "altered")
+    plan = tmp_path / "altered" / "plan.yaml"
+    plan.write_bytes(plan.read_bytes().replace(b"upper_mm: 0.05", b"upper_mm: 0.08"))
+    for folder, code in (("evidence", 0), ("altered", 1)):
+        words = [verify.__file__, folder, "--head", evidence.head, "--key", told["key_id"]]
+        done = subprocess.run([sys.executable, "-I", *words], cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == code, done.stdout + done.stderr
+        printed = [line for line in done.stdout.splitlines() if code == 0 or line.startswith("NOT TRUE")]
+        numbers = re.compile(r"[0-9a-f]{16}|[-+.0-9]+(?:e[-+]?[0-9]+)?|20[0-9-]+")
+        assert [numbers.sub("#", line) for line in printed] == [
+            numbers.sub("#", line) for line in shown[f"plain/bin/python verify.py {folder}"].splitlines()
+        ]
