@@ -4,10 +4,7 @@ Of a response this file reads what is stamped, and when. That the authority sign
 certificate.
 """
 
-import http.client
 import secrets
-import urllib.error
-import urllib.request
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
@@ -36,6 +33,9 @@ class Stamp:
 
 def ask_stamp(url: str, sha256: bytes, patience_s: float) -> bytes:
     """Ask an authority to stamp a hash; its response, once it was read. Raises StoreError where there is none that states it."""
+    import http.client  # noqa: PLC0415 - what speaks to servers is loaded where one is spoken to: it takes longer than all else here
+    import urllib.request  # noqa: PLC0415 - as above
+
     nonce = secrets.randbits(_NONCE_BITS)
     asked = urllib.request.Request(url, stamp_request(sha256, nonce), _ASKED)
     try:
