@@ -163,7 +163,7 @@ def carry_out(
         answered = answer.deliver(outcome, evidence.run if evidence else "") if answer else None  # a machine waits: before all others
         if evidence is not None:
             told = anchor_ends(store, seal, plan.records.places, utc_words(now()), [evidence])
-            evidence = replace(evidence, anchors=[one.model_dump() for one in told])
+            evidence = replace(evidence, anchors=[asdict(one) for one in told])
     if evidence is not None:
         _log.info("recorded in %s as run %s, chain %s, plan %s", records, evidence.run, evidence.chain_sha256, evidence.plan_sha256)
     return FinishedRun(plan, profile, started, outcome, evidence, began, answered)

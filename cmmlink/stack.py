@@ -8,7 +8,7 @@ import logging
 import threading
 from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import ExitStack, closing
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -173,7 +173,7 @@ class StackOutcome:
             "characteristics": [stack_characteristic_json(one) for one in self.characteristics],
             "qualification": self.qualification,
             "notes": list(self.notes),
-            "anchors": [one.model_dump() for one in self.anchors],
+            "anchors": [asdict(one) for one in self.anchors],
         }
 
 

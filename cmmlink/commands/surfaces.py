@@ -6,6 +6,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -203,7 +204,7 @@ def _inspect_stack(plan: "CtPlan", output: Output, pictures: PicturesWanted, no_
         drawn = pictures != "none" and pattern is not None
         wanted = SectionPictures(plan.part.name, processes, every=pictures == "all") if drawn else None
         stack = _judge_stack(plan, output, bar, wanted, no_record)
-        say_untold([one.model_dump() for one in stack.anchors])
+        say_untold([asdict(one) for one in stack.anchors])
         folder = None if pattern is None else stack.folder_of(pattern, plan)
         try:
             if folder is not None:

@@ -1,6 +1,7 @@
 """A measured part from its record: the same as when it was measured, whatever version measured it."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import asdict
 from datetime import datetime
 from typing import Any
 
@@ -78,5 +79,5 @@ def _evidence(store: Store, recorded: RecordedRun) -> Mapping[str, Any]:
         "chain_sha256": recorded.chain_sha256,
         **{key: header[key] for key in _HASHES if key in header},
         "signature": None if signature is None else signature.beside_result(),
-        "anchors": [one.model_dump() for one in anchors_of(store, recorded.run)],
+        "anchors": [asdict(one) for one in anchors_of(store, recorded.run)],
     }

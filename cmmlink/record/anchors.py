@@ -11,10 +11,8 @@ import re
 import threading
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
-
-from pydantic import BaseModel, ConfigDict
 
 from cmmlink.errors import PlanError, StoreError
 from cmmlink.record.bodies import pack_document, unpack_document
@@ -48,10 +46,9 @@ class Head:
         return f"{self.time} {self.station} {self.run} {self.chain_sha256} {self.key_id or '-'}"
 
 
-class Told(BaseModel):
+@dataclass(frozen=True, slots=True)
+class Told:
     """A place that was to be told how a run ended. `problem` is what kept it from that, empty where nothing did."""
-
-    model_config = ConfigDict(strict=True, frozen=True)
 
     place: str
     problem: str
@@ -101,7 +98,7 @@ def anchor_ends(store: Store, seal: Seal, places: Sequence[str], ended: str, run
 
 
 def _draft(run: str, told: Sequence[Told]) -> Draft:
-    return Draft(run, "anchors", pack_document([one.model_dump() for one in told]))
+    return Draft(run, "anchors", pack_document([asdict(one) for one in told]))
 
 
 def anchors_of(store: Store, run: str) -> tuple[Told, ...]:

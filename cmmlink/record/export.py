@@ -3,6 +3,7 @@
 import csv
 import json
 from contextlib import suppress
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -108,7 +109,7 @@ def _result(store: Store, run: str, files: NewFiles) -> None:
 def _signature(store: Store, run: str, files: NewFiles) -> None:
     signature = signature_of(store, run)
     if signature is not None:
-        _json(files("signature.json"), signature.model_dump())
+        _json(files("signature.json"), asdict(signature))
     stamps = [record.body for record in store.records(run, "timestamp")]
     if stamps:
         files("timestamp.tsr").write_bytes(stamps[-1])

@@ -256,7 +256,7 @@ def describe(store: Store, run: str) -> dict[str, Any]:
         "result": recorded.result,
         "chain_sha256": recorded.chain_sha256,
         "signature": None if (signature := signature_of(store, run)) is None else signature.beside_result(),
-        "anchors": [one.model_dump() for one in anchors_of(store, run)],
+        "anchors": [dataclasses.asdict(one) for one in anchors_of(store, run)],
         "origin": None if (origin := origin_of(store, run)) is None else origin.model_dump(mode="json"),
         "derived": derived_of(store, run),
         "recorded": {

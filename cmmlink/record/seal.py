@@ -9,7 +9,7 @@ import hashlib
 import logging
 import platform
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -52,10 +52,17 @@ class Seal:
         """The signature of a record that is added to a run which has ended, to stand behind it; nothing where no key can be used."""
         if self.key is None:
             return []
-        told = {"run": record.run, "kind": record.kind, "time_s": record.time_s, "count": record.count}
-        told |= {"body_sha256": hashlib.sha256(record.body).hexdigest(), "public_key": self.key.public_key, "key_id": self.key.key_id}
-        unsigned = Countersignature.model_validate({**told, "signature": "0" * 128})
-        return [unsigned.model_copy(update={"signature": self.key.sign(unsigned.message)}).draft()]
+        unsigned = Countersignature(
+            run=record.run,
+            kind=record.kind,
+            time_s=record.time_s,
+            count=record.count,
+            body_sha256=hashlib.sha256(record.body).hexdigest(),
+            public_key=self.key.public_key,
+            signature="",
+            key_id=self.key.key_id,
+        )
+        return [replace(unsigned, signature=self.key.sign(unsigned.message)).draft()]
 
 
 def seal_of(store: Store, *, station: str | None, key: Path | None) -> Seal:

@@ -5,9 +5,10 @@ every run before it. What is added behind the end later has a signature of its o
 """
 
 import hashlib
+from dataclasses import asdict, dataclass
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from cmmlink.record.bodies import pack_document, unpack_document
 from cmmlink.record.chain import Draft, Record
@@ -25,13 +26,12 @@ def key_id_of(public_key: str) -> str:
     return hashlib.sha256(bytes.fromhex(public_key)).hexdigest()[:_SHORT]
 
 
-class Signature(BaseModel):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Signature:
     """The signature of a run, all of it in lower-case hexadecimal digits.
 
     chain_sha256 : the hash of the run's end at the station that measured it
     """
-
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
 
     algorithm: Literal["Ed25519"] = "Ed25519"
     run: str
@@ -47,20 +47,19 @@ class Signature(BaseModel):
 
     def draft(self) -> Draft:
         """The record that keeps it."""
-        return Draft(self.run, "signature", pack_document(self.model_dump()))
+        return Draft(self.run, "signature", pack_document(asdict(self)))
 
     def beside_result(self) -> dict[str, Any]:
         """The signature as a result has it, which names run and hash itself."""
-        return self.model_dump(exclude={"run", "chain_sha256"})
+        return {key: value for key, value in asdict(self).items() if key not in ("run", "chain_sha256")}
 
 
-class Countersignature(BaseModel):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Countersignature:
     """The signature of one record that was added behind the end of a run.
 
     body_sha256 : the hash of its body alone, so that it holds wherever the record stands
     """
-
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
 
     algorithm: Literal["Ed25519"] = "Ed25519"
     run: str
@@ -79,7 +78,7 @@ class Countersignature(BaseModel):
 
     def draft(self) -> Draft:
         """The record that keeps it."""
-        return Draft(self.run, "countersignature", pack_document(self.model_dump()))
+        return Draft(self.run, "countersignature", pack_document(asdict(self)))
 
     def is_of(self, record: Record) -> bool:
         """Whether it says that it signs this record."""

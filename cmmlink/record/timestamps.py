@@ -4,7 +4,7 @@ Of a response this file reads what is stamped, and when. That the authority sign
 certificate.
 """
 
-import secrets
+import os
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
@@ -16,7 +16,7 @@ _STAMPED = bytes.fromhex("060b2a864886f70d0109100104")  # 1.2.840.113549.1.9.16.
 _INTEGER, _OCTETS, _MOMENT, _SEQUENCE, _INNER = 0x02, 0x04, 0x18, 0x30, 0xA0  # tags
 _NULL, _TRUE = b"\x05\x00", b"\x01\x01\xff"
 _GRANTED = (0, 1)
-_NONCE_BITS = 63
+_NONCE_BYTES = 8
 _LONGEST = 1 << 18
 _ASKED = {"Content-Type": "application/timestamp-query", "Accept": "application/timestamp-reply"}
 _NONE = "it is no time stamp"
@@ -36,7 +36,7 @@ def ask_stamp(url: str, sha256: bytes, patience_s: float) -> bytes:
     import http.client  # noqa: PLC0415 - what speaks to servers is loaded where one is spoken to: it takes longer than all else here
     import urllib.request  # noqa: PLC0415 - as above
 
-    nonce = secrets.randbits(_NONCE_BITS)
+    nonce = int.from_bytes(os.urandom(_NONCE_BYTES), "big")
     asked = urllib.request.Request(url, stamp_request(sha256, nonce), _ASKED)
     try:
         with urllib.request.urlopen(asked, timeout=patience_s) as answer:
