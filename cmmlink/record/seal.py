@@ -76,6 +76,8 @@ def seal_of(store: Store, *, station: str | None, key: Path | None) -> Seal:
         signing, notes = _own_key(store) if key is None else _key_in(key)
     except PlanError as error:
         return Seal(name, None, (f"the run is not signed: {error}",))
+    except OSError as error:  # the folder does not even tell whether a key is there
+        return Seal(name, None, (f"the run is not signed: {error.filename or store.path.parent}: {error.strerror or error}",))
     except ImportError as error:
         return Seal(name, None, (f"the run is not signed: the library of signatures cannot be used here ({error})",))
     return Seal(name, signing, notes)

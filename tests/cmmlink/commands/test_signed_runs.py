@@ -1,11 +1,13 @@
 """Runs of the command line: signed, anchored, verified, and measured all the same where they cannot be."""
 
+import errno
 import json
 import os
 import stat
 import subprocess
 import sys
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
 
@@ -60,6 +62,21 @@ def test_a_run_is_signed_anchored_and_verified_by_a_stranger(shop: Path) -> None
     cmmlink("export", "last", "--out", shop / "evidence", "--records", kept)
     exported = json.loads((shop / "evidence" / "signature.json").read_text(encoding="utf-8"))
     assert exported == {**signature, "run": result["run"], "chain_sha256": result["chain_sha256"]}
+
+
+@pytest.mark.parametrize("name", ["station.key", "station.pub"])
+def test_a_folder_that_does_not_tell_whether_a_key_is_there_keeps_no_part_from_being_measured(shop: Path, name: str) -> None:
+    real = Path.exists
+
+    def exists(path: Path) -> bool:
+        if path.name == name:
+            raise OSError(errno.EIO, "Input/output error", str(path))
+        return real(path)
+
+    with patch.object(Path, "exists", exists):
+        ended = run(shop, "{folder: kept}")
+    assert ended.code == 0
+    assert f"the run is not signed: {shop / 'kept' / name}: Input/output error" in ended.json()["notes"]
 
 
 def test_a_key_that_is_not_there_keeps_no_part_from_being_measured(shop: Path) -> None:
