@@ -39,6 +39,16 @@ class Place(_Document):
     doubt: str | None = None
 
 
+class QualificationNamed(_Document):
+    """The last qualification of the installation that recorded a run."""
+
+    date: Moment
+    result: str
+    certificate_sha256: str
+    same_installation: bool
+    words: str
+
+
 class Header(_Document):
     """The record that a run begins with."""
 
@@ -51,7 +61,7 @@ class Header(_Document):
     device: str
     simulated: bool
     notes: list[str] = []
-    qualification: dict[str, Any] | None = None
+    qualification: QualificationNamed | None = None
     software: dict[str, str | None]
     nominal: str
     plan_file: str = ""

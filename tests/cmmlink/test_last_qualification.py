@@ -7,9 +7,11 @@ from pathlib import Path
 import pytest
 
 from cmmlink import last_qualification as named
+from cmmlink.errors import StoreError
 from cmmlink.events import RunStarted
 from cmmlink.installation import Installation
 from cmmlink.last_qualification import LastQualification, keep_as_last, qualification_here
+from cmmlink.record.shapes import Header, checked
 from cmmlink.report.further_pages import qualification_words
 from cmmlink.report.speech import Speech
 from tests.cmmlink.command import cmmlink
@@ -125,6 +127,18 @@ def test_a_result_without_one_holds_null_and_no_further_note(station: Path, tmp_
     found = cmmlink(*_inspect(tmp_path, "--no-record", "--json")).json()
     assert found["qualification"] is None
     assert not any("qualif" in note for note in found["notes"])
+
+
+def test_a_header_that_names_one_otherwise_is_damaged() -> None:
+    header = {
+        "run": "1", "started": PASSED.date, "clock_s": 0.0, "part": "p", "serial_number": "", "operator": "", "device": "d",
+        "simulated": False, "software": {}, "nominal": "n",
+    }  # fmt: skip
+    named_well = {"date": PASSED.date, "result": "passed", "certificate_sha256": "", "same_installation": True, "words": "passed"}
+    assert checked(Header, {**header, "qualification": named_well})
+    for key in named_well:
+        with pytest.raises(StoreError, match=f"qualification.{key}"):
+            checked(Header, {**header, "qualification": {name: value for name, value in named_well.items() if name != key}})
 
 
 def test_records_of_earlier_versions_name_none() -> None:
