@@ -8,6 +8,7 @@ deviations stands beside it, and so do the stretches without a measured point: n
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,7 @@ from inspection.rigid import RigidTransform
 from inspection.signed_deviations import Deviations
 
 Array = NDArray[np.float64]
+Rows = NDArray[np.int64]
 
 _DEGREE = 3
 _EDGE = 0.1  # of the section's length: to either side of a tip, what moves with its edge where edges move as a whole
@@ -30,6 +32,10 @@ _KNOTS = 200  # on the outline, unless their distance is given
 _BETWEEN = 4  # places from knot to knot at which the noise left in the spline is looked at: where points are few it swings between knots
 _GAP_KNOTS = 2.0  # a stretch without points that is longer than this many knot distances is drawn by no point
 _BRIDGING = 1e-10  # weight of smoothness beside that of the points; it acts where there are none
+_FEWEST = 6  # samples between two joints of the outline: a piece of it has as many places
+_JUMP = 0.02  # of a curvature: by less it does not jump
+_CLOSE = 0.2  # of a step: over a shorter one, round-off would bend a spline
+_BESIDE = 1e-9  # of the parameter's range: how far beside a joint the curvature is looked at
 _ON_OUTLINE = 1e-4  # of the section's length: a place nearer to the outline than this lies on it
 
 
@@ -287,19 +293,63 @@ def _move_outline(
 
     within : the stations between which the spline holds; beyond them an outline with ends has the deviation from there
     """
-    from scipy.interpolate import make_interp_spline  # noqa: PLC0415
-
     along = nominal.stations.value
-    station = along.fine_mm  # a spline over the station does not feel how the nominal is parametrised
-    point, _, _, inward = nominal.frame(along.fine)
+    parameter, station, joints = _with_joints(nominal, along.fine, along.fine_mm)
+    point, _, _, inward = nominal.frame(parameter)
     at = station if nominal.trailing == "round" else np.clip(station, *within)
     moved = point + (nominal.outward * nominal.inward * spline(at))[:, None] * inward
     nose = float(along.at_sample[nominal.nose_sample])
     if nominal.trailing == "round":
         moved[-1] = moved[0]
-        drawn = make_interp_spline(station, moved, k=_DEGREE, bc_type="periodic")
-        curve = NurbsCurve(_DEGREE, drawn.c, drawn.t, closed=True)
-        return section_on(curve, float(station[0]), float(station[-1]), "round", nominal.outward, nose)
-    drawn = make_interp_spline(station, moved, k=_DEGREE)
-    curve = NurbsCurve(_DEGREE, drawn.c, drawn.t)
+    curve = _curve_through(station, moved, joints, nominal.trailing == "round")  # over the station it does not feel the parameter
     return section_on(curve, float(station[0]), float(station[-1]), nominal.trailing, nominal.outward, nose)
+
+
+def _with_joints(nominal: AirfoilSection, parameter: Array, station: Array) -> tuple[Array, Array, Rows]:
+    """Rising samples (j,) of an outline by parameter and station, with its joints among them, and which they are.
+
+    At a joint the curvature of the nominal jumps, as where a line runs into an arc. A spline through places on both sides of it would
+    swing there, its curvature by a sixth of the jump, however dense the places are.
+    """
+    joints = _joints(nominal)
+    at = unwrap(nominal.curve, nominal.curve.station_mm(joints), float(station[0])) if len(joints) else joints
+    inside = (at > station[_FEWEST]) & (at < station[-1 - _FEWEST])
+    joints, at = joints[inside], at[inside]
+    after = np.searchsorted(station, at)
+    step = station[after] - station[after - 1]
+    kept = np.ones(len(station), dtype=np.bool_)
+    kept[after[station[after] - at < _CLOSE * step]] = False
+    kept[after[at - station[after - 1] < _CLOSE * step] - 1] = False
+    station, parameter = np.append(station[kept], at), np.append(parameter[kept], joints)
+    order = np.argsort(station, kind="stable")
+    rows = np.flatnonzero(order >= kept.sum())
+    return parameter[order], station[order], rows[np.diff(rows, prepend=0) >= _FEWEST]
+
+
+def _joints(nominal: AirfoilSection) -> Array:
+    """Parameters (q,) within an outline at which the curvature of the nominal jumps."""
+    curve = nominal.curve
+    start, end = curve.domain
+    knots = np.unique(curve.knots[(curve.knots >= start) & (curve.knots <= end)])
+    every = np.unique(np.concatenate([knots, knots + (end - start)]) if curve.closed else knots)
+    beside = _BESIDE * (end - start)
+    every = every[(every > nominal.first + beside) & (every < nominal.last - beside)]
+    if not len(every):
+        return every
+    before, behind = (curve.curvature(every + way) for way in (-beside, beside))
+    return np.asarray(every[np.abs(behind - before) > _JUMP * np.maximum(np.abs(before), np.abs(behind))])
+
+
+def _curve_through(station: Array, places: Array, joints: Rows, closed: bool) -> NurbsCurve:
+    """The cubic through places (j, 2) at rising stations (j,), in one piece from each of the joints to the next."""
+    from scipy.interpolate import make_interp_spline  # noqa: PLC0415 - it takes half a second
+
+    if not len(joints):
+        drawn = make_interp_spline(station, places, k=_DEGREE, bc_type="periodic" if closed else None)
+        return NurbsCurve(_DEGREE, drawn.c, drawn.t, closed=closed)
+    cuts = [0, *joints.tolist(), len(station) - 1]
+    drawn_pieces = [make_interp_spline(station[a : b + 1], places[a : b + 1], k=_DEGREE) for a, b in pairwise(cuts)]
+    first, *others = drawn_pieces
+    control = np.vstack([first.c, *(piece.c[1:] for piece in others)])
+    knots = np.concatenate([first.t[:-1], *(piece.t[_DEGREE + 1 : -1] for piece in others), others[-1].t[-1:]])
+    return NurbsCurve(_DEGREE, control, knots, closed=closed)

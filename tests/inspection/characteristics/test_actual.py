@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from cmmlink.reference import reference_cases
 from inspection import (
     ActualSection,
     Deviations,
@@ -10,13 +11,17 @@ from inspection import (
     NominalProfile,
     NurbsCurve,
     ProfileFilter,
+    RigidTransform,
+    chord,
     compare_airfoil,
     compare_values,
     deviations,
     discretize,
     draw_actual_section,
+    edge_radius,
     find_airfoil,
     find_camber_line,
+    maximum_camber,
     maximum_thickness,
 )
 from tests.inspection.characteristics.airfoils import Array
@@ -186,3 +191,25 @@ def test_too_few_points_and_knots_too_far_apart_are_refused() -> None:
         drawn(on_ellipse(2000)[:5])
     with pytest.raises(ValueError, match="below a quarter"):
         drawn(on_ellipse(200), knots_mm=80.0)
+
+
+def test_a_part_beside_a_section_of_arcs_and_lines_has_its_numbers_though_the_curvature_jumps() -> None:
+    """A spline across the joints would swing there: a radius by curvature was a sixth off, and a camber 4 um."""
+    case = next(case for case in reference_cases() if case.name == "section-bent-too-large")
+    given, pose = case.nominal, case.truth.pose
+    assert pose is not None
+    nominal = discretize(NurbsCurve(given.degree, given.control_points, given.knots, given.weights, closed=True), samples=2000)
+    placed = RigidTransform(np.radians(pose.rotation_deg), np.array(pose.translation)).apply(case.points)
+    section = draw_actual_section(find_airfoil(nominal), deviations(placed, nominal)).section
+    camber = find_camber_line(section)
+    found = {
+        "leading edge radius": edge_radius(section, "leading", "circle", 60.0),
+        "trailing edge radius": edge_radius(section, "trailing", "circle", 60.0),
+        "leading edge radius by curvature": edge_radius(section, "leading", "curvature"),
+        "chord": chord(section, camber, "maximum-distance"),
+        "chord by nose and tail": chord(section, camber, "nose-tail"),
+        "largest thickness": maximum_thickness(section, camber, "inscribed"),
+        "largest camber": maximum_camber(section, camber),
+    }
+    for known in case.truth.values:
+        assert found[known.name].value == pytest.approx(known.value, abs=2e-5 if "curvature" in known.name else 1e-8), known.name
