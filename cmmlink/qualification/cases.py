@@ -146,7 +146,10 @@ def _errors_behind_filters(case: ReferenceCase, plan: Plan, profile: NominalProf
         if asked.type == "line-profile" and asked.filter is not None:
             wanted = ProfileFilter(asked.filter.cutoff_mm, asked.filter.order, asked.filter.robust)
             along = (result.station_mm, result.deviation_mm, profile.length_mm, profile.curve.closed)
-            away = filter_profile(*along, wanted, corners).waviness_mm - known_mm[f"Gaussian regression of order {wanted.order}"]
+            away = (
+                filter_profile(*along, wanted, corners).waviness_mm
+                - known_mm[f"{'robust ' if wanted.robust else ''}Gaussian regression of order {wanted.order}"]
+            )
             yield FoundError(FILTERED, float(np.abs(away).max()), case.name, len(away))
 
 

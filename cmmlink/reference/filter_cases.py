@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from cmmlink.reference.case import KnownFilter, KnownValue, ReferenceCase
 from cmmlink.reference.deviation_cases import Build
 from cmmlink.reference.exact_curve import ExactCurve, Foot
-from cmmlink.reference.exact_numbers import PI, as_array, as_float, cosine_and_sine, rounded, sine, total
+from cmmlink.reference.exact_numbers import PI, Number, as_array, as_float, cosine_and_sine, rounded, sine, total
 from cmmlink.reference.laying import Asked, Laid, Pose, at_datum, case_of, lay
 from cmmlink.reference.shapes import ellipse, straight_line
 
@@ -37,7 +37,8 @@ def builders() -> Iterator[Build]:
     yield lambda: _waves("filter-gaussian", "Three waves through a Gaussian filter.", three, Decimal(8), 0)
     yield lambda: _waves("filter-order-two", "Three waves through Gaussian regression of order 2.", three, Decimal(8), 2)
     yield lambda: _waves("filter-short-cutoff", "Three waves through a filter that leaves the longest two.", three, Decimal("2.5"), 2)
-    yield _parabola
+    yield lambda: _parabola("filter-parabola", "", {})
+    yield lambda: _parabola("filter-spikes", "robust ", {40: "-0.03", 41: "-0.035", 120: "0.02", 200: "-0.04", 288: "0.045"})
 
 
 def share_left(order: int, cutoff: Decimal, wave: Decimal) -> Decimal:
@@ -83,29 +84,36 @@ def _waves(name: str, what: str, waves: Sequence[Wave], cutoff: Decimal, order: 
 
 
 def _filtered(
-    name: str, about: str, curve: ExactCurve, laid: Laid, cutoff: Decimal, order: int, known: dict[str, list[Decimal]]
+    name: str, about: str, curve: ExactCurve, laid: Laid, cutoff: Decimal, order: int, known: dict[str, list[Decimal]], robust: str = ""
 ) -> ReferenceCase:
-    """The case of points whose waviness the plan asks for, at the datum, by regression of an order."""
+    """The case of points whose waviness the plan asks for, at the datum, by regression of an order. robust : that it is, as a word."""
     profile: dict[str, Any] = {"name": "profile", "type": "line-profile", "fit": "none", "zone": {"width_mm": 0.1}}
-    waviness = profile | {"name": "waviness", "filter": {"cutoff_mm": as_float(cutoff), "order": order}}
+    waviness = profile | {"name": "waviness", "filter": {"cutoff_mm": as_float(cutoff), "order": order, "robust": bool(robust)}}
     settings = at_datum(laid.pose) | {"characteristics": [profile, waviness]}
-    wanted = known[f"Gaussian regression of order {order}"]
+    wanted = known[f"{robust}Gaussian regression of order {order}"]
     value = KnownValue("waviness", "mm", as_float(2 * max(abs(each) for each in wanted)))
     filters = tuple(KnownFilter(words, as_float(cutoff), as_array(deviation)) for words, deviation in known.items())
     asked = Asked(name, "filter", about, (-0.05, 0.05), "conform", settings)
     return case_of(asked, curve, laid, filtered=filters, values=(value,))
 
 
-def _parabola() -> ReferenceCase:
-    """A straight part that is bent: order 2 leaves a parabola as it is, up to the ends and however points are spaced."""
+def _parabola(name: str, robust: str, spikes: dict[int, Number]) -> ReferenceCase:
+    """A straight part that is bent: order 2 leaves a parabola as it is, up to the ends and however points are spaced.
+
+    robust, spikes : the robust filter also leaves it where some points spike off it, by row: all others lie on it, and spikes count nothing
+    """
     count, length = 300, Decimal(100)
     along = [length * (Decimal(i) / (count - 1) + _bent(i, count)) for i in range(count)]
     feet = [Foot(s, Decimal(0), Decimal(0), Decimal(1)) for s in along]
-    deviation = [Decimal("0.03") - Decimal("0.0016") * s + Decimal("0.000014") * s * s for s in along]
+    bent = [Decimal("0.03") - Decimal("0.0016") * s + Decimal("0.000014") * s * s for s in along]
+    deviation = [Decimal(spikes[row]) if row in spikes else d for row, d in enumerate(bent)]
     laid = lay(feet, deviation, Pose.of("-15", "8", "2"))
-    about = "A parabola on a straight part, unevenly spaced: Gaussian regression of order 2 leaves it as it is, up to both ends."
-    known = {"Gaussian regression of order 2": laid.deviation}
-    return _filtered("filter-parabola", about, straight_line(100), laid, Decimal(12), 2, known)
+    left = [bent[row] if row in spikes else d for row, d in enumerate(laid.deviation)]
+    what = (
+        f", of which {len(spikes)} points are spikes: the robust filter leaves the parabola" if spikes else ": order 2 leaves it as it is"
+    )
+    about = f"A parabola on a straight part, unevenly spaced{what}, up to both ends."
+    return _filtered(name, about, straight_line(100), laid, Decimal(12), 2, {f"{robust}Gaussian regression of order 2": left}, robust)
 
 
 def _bent(i: int, count: int) -> Decimal:

@@ -103,6 +103,22 @@ def drop() -> ExactCurve:
 
 
 @cache
+def bow() -> ExactCurve:
+    """A bent section of even thickness: arcs of the radii 51.5 and 48.5 about (0, -40), and half circles of radius 1.5 around its ends.
+
+    The middle line is an arc of radius 50 from (-30, 0) to (30, 0); all numbers are exact.
+    """
+    right: Places = [("31.2", "-0.9"), ("32.1", "0.3"), ("30.9", "1.2")]
+    inner: Places = [("29.1", "-1.2"), ("30.3", "-2.1"), ("31.2", "-0.9")]
+
+    def mirrored(places: Places) -> Places:
+        return [(-Decimal(x), y) for x, y in reversed(places)]
+
+    ring: Places = [*right, (0, "24.375"), *mirrored(right), *mirrored(inner)[1:], (0, "20.625"), *inner]
+    return pieces(ring, (2, 1, 1, "0.8", 1, 1, 2, 1, 1, "0.8", 1, 1, 2))
+
+
+@cache
 def straight_line(length: Number) -> ExactCurve:
     """A straight line along x from the origin, the material below it."""
     return ExactCurve(1, tuple(map(Decimal, (0, 0, 1, 1))), _pairs([(0, 0), (length, 0)]), (Decimal(1),) * 2, False, "right")
