@@ -155,6 +155,11 @@ RUNS ?= 200
 verifier: .venv/test-installed
 	$(BIN)/python -m tests.docs.sound_runs $(RUNS)
 
+# A folder of airfoils, from the file to the minimum zone, held against the verifier's algorithms: `make airfoils FOLDER=...`.
+FOLDER ?= tests/data/airfoils
+airfoils: .venv/test-installed
+	$(BIN)/python -m tests.benchmarks.airfoil_folder $(FOLDER)
+
 # The audit of verdicts: live scans, minimum zones, partial scans and mirrored parts whose truth is known.
 audit: .venv/test-installed
 	$(BIN)/python -m tests.benchmarks.verdict_audit
