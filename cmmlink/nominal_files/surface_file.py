@@ -1,4 +1,4 @@
-"""Nominal surfaces from files: faces of STEP and IGES, exact where all are whole; triangles of STL, OBJ and PLY."""
+"""Nominal surfaces from files: faces of STEP and IGES, exact where all are whole; triangles of STL, OBJ and PLY; clouds of points."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,16 +7,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers import CadError, MeshError
+from drivers import CadError, MeshError, PointFileError, read_points
 from drivers.cad import CadFace, CadFaces, Kind, read_cad_faces
 from drivers.surface import Open3DMissing, Open3DProcess, SurfaceMesh, read_obj, read_stl
 from inspection import NominalError
-from inspection.surface import NominalSurface, PatchSurface, SplineFace, TriangleSurface
+from inspection.surface import CloudSurface, NominalSurface, PatchSurface, SplineFace, TriangleSurface
 
 Array = NDArray[np.float64]
 
 CHORD_MM = 0.001  # between trimmed faces and their triangles: well below what is measured, and counted against the verdict
-SURFACE_SUFFIXES = (".stl", ".obj", ".ply", ".step", ".stp", ".p21", ".igs", ".iges")
+_CLOUDS = (".xyz", ".asc", ".npy")
+SURFACE_SUFFIXES = (".stl", ".obj", ".ply", ".step", ".stp", ".p21", ".igs", ".iges", *_CLOUDS)
 _CAD: dict[str, Kind] = {".step": "step", ".stp": "step", ".p21": "step", ".igs": "iges", ".iges": "iges"}
 
 
@@ -26,7 +27,7 @@ class SurfaceFile:
 
     nominal       : in mm
     source_format : the name of the format
-    faces         : how many faces, or triangles
+    faces         : how many faces, triangles, or points that have a jet
     notes         : what was assumed, and what was done to it, in sentences
     """
 
@@ -45,7 +46,7 @@ def load_surface(
 ) -> SurfaceFile:
     """Read a nominal surface. Raises NominalError, which names the file and what to do.
 
-    scale            : mm that one unit of a mesh is; CAD files state their own unit
+    scale            : mm that one unit of a mesh or a cloud is; CAD files state their own unit
     nominal_error_mm : the chord tolerance with which a mesh was exported from CAD; None takes the mesh for the nominal itself
     chord_mm         : how far triangles may lie off trimmed faces
     """
@@ -54,6 +55,8 @@ def load_surface(
         return _of_cad(path, _CAD[kind], chord_mm, read_faces)
     if kind not in SURFACE_SUFFIXES:
         raise NominalError(f"{path}: not a format of surfaces; known are {', '.join(SURFACE_SUFFIXES)}")
+    if kind in _CLOUDS:
+        return _of_cloud(path, scale)
     mesh = _read_mesh(path, kind, scale)
     triangles = np.concatenate([np.array(piece, dtype=np.float64) for piece in mesh.pieces()])
     rounding = _rounding_mm(triangles, scale) if mesh.kind == "binary STL" else 0.0
@@ -64,6 +67,18 @@ def load_surface(
         )
     surface = TriangleSurface(triangles, (nominal_error_mm or 0.0) + rounding)
     return SurfaceFile(surface, mesh.kind, len(surface), (*notes, *surface.notes))
+
+
+def _of_cloud(path: Path, scale: float) -> SurfaceFile:
+    try:
+        found = read_points(path, scale)
+        cloud = CloudSurface(found.points_mm)
+    except PointFileError as error:
+        raise NominalError(str(error)) from None
+    except NominalError as error:
+        raise NominalError(f"{path}: {error}") from None
+    words = f"the nominal is a cloud of points: by how its jets disagree it lies up to {cloud.nominal_error_mm:.2g} mm off (95 %)"
+    return SurfaceFile(cloud, "points", len(cloud), (*found.notes, *cloud.notes, words))
 
 
 def _read_mesh(path: Path, kind: str, scale: float) -> SurfaceMesh:

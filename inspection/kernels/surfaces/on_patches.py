@@ -34,7 +34,16 @@ from inspection.kernels.surfaces.layout import (
     STACK,
 )
 from inspection.kernels.surfaces.piece_minimum import closest_on_piece, piece_at
-from inspection.kernels.surfaces.space_feet import AT_ONCE, SpaceFeet, empty_space_feet, next_leaf, square_from_last, store_no_foot
+from inspection.kernels.surfaces.space_feet import (
+    AT_ONCE,
+    SpaceFeet,
+    empty_space_feet,
+    nearby_first,
+    next_leaf,
+    put_back,
+    square_from_last,
+    store_no_foot,
+)
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]
@@ -77,10 +86,11 @@ def project_on_patches(points_mm: Array, tables: PatchTables, threads: int | Non
 
     threads : None chooses by the number of points; the result is the same.
     """
-    points = flatten(points_mm)
+    order = nearby_first(points_mm)
+    points = flatten(points_mm if order is None else points_mm[order])
     feet = empty_space_feet(len(points_mm))
     share_out(lambda claimed: _project_chunks(points, tables, feet, claimed), len(points_mm), threads)
-    return feet
+    return put_back(feet, order)
 
 
 @kernel

@@ -38,7 +38,16 @@ from inspection.kernels.surfaces.layout import (
     STACK,
     WAYS,
 )
-from inspection.kernels.surfaces.space_feet import AT_ONCE, SpaceFeet, empty_space_feet, next_leaf, square_from_last, store_no_foot
+from inspection.kernels.surfaces.space_feet import (
+    AT_ONCE,
+    SpaceFeet,
+    empty_space_feet,
+    nearby_first,
+    next_leaf,
+    put_back,
+    square_from_last,
+    store_no_foot,
+)
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]
@@ -78,10 +87,11 @@ def project_on_triangles(points_mm: Array, tables: TriangleTables, threads: int 
 
     threads : None chooses by the number of points; the result is the same.
     """
-    points = flatten(points_mm)
+    order = nearby_first(points_mm)
+    points = flatten(points_mm if order is None else points_mm[order])
     feet = empty_space_feet(len(points_mm))
     share_out(lambda claimed: _project_chunks(points, tables, feet, claimed), len(points_mm), threads)
-    return feet
+    return put_back(feet, order)
 
 
 @kernel

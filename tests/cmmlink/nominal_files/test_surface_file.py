@@ -8,7 +8,7 @@ import pytest
 from cmmlink.nominal_files.surface_file import load_surface
 from drivers.cad import OcctProcess
 from inspection import NominalError
-from inspection.surface import PatchSurface, TriangleSurface
+from inspection.surface import CloudSurface, PatchSurface, TriangleSurface
 from tests.drivers.surface.meshes import binary_stl, write
 
 TORUS_MM = (30.0, 8.0)  # these are what occt_writer.py makes
@@ -67,6 +67,18 @@ def test_a_mesh_is_taken_as_it_is_and_what_it_stands_for_is_asked(tmp_path: Path
     assert stated.notes == ()
     (tmp_path / "sheet.obj").write_text("v 0 0 0\nv 100 0 0\nv 100 50 0\nv 0 50 0\nf 1 2 3 4\n", encoding="ascii")
     assert load_surface(tmp_path / "sheet.obj").nominal.area_mm2 == pytest.approx(5000)
+
+
+def test_a_cloud_states_its_error(tmp_path: Path) -> None:
+    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(30.0), np.arange(20.0)))
+    np.savetxt(tmp_path / "sheet.xyz", np.column_stack([x, y, 100 + np.sin(x / 9)]), fmt="%.6f")
+    found = load_surface(tmp_path / "sheet.xyz")
+    assert isinstance(found.nominal, CloudSurface)
+    assert 0 < found.nominal.nominal_error_mm < 0.01
+    assert f"{found.nominal.nominal_error_mm:.2g} mm" in found.notes[-1]
+    assert abs(found.nominal.project([(15, 10, 100 + np.sin(15 / 9))]).distance_mm[0]) < found.nominal.nominal_error_mm
+    with pytest.raises(NominalError, match=r"few\.xyz: a cloud needs more than"):
+        load_surface(Path(write(tmp_path / "few.xyz", "1 2 3\n4 5 6\n")))
 
 
 def test_what_is_no_surface_is_refused_with_the_file(cad_files: Path, occt_process: OcctProcess, tmp_path: Path) -> None:

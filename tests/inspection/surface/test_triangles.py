@@ -7,6 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from inspection import NominalError, Rejection
+from inspection.kernels.surfaces.space_feet import nearby_first
 from inspection.surface import FootKind, SurfaceFeet, TriangleSurface, rejections
 from tests.inspection.surface import meshes
 
@@ -113,6 +114,22 @@ def test_no_bit_depends_on_batch_order_or_threads() -> None:
     for one, other in zip(whole, pieces, strict=True):
         assert np.array_equal(one[shuffled], other, equal_nan=True)
     assert np.array_equal(whole[1], surface.project(points, threads=3).distance_mm, equal_nan=True)
+
+
+def test_scattered_points_are_looked_at_in_order_and_come_back_in_theirs() -> None:
+    surface = TriangleSurface(meshes.sphere(20))
+    scattered = np.random.default_rng(10).uniform(-35, 35, (3000, 3))
+    scattered[100] = np.nan
+    order = nearby_first(scattered)
+    assert order is not None
+    assert sorted(order.tolist()) == list(range(3000))
+    steps = [float(np.nanmedian(np.abs(np.diff(points, axis=0)))) for points in (scattered, scattered[order])]
+    assert steps[1] < steps[0] / 3
+    assert nearby_first(scattered[order]) is None
+    whole = rows(surface.project(scattered))
+    parts = [rows(surface.project(part)) for part in np.split(scattered, 5)]  # too few to be ordered
+    for one, other in zip(whole, (np.concatenate(column) for column in zip(*parts, strict=True)), strict=True):
+        assert np.array_equal(one, other, equal_nan=True)
 
 
 def test_points_that_are_no_place_have_no_foot() -> None:
