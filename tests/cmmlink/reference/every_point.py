@@ -3,6 +3,7 @@
 import sys
 import tempfile
 import time
+import traceback
 from pathlib import Path
 
 from cmmlink.nominal_files import load_nominal
@@ -47,9 +48,9 @@ def main() -> int:
             try:
                 check_case(folder / name)
                 print(f"{name}: true ({time.monotonic() - begun:.1f} s)", flush=True)
-            except AssertionError as error:
+            except AssertionError:
                 failed += 1
-                print(f"{name}: NOT TRUE: {error.__traceback__ and error} ", flush=True)
+                print(f"{name}: NOT TRUE\n{traceback.format_exc()}", flush=True)
         return 1 if failed else 0
 
 
