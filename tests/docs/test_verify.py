@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from docs.verify import verify
+from docs.verify import best_fit, verify
 from tests.cmmlink.command import cmmlink
 from tests.docs.evidence import Evidence
 
@@ -281,3 +281,19 @@ def test_the_walk_of_an_auditor_is_as_its_page_tells_it(tmp_path: Path) -> None:
         assert [numbers.sub("#", line) for line in printed] == [
             numbers.sub("#", line) for line in shown[f"plain/bin/python verify.py {folder}"].splitlines()
         ]
+
+
+@pytest.mark.parametrize(("turned_deg", "moved_mm", "holds"), [(0.0, 0.0, True), (1e-5, 0.0, False), (0.0, 1e-5, False)])
+def test_a_best_fit_is_told_from_a_placement_beside_it(
+    sound: Evidence, turned_deg: float, moved_mm: float, holds: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(best_fit, "STARTS", 3)
+    check = best_fit.verify.Check(sound.folder)
+    one = check.result["characteristics"][0]
+    assert one["fit"] == "best-fit"
+    x, y = one["pose"]["translation_mm"]
+    pose = {"rotation_deg": one["pose"]["rotation_deg"] + turned_deg, "translation_mm": [x, y + moved_mm]}
+    best_fit.check_fit(check, one | {"pose": pose}, check.zone_of(-1))
+    assert ("NOT TRUE" not in check.findings) is holds
+    told = [sentence for heap in check.findings.values() for sentence in heap if "step is left" in sentence or "fits better" in sentence]
+    assert len(told) == 2
