@@ -22,12 +22,13 @@ class TriangleSurface:
 
     nominal_error_mm : bound of how far the triangles lie off the surface that they stand for, such as the chord tolerance of an export;
                        0 for triangles that are the nominal themselves
+    is_closed        : whether it has no border
     face             : (n,) the face that each triangle belongs to; None for the number of the triangle itself
 
     Raises NominalError for triangles (n, 3, 3) of which no surface can be made.
     """
 
-    __slots__ = ("_face", "_tables", "area_mm2", "nominal_error_mm", "notes", "size_mm", "welded")
+    __slots__ = ("_corners_mm", "_face", "_tables", "area_mm2", "is_closed", "nominal_error_mm", "notes", "size_mm")
 
     def __init__(self, triangles_mm: ArrayLike, nominal_error_mm: float = 0.0, face: ArrayLike | None = None) -> None:
         loose = np.asarray(triangles_mm, dtype=np.float64)
@@ -37,22 +38,19 @@ class TriangleSurface:
             raise NominalError("a corner of a triangle is not finite, or farther than a kilometre from zero")
         if not 0 <= nominal_error_mm < np.inf:
             raise NominalError(f"the error of the nominal must be a finite number, zero or more, got {nominal_error_mm:g} mm")
-        self.welded: WeldedTriangles = weld(loose)
+        welded = weld(loose)
+        self._corners_mm = welded.corners_mm
+        self.is_closed = not welded.is_open.any()
         self.nominal_error_mm = float(nominal_error_mm)
-        self.notes = self.welded.notes
-        self.size_mm = float(np.ptp(self.welded.corners_mm, axis=0).max())
-        given = self.welded.given
+        self.notes = welded.notes
+        self.size_mm = float(np.ptp(welded.corners_mm, axis=0).max())
+        given = welded.given
         self._face = (given if face is None else np.asarray(face)[given]).astype(np.int32)
-        self._tables, area = _tables_of(self.welded, self.size_mm)
+        self._tables, area = _tables_of(welded, self.size_mm)
         self.area_mm2 = float(area.sum())
 
     def __len__(self) -> int:
-        return len(self.welded.triangles)
-
-    @property
-    def is_closed(self) -> bool:
-        """Whether the surface has no border."""
-        return not self.welded.is_open.any()
+        return len(self._face)
 
     def project(self, points_mm: ArrayLike, threads: int | None = None) -> SurfaceFeet:
         """Closest points of the surface to points (m, 3); see `NominalSurface`. The number of threads changes no bit."""
@@ -60,7 +58,7 @@ class TriangleSurface:
 
     def sample(self, count: int) -> tuple[Array, Array]:
         """At least `count` places (n, 3) spread over the area, and the normals (n, 3) there: each triangle is cut into like ones."""
-        corners = self.welded.corners_mm[self.welded.triangles]
+        corners = self._corners_mm[self._tables.triangles.reshape(-1, 3)]
         a, e, g = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
         owner = shares_of(np.linalg.norm(np.cross(e, g), axis=1), count)
         first, second = spread_within(owner)
