@@ -46,11 +46,11 @@ MUTANTS = (
         "= foot[FOOT_U], -foot[FOOT_DISTANCE]",
     ),
     Mutant(
-        "a fit that ends a step too early",
+        "a fit that ends twenty picometres off",
         "pose",
-        "inspection/kernels/pose.py",
-        "if moved_mm <= _STANDSTILL_MM or",
-        "if moved_mm <= 1e-2 or",
+        "inspection/fine.py",
+        "return RigidTransform(fit.pose[0], np.array(fit.pose[1:]))",
+        "return RigidTransform(fit.pose[0], np.array(fit.pose[1:]) + 2e-8)",
     ),
     Mutant(
         "a zone that is a nanometre wider",
