@@ -297,8 +297,8 @@ class Check:
         announced = max((one.get("expected", one.get("sent")) or 0 for one in told["ScanOpened"] + told["ScanClosed"]), default=0)
         self.missing = lost > 0 or damaged > 0 or dropped > harmless or announced > came - harmless + max(lost, 0)
         self.missing |= not np.isin(rejection, (0, BEYOND_END)).all()
-        anew = any(one["event"] == "ScanOpened" and one["points"] > 0 for one in events)
-        self.doubts = {"the scan did not end": not (self.result["complete"] and told["ScanClosed"]), "the device began anew": anew}
+        anew, end = any(one["event"] == "ScanOpened" and one["points"] > 0 for one in events), json.loads(self.bodies["end"][0])
+        self.doubts = {"the scan did not end": not (self.result["complete"] and end["state"] == "complete"), "the device began anew": anew}
 
     def check_deviations(self) -> None:
         """Every deviation anew, at the recorded placement."""
@@ -324,13 +324,12 @@ class Check:
         beyond, _, there = curve.closest(placed(flat[rejection == BEYOND_END], pose))
         self.say(there.all() and not at_end.any(), "The points that were left out as beyond an end lie there, and no others.")
         self.beyond_mm = float((np.abs(beyond) - self.radius).max(initial=0.0))
-        d, s = self.deviation, np.sort(self.station)
+        self.zone = zone = [result["tolerance"][key] for key in ("lower_mm", "upper_mm", "uncertainty_mm")]
+        d, s, guard = self.deviation, np.sort(self.station), zone[2] * (plan["decision_rule"] != "simple")
         self.gap_mm = plan["gap_max_mm"] or max(curve.length / 100, plan["allow.unseen_mm"] or 0.0)
         gaps = np.diff(s, append=s[0] + curve.length) if curve.closed else np.diff(s, prepend=0.0, append=curve.length)
         self.facts = {"coverage": gaps[gaps <= self.gap_mm].sum() / curve.length, "largest_gap_mm": gaps.max()}
-        self.zone = zone = [result["tolerance"][key] for key in ("lower_mm", "upper_mm", "uncertainty_mm")]
         found = {"max_deviation_mm": d.max(), "min_deviation_mm": d.min(), "profile_error_mm": 2 * np.abs(d).max()} | self.facts
-        guard = 0.0 if plan["decision_rule"] == "simple" else zone[2]
         out = int(((d > zone[1] + guard) | (d < zone[0] - guard)).sum())
         same = all(abs(result[key] - value) < FITTED_MM for key, value in found.items()) and result["out_of_tolerance"] == out
         self.say(same, f"The longest gap is {gaps.max():.3f} mm; {self.facts['coverage']:.1%} was measured; {out} points are out.")
@@ -368,8 +367,9 @@ class Check:
         else:
             self.say(self.curve.search(self.flat, low - guard, high + guard), f"{verdict}, for no placement passes.")
         if proof and proof["proven"]:
-            middle, half = (low + high) / 2, found["value"] / 2 - proof["gap_mm"]
-            self.say(half < 0 or self.curve.search(self.flat, middle - half, middle + half), f"{name}: no zone is below {2 * half:.6f} mm.")
+            middle, half, same = (low + high) / 2, found["value"] / 2 - proof["gap_mm"], abs(proof["zone_mm"] - found["value"]) < FITTED_MM
+            none = half < 0 or self.curve.search(self.flat, middle - half, middle + half) if same else None  # not of all points
+            self.say(none, f"{name}: no placement has a zone of less than {2 * half:.6f} mm.")
 
     def find_doubts(self, one: Any, zone: list[float], d: Array, guard: float) -> dict[str, bool]:
         """What keeps a line-profile with deviations d (k,) from being proven to conform."""

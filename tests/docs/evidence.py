@@ -148,8 +148,8 @@ def _say_nothing_of_losses(evidence: Evidence) -> bool:
 
 
 def _cut(evidence: Evidence) -> bool:
-    evidence.rows.pop()
-    evidence.bodies.pop()
+    end = next(k for k, row in enumerate(evidence.rows) if row["kind"] == "end")  # what was added behind it goes as well
+    del evidence.rows[end:], evidence.bodies[end:]
     evidence.write()
     return True
 
