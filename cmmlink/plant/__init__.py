@@ -1,0 +1,31 @@
+"""What a plant learns from many runs: control charts, capability of a process and studies of gauges. This is the front door."""
+
+TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer to load than all of this
+
+if TYPE_CHECKING:
+    from cmmlink.plant.capability_indices import Capability, CapabilityIndex, capability
+    from cmmlink.plant.control_charts import ControlChart, ControlCharts, individuals_charts, mean_range_charts
+    from cmmlink.plant.western_electric import ControlLimits, RuleViolation
+else:
+    from cmmlink.front_door import load_on_use
+
+    _PLACES = {
+        "cmmlink.plant.capability_indices": ("Capability", "CapabilityIndex", "capability"),
+        "cmmlink.plant.control_charts": ("ControlChart", "ControlCharts", "individuals_charts", "mean_range_charts"),
+        "cmmlink.plant.western_electric": ("ControlLimits", "RuleViolation"),
+    }
+
+    __getattr__ = load_on_use(__name__, _PLACES)
+
+
+__all__ = [
+    "Capability",
+    "CapabilityIndex",
+    "ControlChart",
+    "ControlCharts",
+    "ControlLimits",
+    "RuleViolation",
+    "capability",
+    "individuals_charts",
+    "mean_range_charts",
+]
