@@ -5,6 +5,7 @@ TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer 
 if TYPE_CHECKING:
     from cmmlink.plant.capability_indices import Capability, CapabilityIndex, capability
     from cmmlink.plant.control_charts import ControlChart, ControlCharts, individuals_charts, mean_range_charts
+    from cmmlink.plant.gauge_studies import CrossedStudy, StationStudy, TypeOneStudy, crossed_study, station_study, type_one_study
     from cmmlink.plant.western_electric import ControlLimits, RuleViolation
 else:
     from cmmlink.front_door import load_on_use
@@ -12,6 +13,14 @@ else:
     _PLACES = {
         "cmmlink.plant.capability_indices": ("Capability", "CapabilityIndex", "capability"),
         "cmmlink.plant.control_charts": ("ControlChart", "ControlCharts", "individuals_charts", "mean_range_charts"),
+        "cmmlink.plant.gauge_studies": (
+            "CrossedStudy",
+            "StationStudy",
+            "TypeOneStudy",
+            "crossed_study",
+            "station_study",
+            "type_one_study",
+        ),
         "cmmlink.plant.western_electric": ("ControlLimits", "RuleViolation"),
     }
 
@@ -24,8 +33,14 @@ __all__ = [
     "ControlChart",
     "ControlCharts",
     "ControlLimits",
+    "CrossedStudy",
     "RuleViolation",
+    "StationStudy",
+    "TypeOneStudy",
     "capability",
+    "crossed_study",
     "individuals_charts",
     "mean_range_charts",
+    "station_study",
+    "type_one_study",
 ]

@@ -1,11 +1,13 @@
 """Values with results that others printed; each was found in at least two places, or is confirmed by its own printed mean.
 
-FLOW     : NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.2, flow rate of ten batches.
-RINGS    : inside diameters of piston rings, D. C. Montgomery, Introduction to Statistical Quality Control, 2nd ed., pages 206 to 213,
+FLOW : NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.2, flow rate of ten batches.
+RINGS : inside diameters of piston rings, D. C. Montgomery, Introduction to Statistical Quality Control, 2nd ed., pages 206 to 213,
            as the package qcc of R hands them out; the first 25 samples were taken while the process was in control.
-AMPS     : gain of amplifiers, SAS/QC User's Guide, CAPABILITY procedure, sample CAPSPEC3.
-MAVRO    : NIST Statistical Reference Datasets, univariate, Mavro.dat.
-LEW      : NIST Statistical Reference Datasets, univariate, Lew.dat.
+AMPS : gain of amplifiers, SAS/QC User's Guide, CAPABILITY procedure, sample CAPSPEC3.
+GAUGE : AIAG, Measurement Systems Analysis, 4th edition 2010, chapter III section B: ten parts, three appraisers, three trials each;
+           the same numbers are in B. McNeese, Three Ways to Analyze a Gage R&R Study, BPI Consulting 2015, and in Minitab's example.
+MAVRO : NIST Statistical Reference Datasets, univariate, Mavro.dat.
+LEW : NIST Statistical Reference Datasets, univariate, Lew.dat.
 """
 
 FLOW = [49.6, 47.6, 49.9, 51.3, 47.8, 51.2, 52.6, 52.4, 53.6, 52.1]
@@ -66,6 +68,32 @@ AMPS = _numbers("""
     5.03 4.50 5.35 4.55 4.05 6.63 5.32 5.24 5.73 5.08 5.07 5.42 5.05 5.70 4.79 4.34 5.06 4.64 4.82 3.24
     4.79 4.46 3.84 5.05 5.46 4.64 6.13 4.31 4.81 4.98 4.95 5.57 4.11 4.15 5.95
 """)
+GAUGE = {
+    "A": [
+        _numbers(line)
+        for line in """
+    0.29 -0.56 1.34 0.47 -0.80 0.02 0.59 -0.31 2.26 -1.36
+    0.41 -0.68 1.17 0.50 -0.92 -0.11 0.75 -0.20 1.99 -1.25
+    0.64 -0.58 1.27 0.64 -0.84 -0.21 0.66 -0.17 2.01 -1.31
+""".strip().splitlines()
+    ],
+    "B": [
+        _numbers(line)
+        for line in """
+    0.08 -0.47 1.19 0.01 -0.56 -0.20 0.47 -0.63 1.80 -1.68
+    0.25 -1.22 0.94 1.03 -1.20 0.22 0.55 0.08 2.12 -1.62
+    0.07 -0.68 1.34 0.20 -1.28 0.06 0.83 -0.34 2.19 -1.50
+""".strip().splitlines()
+    ],
+    "C": [
+        _numbers(line)
+        for line in """
+    0.04 -1.38 0.88 0.14 -1.46 -0.29 0.02 -0.46 1.77 -1.49
+    -0.11 -1.13 1.09 0.20 -1.07 -0.67 0.01 -0.56 1.45 -1.77
+    -0.15 -0.96 0.67 0.11 -1.45 -0.49 0.21 -0.49 1.87 -2.16
+""".strip().splitlines()
+    ],
+}  # appraiser, trial, part
 MAVRO = _numbers("""
     2.00180 2.00170 2.00180 2.00190 2.00180 2.00170 2.00150 2.00140 2.00150 2.00150
     2.00170 2.00180 2.00180 2.00190 2.00190 2.00210 2.00200 2.00160 2.00140 2.00130
