@@ -165,7 +165,10 @@ def _from_folded(charts: ControlCharts, zone: _Zone, upper: float) -> Capability
     others, tail = [_upper_index(upper, fit) for fit in fits], (1 - zone.confidence) / 2
     low, high = np.quantile(others, [tail, 1 - tail]).tolist()
     ppk = CapabilityIndex(_upper_index(upper, fitted), low, high)
-    note = f"A folded normal distribution was fitted to the deviations of form and not refused (level {level:.3f}, Anderson-Darling)."
+    note = (
+        f"A folded normal distribution was fitted to the deviations of form and not refused (level {level:.3f}, Anderson-Darling); "
+        f"{len(values)} values do not exclude a longer tail."
+    )
     return _of_form(charts, zone, ppk, "folded normal", note)
 
 

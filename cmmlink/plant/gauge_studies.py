@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.stats import f as f_distribution
 from scipy.stats import t as t_distribution
 
-from cmmlink.plant.crossed_anova import CrossedSums, VarianceComponents, components_of, sums_of_squares
+from cmmlink.plant.crossed_anova import CrossedSums, Source, VarianceComponents, components_of, sums_of_squares
 
 _USUAL_REPEATS = 25  # at least so many are asked of a type-1 study, better 50
 ALPHA_TO_POOL = 0.25  # AIAG, appendix A: an interaction above this level is taken for noise
@@ -73,16 +73,18 @@ class StudyLine:
 class CrossedStudy:
     """A gauge R&R study.
 
-    anova          : the analysis with the interaction
-    pooled         : whether the interaction was taken for noise, so that the components come from the analysis without it
-    lines          : repeatability (EV), operator, interaction, reproducibility (AV), gauge R&R, part (PV), total (TV)
-    categories     : ndc, how many groups of parts the gauge tells apart; None when the gauge adds nothing
-    notes          : what was assumed, in whole sentences
+    anova      : the analysis with the interaction
+    pooled     : whether the interaction was taken for noise, so that the components come from the analysis without it
+    lines      : repeatability (EV), operator, interaction, reproducibility (AV), gauge R&R, part (PV), total (TV)
+    freedom    : degrees of freedom of the repeatability
+    categories : ndc, how many groups of parts the gauge tells apart; None when the gauge adds nothing
+    notes      : what was assumed, in whole sentences
     """
 
     anova: tuple[AnovaLine, ...]
     pooled: bool
     lines: tuple[StudyLine, ...]
+    freedom: int
     categories: int | None
     notes: tuple[str, ...]
 
@@ -152,8 +154,9 @@ def crossed_study(values: ArrayLike, tolerance: float | None = None, *, alpha: f
     level = float(_interaction_level(sums))
     pooled = level > alpha
     components = components_of(sums, np.asarray(pooled))
-    lines = _study_lines(components, tolerance)
-    return CrossedStudy(_anova(sums, level), pooled, lines, _categories(components), _notes(components, level, alpha, pooled))
+    freedom = sums.freedom["repeatability"] + (sums.freedom["interaction"] if pooled else 0)
+    notes = _notes(components, level, alpha, pooled)
+    return CrossedStudy(_anova(sums, level), pooled, _study_lines(components, tolerance), freedom, _categories(components), notes)
 
 
 def station_study(values: ArrayLike, *, alpha: float = ALPHA_TO_POOL) -> StationStudy:
@@ -166,8 +169,7 @@ def station_study(values: ArrayLike, *, alpha: float = ALPHA_TO_POOL) -> Station
     sums = sums_of_squares(measured)
     pooled = _interaction_level(sums) > alpha
     found = components_of(sums, pooled)
-    roots = (np.sqrt(part) for part in (found.repeatability, found.reproducibility, found.gauge, found.part))
-    return StationStudy(*roots, pooled=pooled)
+    return StationStudy(np.sqrt(found.repeatability), np.sqrt(found.reproducibility), np.sqrt(found.gauge), np.sqrt(found.part), pooled)
 
 
 def _finite(values: ArrayLike, dimensions: int, with_gaps: bool = False) -> NDArray[np.float64]:
@@ -204,7 +206,7 @@ def _anova(sums: CrossedSums, level: float) -> tuple[AnovaLine, ...]:
     square = {source: float(sums.mean_square(source)) for source in sums.freedom}
     inner, repeat = square["interaction"], square["repeatability"]
 
-    def tested(source: str) -> AnovaLine:
+    def tested(source: Source) -> AnovaLine:
         ratio = square[source] / inner if inner else math.inf
         beyond = float(f_distribution.sf(ratio, sums.freedom[source], sums.freedom["interaction"]))
         return AnovaLine(source, sums.freedom[source], float(sums.squares[source]), square[source], ratio, beyond)

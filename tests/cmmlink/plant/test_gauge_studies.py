@@ -41,12 +41,14 @@ def test_the_components_are_the_printed_ones() -> None:
     assert f"{100 * study.line('gauge R&R').to_total:.2f}" == "27.86"
     assert study.line("gauge R&R").to_tolerance == pytest.approx(6 * 0.3023715 / 8, rel=1e-5)
     assert study.categories == 4
+    assert study.freedom == 78
     assert "was pooled with the repeatability, since its level lies above 0.25" in study.notes[0]
 
 
 def test_an_interaction_that_is_kept_leaves_the_repeatability_alone() -> None:
     study = crossed_study(AIAG, alpha=0.98)
     assert not study.pooled
+    assert study.freedom == 60
     assert f"{study.line('repeatability').sigma:.6f}" == "0.214435"
     assert study.line("interaction").sigma == 0
     assert "The variance of the source interaction came out negative and counts as zero." in study.notes
@@ -56,8 +58,9 @@ def test_an_interaction_that_is_kept_leaves_the_repeatability_alone() -> None:
 def _designed(spread: float) -> NDArray[np.float64]:
     """Parts 10, 20, 30; operators 0, 5, -5; an interaction whose rows and columns add up to zero; two repeats at -spread and spread."""
     inner = np.array([[4, -4, 0], [-4, 0, 4], [0, 4, -4]])
-    cells = np.array([10, 20, 30])[:, None] + np.array([0, 5, -5]) + inner
-    return cells[:, :, None] + np.array([-spread, spread])
+    cells = np.array([10.0, 20.0, 30.0])[:, None] + np.array([0.0, 5.0, -5.0]) + inner
+    values: NDArray[np.float64] = cells[:, :, None] + np.array([-spread, spread])
+    return values
 
 
 def test_a_significant_interaction_is_kept_and_all_variances_are_those_worked_out_by_hand() -> None:
