@@ -77,7 +77,7 @@ class CrossedStudy:
     pooled     : whether the interaction was taken for noise, so that the components come from the analysis without it
     lines      : repeatability (EV), operator, interaction, reproducibility (AV), gauge R&R, part (PV), total (TV)
     freedom    : degrees of freedom of the repeatability
-    categories : ndc, how many groups of parts the gauge tells apart; None when the gauge adds nothing
+    categories : ndc, how many groups of parts the gauge tells apart
     notes      : what was assumed, in whole sentences
     """
 
@@ -85,7 +85,7 @@ class CrossedStudy:
     pooled: bool
     lines: tuple[StudyLine, ...]
     freedom: int
-    categories: int | None
+    categories: int
     notes: tuple[str, ...]
 
     def line(self, source: str) -> StudyLine:
@@ -239,10 +239,8 @@ def _study_lines(found: VarianceComponents, tolerance: float | None) -> tuple[St
     return tuple(lines)
 
 
-def _categories(found: VarianceComponents) -> int | None:
+def _categories(found: VarianceComponents) -> int:
     """The number of distinct categories, cut to a whole number and at least one."""
-    if not found.gauge:
-        return None
     return max(1, int(_CATEGORIES * math.sqrt(float(found.part) / float(found.gauge))))
 
 
