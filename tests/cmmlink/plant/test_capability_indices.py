@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from scipy.stats import halfnorm, norm
+from scipy.stats import expon, halfnorm, norm
 
 from cmmlink.plant import capability, individuals_charts, mean_range_charts
 from cmmlink.plant.folded_normal import FoldedNormal, fit_folded_normal
-from cmmlink.plant.goodness_of_fit import anderson_darling, normal_distance
+from cmmlink.plant.goodness_of_fit import anderson_darling, is_normal
 from tests.cmmlink.plant.published_values import AMPS, LEW, MAVRO, RINGS
 
 
@@ -134,9 +134,17 @@ def test_two_sided_values_that_are_not_normal_take_their_percentiles_when_there_
     assert found.ppk.value == pytest.approx(1.5 / 0.9973, rel=1e-4)
 
 
+def test_each_side_is_held_against_its_own_tail() -> None:
+    skew = np.random.default_rng(6).permutation(expon.ppf((np.arange(2000) + 0.5) / 2000))
+    median, low, high = (float(np.quantile(skew, share)) for share in (0.5, 1 - norm.cdf(3), norm.cdf(3)))
+    below, above = capability(individuals_charts(skew), -0.1, 99.0), capability(individuals_charts(skew), -99.0, 7.0)
+    assert below.ppk.value == pytest.approx((median + 0.1) / (median - low), rel=1e-9)
+    assert above.ppk.value == pytest.approx((7 - median) / (high - median), rel=1e-9)
+
+
 def test_the_test_of_normality_refuses_one_normal_sample_in_twenty() -> None:
     drawn = np.random.default_rng(5).normal(3.0, 0.2, size=(4000, 40))
-    refused = np.mean([normal_distance(row) > 0.752 for row in drawn])
+    refused = np.mean([not is_normal(row) for row in drawn])
     assert 0.04 < refused < 0.06
 
 

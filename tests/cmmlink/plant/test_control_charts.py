@@ -90,6 +90,21 @@ def test_no_range_is_taken_across_a_run_without_a_value() -> None:
     assert charts.notes[-1] == "Without a value: 1 runs, of which the chart says nothing."
 
 
+def test_ranges_on_both_sides_of_a_gap_share_no_value_and_are_worth_more() -> None:
+    d2, d3 = 2 / math.sqrt(math.pi), math.sqrt(2 - 4 / math.pi)
+    apart = d3**2 / 2 / d2**2  # relative variance of the mean of two ranges that are independent
+    freedom = 1 / (2 * math.sqrt(1 + 2 * apart) - 2)
+    assert individuals_charts([1.0, 2.0, np.nan, 9.0, 10.0]).degrees_of_freedom == pytest.approx(freedom, rel=1e-9)
+    assert individuals_charts([1.0, 2.0, 9.0]).degrees_of_freedom < 0.9 * freedom
+
+
+def test_a_range_that_is_too_small_to_be_true_is_out_of_control() -> None:
+    groups = np.random.default_rng(12).normal(size=(25, 10))
+    groups[20] = groups[20, 0]
+    charts = mean_range_charts(groups, limits_from=20)
+    assert [(violation.at, violation.above) for violation in charts.spread.violations] == [(20, False)]
+
+
 def test_a_subgroup_that_lacks_a_value_is_refused() -> None:
     with pytest.raises(ValueError, match="subgroup 1 lacks a value"):
         mean_range_charts([[1.0, 2.0], [1.0, np.nan]])

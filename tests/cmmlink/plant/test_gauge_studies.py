@@ -101,6 +101,13 @@ def test_variances_that_were_put_in_are_found_at_every_station() -> None:
     assert one.line("gauge R&R").sigma == pytest.approx(found.gauge[17], rel=1e-12)
 
 
+def test_every_station_pools_as_a_study_of_it_alone_would() -> None:
+    values = np.random.default_rng(10).normal(size=(4, 3, 2, 60))
+    pooled = station_study(values).pooled.tolist()
+    assert pooled == [crossed_study(values[..., station]).pooled for station in range(60)]
+    assert 0.6 < np.mean(pooled) < 0.9  # without an interaction the level is spread evenly, and three in four lie above 0.25
+
+
 def test_a_gap_in_one_scan_leaves_that_station_without_a_result_and_no_other() -> None:
     values = np.random.default_rng(1).normal(size=(3, 2, 2, 5))
     whole = station_study(values)
