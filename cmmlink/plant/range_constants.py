@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,7 @@ class RangeConstants:
     D4: float
 
 
+@cache
 def range_constants(size: int) -> RangeConstants:
     """The constants of subgroups of that many values, from 2 to 100."""
     if not 2 <= size <= _LARGEST_SIZE:
