@@ -2,7 +2,9 @@
 
 A scan's line holds bare numbers, whole points one behind the other; a length that is no multiple of the columns is damage, not a point.
 A server that splits a point over two lines is understood where the two lines together hold whole points, and where every point tells its
-direction or its radius: only these show that the right parts were put together.
+direction or its radius: only these show that the right parts were put together. Behind damage, until the scan ends, a line of a whole
+length may begin within a point as well; then it is taken where all its points fit, and would not if it began within a point. Columns that
+tell neither direction nor radius show nothing of it, so nothing of a scan is taken behind a line of another length.
 
 Nothing of the protocol carries a checksum or counts points. So whatever else the columns tell is held against what is known: a direction
 has length 1, a quality lies between 0 and 100, and the effective radius of the tip is that of the plan.
@@ -65,9 +67,15 @@ class PointReader:
         self.count = 0  # of the points that came whole, used or not
         self._held: list[float] = []
         self._held_bytes = 0
+        self._in_doubt = False  # whether lines of this scan begin with a point
         self._sequence: list[int] = []
         self._points_mm: list[tuple[float, float, float]] = []
         self.out = Outbox(self._batch)
+
+    @property
+    def _tells_beginnings(self) -> bool:
+        """Whether the columns, which are agreed on after the session began, show where a point begins."""
+        return bool(_CHECKED & set(self.columns))
 
     def take_scan_line(self, data: str) -> None:
         """Take a data line of a scan."""
@@ -77,11 +85,12 @@ class PointReader:
             self.damage(len(data), "data of a scan that are not numbers")
             return
         width = sum(WIDTHS[name] for name in self.columns)
-        if not self._held and len(found) % width and _CHECKED & set(self.columns):
+        if not self._held and len(found) % width and self._tells_beginnings:
             self._held, self._held_bytes = found, len(data)
             return
         rows = self._held + found
         if len(rows) % width:
+            self._in_doubt = True
             self.damage(self._held_bytes + len(data), "scan data that hold no whole number of points")
         else:
             self._take_rows(rows, width, self._held_bytes + len(data))
@@ -101,6 +110,7 @@ class PointReader:
     def end_scan(self) -> None:
         """Note the end of a scan: what is held of a point is none."""
         self.drop_held()
+        self._in_doubt = False
 
     def drop_held(self) -> None:
         """Count the line that was held, for the other part of its last point, as damage."""
@@ -110,16 +120,34 @@ class PointReader:
 
     def damage(self, byte_count: int, reason: str) -> None:
         """Count bytes that are no points."""
+        self._in_doubt |= self._tells_beginnings
         self.out.append(Damaged(byte_count, reason))
 
     def _take_rows(self, numbers: list[float], width: int, size: int) -> None:
-        """Take whole points. Of lines that were put together, one that cannot be used shows that they may not belong together."""
-        points = [self._values_of(numbers[at : at + width]) for at in range(0, len(numbers), width)]
-        if self._held and not all(_are_sound(values) and not self._check.refusal(values) for values in points):
+        """Take whole points. Of lines that need not begin with a point, one that cannot be used shows that they may not belong together."""
+        rows = [numbers[at : at + width] for at in range(0, len(numbers), width)]
+        fit = [self._fits(row) for row in rows]
+        if self._held and not all(fit):
             self.damage(size, "scan data that hold no whole number of points")
             return
-        for values in points:
-            self._take(values, size // len(points))
+        if self._in_doubt and any(fit) and not (all(fit) and self._begins_with_a_point(numbers, width)):
+            self.damage(size, "scan data behind damage that do not show where a point begins")
+            return
+        for row in rows:
+            self._take(self._values_of(row), size // len(rows))
+
+    def _fits(self, row: Sequence[float]) -> bool:
+        """Tell whether the numbers are those of a point that can be used."""
+        values = self._values_of(row)
+        return _are_sound(values) and not self._check.refusal(values)
+
+    def _begins_with_a_point(self, numbers: list[float], width: int) -> bool:
+        """Tell whether the numbers of a line that fit as they stand would not fit if the line began within a point.
+
+        Such a line ends with the beginning of another point, which stands before the rest at the line's own beginning here.
+        """
+        turned = (numbers[-shift:] + numbers[:-shift] for shift in range(1, width))
+        return all(not all(self._fits(other[at : at + width]) for at in range(0, len(other), width)) for other in turned)
 
     def _values_of(self, row: Sequence[float]) -> dict[str, Sequence[float]]:
         """The values of a point by the names of their columns."""

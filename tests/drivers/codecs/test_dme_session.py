@@ -157,7 +157,7 @@ def scanned(*said: str, columns: int = 12) -> Account:
     ("said", "points", "damaged"),
     [
         (("&", "# 0,0,1.5,0.5001,0", "# 1.5002,1.0002,0,1.4999", "%"), (), True),  # split, and nothing shows that the parts belong together
-        (("&", "# 0,0,1.5,0.5001,0", "# 1.0002,0,1.4999", "%"), (SCANNED_MM[2],), True),
+        (("&", "# 0,0,1.5,0.5001,0", "# 1.5002,1.0002,0", "%"), (), True),  # fits by its length, and is of two points
         (("&", "# 0,0,1.5,0.5001,0", "%"), (), True),
         (("&", "# 0,0,1.5", "# 0.5001,O,1.5002", "# 1.0002,0,1.4999", "%"), (SCANNED_MM[0], SCANNED_MM[2]), True),
         (("# 0,0,1.5", "&", "# 0.5001,0,1.5002", "%"), (SCANNED_MM[1],), True),  # before it was acknowledged

@@ -53,6 +53,7 @@ def lines_of(sent: np.ndarray[tuple[int, int], np.dtype[np.float64]], rng: np.ra
 
 @given(st.integers(0, 2**32), st.sampled_from([0.0, 0.05, 0.3]))
 @example(75405, 0.3)  # behind a damaged line: two lines that fit by their length, the radius of one point standing where x should
+@example(900839, 0.3)  # one whole line of the rest of a point and the beginning of another, x being the radius of the tip
 @LAW
 def test_faults_give_no_wrong_point(seed: int, share: float) -> None:
     rng = np.random.default_rng(seed)
