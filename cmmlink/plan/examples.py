@@ -207,7 +207,7 @@ registration: {fit: best-fit, method: exact, coverage_min: 0.95}
 out: {folder: "results/{part}_{run}", formats: [qif, dfq]}
 stack_fit: each
 report: {language: en, paper: a4, section_pages: not-conform}
-records: records
+records: {folder: records, key: "E:/key", anchor: //server/share/heads.txt, timestamp: "https://tsa.example", station: hall 2}
 """
 
 _ON_A_MACHINE = """

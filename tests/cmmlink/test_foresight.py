@@ -17,6 +17,7 @@ from cmmlink import foresight
 from cmmlink.foresight import Foresight, look_ahead
 from cmmlink.other_processes import OtherProcesses, _Process
 from cmmlink.plan import CtPlan
+from cmmlink.record import make_key
 from cmmlink.stack import SectionOutcome, StackOutcome, inspect_stack
 from tests.cmmlink.blade import plan_of
 from tests.drivers.surface.ct_phantom import write_spline
@@ -38,7 +39,9 @@ def plan(tmp_path_factory: pytest.TempPathFactory, spline: BSpline) -> CtPlan:
     rings[:, :, 0] += 0.02 * np.sin(rings[:, :, 1] + rings[:, :, 2])
     mesh = write(folder / "blade.stl", binary_stl(np.concatenate([rings, box((20, 0.5, 22), (23, 3.5, 40))])))
     nominal = write_spline(spline, folder / "n.yaml")
-    return plan_of(mesh, nominal, {"heights_mm": HEIGHTS}, characteristics=ASKED, stack_characteristics=TWIST)
+    make_key(folder / "station.key")  # one for all folders of records, so that the signatures are the same, too
+    keeping = {"key": folder / "station.key"}
+    return plan_of(mesh, nominal, {"heights_mm": HEIGHTS}, characteristics=ASKED, stack_characteristics=TWIST, records=keeping)
 
 
 @pytest.fixture
