@@ -81,7 +81,8 @@ class Findings:
     why             : the reason of that verdict, where it is not CONFORM
     judged          : points with a verdict
     rejected        : points that the inspection itself rejected, by reason, those beyond an end left out
-    beyond_end_mm   : how far the farthest point lies beyond an open end, 0 where there is none; `beyond_end_count` how many do
+    beyond_end_mm   : how far the farthest of the points beyond an open end lies off it, 0 where there is none; `beyond_end_count` how
+                      many do
     coverage, gap   : how much was measured, and the longest stretch that was not
     converged       : the fit settled
     """
@@ -186,8 +187,8 @@ def _unmeasured(found: Findings, limits: Limits) -> list[Reason]:
         reasons.append(
             Reason(
                 "ends",
-                f"{_count(number, 'point')} {_verb(number, 'lies', 'lie')} up to {found.beyond_end_mm:.4g} mm beyond an end of the "
-                f"open profile; {limits.end_allowance_mm:.4g} mm are allowed.",
+                f"{_count(number, 'point')} beyond an end of the open profile {_verb(number, 'lies', 'lie')} up to "
+                f"{found.beyond_end_mm:.4g} mm off it; {limits.end_allowance_mm:.4g} mm are allowed.",
             )
         )
     if found.coverage < limits.coverage_min:

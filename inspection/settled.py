@@ -343,13 +343,16 @@ def _few_judged(rows: ScanRows) -> Array:
 
 
 def _beyond_ends(rows: ScanRows, registration: Registration, terms: Terms) -> tuple[float, int]:
-    """How far the surface of the part lies beyond the ends of an open profile, and how many points farther than is allowed."""
+    """How far the surface of the part lies off the ends of an open profile, by the points beyond them, and how many lie too far.
+
+    A ball whose centre is nearer to an end than its radius reaches into the nominal there: by so much the part is missing.
+    """
     ends = terms.nominal.curve.point(np.array(terms.nominal.curve.domain))
     farthest, count = 0.0, 0
     for part in row_blocks(rows.count):
         beyond = rows.points[part][rows.rejection[part] == Rejection.BEYOND_END]
         away = registration.nominal_from_section.apply(beyond)[:, None, :] - ends
-        off = np.maximum(np.hypot(away[..., 0], away[..., 1]).min(axis=1) - terms.tip_radius_mm, 0.0)
+        off = np.abs(np.hypot(away[..., 0], away[..., 1]).min(axis=1) - terms.tip_radius_mm)
         farthest = max(farthest, float(off.max(initial=0.0)))
         count += int(np.count_nonzero(off > terms.limits.end_allowance_mm))
     return farthest, count

@@ -323,7 +323,7 @@ class Check:
         self.say(same, "Every deviation, place and station follows from points, placement and nominal.", f"within {max(off, apart):.1e} mm")
         beyond, _, there = curve.closest(placed(flat[rejection == BEYOND_END], pose))
         self.say(there.all() and not at_end.any(), "The points that were left out as beyond an end lie there, and no others.")
-        self.beyond_mm = float((np.abs(beyond) - self.radius).max(initial=0.0))
+        self.beyond_mm = float(np.abs(np.abs(beyond) - self.radius).max(initial=0.0))
         self.zone = zone = [result["tolerance"][key] for key in ("lower_mm", "upper_mm", "uncertainty_mm")]
         d, s, guard = self.deviation, np.sort(self.station), zone[2] * (plan["decision_rule"] != "simple")
         self.gap_mm = plan["gap_max_mm"] or max(curve.length / 100, plan["allow.unseen_mm"] or 0.0)

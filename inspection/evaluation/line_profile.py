@@ -24,6 +24,7 @@ from inspection.placements import PlacementSearch
 from inspection.rigid import RigidTransform
 from inspection.tolerance import DecisionRule, ToleranceZone, decision_words
 from inspection.verdict import Verdict
+from inspection.zone_certificate import ZoneCertificate
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -75,6 +76,7 @@ def judge_whole(asked: WholeProfile, basis: Basis) -> CharacteristicResult:
         (x, y), station, off = worst.actual_mm[0].tolist(), float(worst.station_mm[0]), float(worst.deviation_mm[0])
         place = WorstPlace(station, x, y, off)
     deviation = place.deviation_mm if place else math.nan
+    certificate = certify_run(basis) if result.fit == "minimum-zone" else None
     return CharacteristicResult(
         name=asked.name,
         type="line-profile",
@@ -98,8 +100,17 @@ def judge_whole(asked: WholeProfile, basis: Basis) -> CharacteristicResult:
         pose=result.registration.nominal_from_section,
         coverage=result.coverage,
         gap_mm=result.gap.length_mm,
-        certificate=certify_run(basis) if result.fit == "minimum-zone" else None,
+        certificate=certificate,
+        notes=_notes_on_smaller(certificate, result.zone_error_mm),
     )
+
+
+def _notes_on_smaller(certificate: ZoneCertificate | None, zone_mm: float) -> tuple[str, ...]:
+    """Say where the search of every placement came to a smaller zone than the run's own fit, which looks only around its start."""
+    if certificate is None or zone_mm - certificate.zone_mm <= 2 * certificate.gap_mm:
+        return ()
+    at = "the certificate's placement, where points beyond the ends of an open profile take no part"
+    return (f"the zone is {certificate.zone_mm:.6g} mm at {at}; the value is that of the fit which decided",)
 
 
 def judge_profile(asked: LineProfile, basis: Basis) -> CharacteristicResult:

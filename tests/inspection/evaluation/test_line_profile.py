@@ -19,12 +19,14 @@ from inspection import (
     UncertaintyBudget,
     VaryingZone,
     Verdict,
+    WholeProfile,
     ZoneCertificate,
+    discretize,
 )
 from inspection.rigid import rotation_about
 from inspection.tolerance import DecisionRule
 from tests.inspection.evaluation.asked import COUNT, DATUM, even, form, named, nominal, points_at, run, stations
-from tests.inspection.profiles import Array
+from tests.inspection.profiles import Array, even_in_arc_length, naca, offset_points
 from tests.inspection.reference_parts import nominal_of, reference_form, scan
 
 PIVOT = np.array([40.0, 3.0])
@@ -217,3 +219,39 @@ def test_a_filtered_verdict_tells_what_the_filter_took_away() -> None:
         assert any("before the filter 1 point lies beyond the limits" in note for note in found[name].notes)
     assert any("for spikes" in note for note in found["robust"].notes)
     assert not any("for spikes" in note for note in found["plain"].notes)
+
+
+def at_an_end(off_mm: float, waves: int) -> CharacteristicResult:
+    """An open section scanned with a ball of 0.5 mm, and one ball more whose centre lies so far behind the end of the nominal."""
+    curve = naca("2412", sharp=False)
+    wave = 0.02 * np.sin(2 * np.pi * (waves * np.arange(198) / 198 + 0.3))
+    centres = offset_points(curve, even_in_arc_length(curve, 198), -(wave + 0.5))
+    end, before = curve.point(np.array([curve.domain[1], curve.domain[1] - 1e-3]))
+    centres = np.vstack([centres, end + off_mm * (end - before) / np.hypot(*(end - before))])
+    opened, zone = discretize(curve, samples=600, material="left"), ToleranceZone(-0.05, 0.05)
+    live = LiveInspection(opened, zone, fit="minimum-zone", tip_radius_mm=0.5, characteristics=[WholeProfile("profile")])
+    live.add(centres)
+    return live.finish().characteristics[0]
+
+
+@pytest.mark.parametrize("off_mm", [0.1, 0.4, 0.5, 0.6, 2.0])
+def test_a_ball_behind_an_end_touches_it_or_the_part_is_longer_or_shorter(off_mm: float) -> None:
+    found = at_an_end(off_mm, 2)
+    assert found.verdict is (Verdict.CONFORM if off_mm == 0.5 else Verdict.UNCERTAIN)
+    if off_mm != 0.5:
+        (reason,) = found.reasons
+        assert reason.kind == "ends"
+        assert float(reason.words.split(" up to ")[1].split()[0]) == pytest.approx(
+            abs(off_mm - 0.5), abs=0.02
+        )  # by so much the waves move the fit
+
+
+def test_a_smaller_zone_in_another_placement_is_said_beside_the_value() -> None:
+    """The fit takes a ball at the very end for one within the profile, half a millimetre deep in the part; elsewhere it takes no part."""
+    found = at_an_end(0.02, 3)
+    assert found.verdict is Verdict.NONCONFORM
+    assert found.value > 0.4
+    assert isinstance(found.certificate, ZoneCertificate)
+    assert found.certificate.zone_mm == pytest.approx(0.04, abs=1e-4)
+    (note,) = found.notes
+    assert f"{found.certificate.zone_mm:.6g} mm" in note
