@@ -7,7 +7,7 @@ finds no part passed. What cannot be told is an alarm, and changes no verdict.
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 
@@ -63,28 +63,34 @@ class MachineAnswer:
         elif isinstance(event, Arrived) and isinstance(event.arrival, ScanOpened):
             self._request = event.arrival.request
 
-    def deliver(self, outcome: RunOutcome, run: str) -> Answered:
-        """Tell the machine the verdict, once the run is on record under its id (empty where it is not), and tell what came of it."""
+    def deliver(self, outcome: RunOutcome, run: str, keep: Callable[[Answered], str]) -> Answered:
+        """Tell the machine the verdict, once the run is on record under its id (empty where it is not), and tell what came of it.
+
+        keep : adds what came of it to the records of the run, before anybody else is told; returns why it could not, nothing where it did
+        """
         verdict = _verdict_of(outcome)
-        problem = NOT_RECORDED if not run else NOT_TOLD if self._request is None else ""
+        problem, text = NOT_RECORDED if not run else NOT_TOLD if self._request is None else "", ""
         if not problem and self._request is not None:
-            problem = self._put(replace_answer, _told_of(outcome, verdict, self._request, run))
+            text = answer_text(self._answer, self._unit, _told_of(outcome, verdict, self._request, run))
+            problem = self._put(replace_answer, text)
         if problem and self._standing:
             problem += STILL_STANDING
         sent = not problem
-        answered = Answered("sent" if sent else "not sent", self._request, self._now(), problem, verdict if sent else None)
+        answered = Answered("sent" if sent else "not sent", self._request, self._now(), problem, verdict if sent else None, text)
+        if run:
+            answered = replace(answered, unrecorded=keep(answered))
         self._tell(answered)
         return answered
 
     def _withdraw(self) -> None:
-        self._standing = self._put(withdraw_answer, _Told())
+        self._standing = self._put(withdraw_answer, answer_text(self._answer, self._unit, _Told()))
         if self._standing:
             self._tell(Answered("not withdrawn", None, self._now(), self._standing))
 
-    def _put(self, put: Callable[[Path, bytes], None], told: _Told) -> str:
+    def _put(self, put: Callable[[Path, bytes], None], text: str) -> str:
         """Put an answer there; returns why it is not, nothing where it is."""
         try:
-            put(self._answer.file, answer_text(self._answer, self._unit, told).encode("ascii"))
+            put(self._answer.file, text.encode("ascii"))
         except AnswerError as error:
             return str(error)
         return ""

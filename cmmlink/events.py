@@ -130,6 +130,8 @@ class Answered:
 
     request : the number of its request; None where it told none
     verdict : what it was told; None where it was told nothing
+    text    : the whole answer as it was written, or was to be; empty where nothing was to be written
+    unrecorded : why the records of the run do not hold it; empty where they do
     """
 
     state: Literal["sent", "not sent", "not withdrawn"]
@@ -137,6 +139,8 @@ class Answered:
     at: datetime
     problem: str
     verdict: "Verdict | None" = None
+    text: str = field(default="", repr=False)
+    unrecorded: str = ""
 
 
 Event = RunStarted | Arrived | Judged | ProvenOut | Evaluated | RunFinished | Answered

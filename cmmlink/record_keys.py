@@ -32,6 +32,23 @@ class RunSigned(JsonObject):
     key_id: str = Field(description="what the key is called: the first 16 digits of the SHA-256 of the public key")
 
 
+class MachineAnswered(JsonObject):
+    """Whether the machine was told the verdict that it asked for."""
+
+    request: int | None = Field(description="the number of its request; null where it told none")
+    sent: bool = Field(description="whether the answer stood in its file, read back; it changes no verdict")
+    verdict: VerdictName | None = Field(description="what it was told: uncertain where the run broke off; null where it was told nothing")
+    at: str = Field(description="when it was sent, or could not be, in UTC")
+    problem: str | None = Field(description="why it was not sent; null where it was")
+
+
+class AnswerKept(MachineAnswered):
+    """The answer to the machine as it is on record."""
+
+    text: str | None = Field(description="the whole answer as it was written, or was to be; null where nothing was to be written")
+    chain_sha256: str = Field(description="the hash of the record that keeps it")
+
+
 class AnchorTold(JsonObject):
     """A place outside the computer that was to be told how the run ended."""
 

@@ -21,7 +21,7 @@ from cmmlink.inspection_keys import (
     Worst,
     Zone,
 )
-from cmmlink.record_keys import AnchorTold, JudgedAgain, JudgementKept, RunOrigin, RunSigned
+from cmmlink.record_keys import AnchorTold, AnswerKept, JudgedAgain, JudgementKept, MachineAnswered, RunOrigin, RunSigned
 from cmmlink.version import ResultSchema
 from cmmlink.words import VerdictName
 
@@ -68,14 +68,12 @@ class Inspected(JsonObject):
     damaged_bytes: int = Field(description="the bytes on the wire that were no valid frame")
 
 
-class MachineTold(JsonObject):
-    """Whether the machine was told the verdict that it asked for."""
+class MachineTold(MachineAnswered):
+    """Whether the machine was told the verdict that it asked for, and whether that is on record."""
 
-    request: int | None = Field(description="the number of its request; null where it told none")
-    sent: bool = Field(description="whether the answer stands in its file, read back; it changes no verdict")
-    verdict: VerdictName | None = Field(description="what it was told: uncertain where the run broke off; null where it was told nothing")
-    at: str = Field(description="when it was sent, or could not be, in UTC")
-    problem: str | None = Field(description="why it was not sent; null where it was")
+    unrecorded: str | None = Field(
+        description="why the records of the run do not hold this; null where they do, and where the run itself is not recorded"
+    )
 
 
 class Measured(Inspected):
@@ -370,6 +368,11 @@ class Shown(JsonObject):
     result: Inspected | None = Field(description="the recorded result; null where the run gave none")
     chain_sha256: str = Field(description="the hash of the run's end; empty while the run goes on")
     signature: RunSigned | None = Field(description="the signature of the run; null where it is not signed")
+    answer: AnswerKept | None = Field(
+        default=None,
+        description="what came of the answer to the machine; null where the plan asks for none, where the program was killed before "
+        "it was on record, and in records of earlier versions: nothing is claimed then",
+    )
     anchors: list[AnchorTold] = Field(description="the places that were to be told how the run ended")
     origin: RunOrigin | None = Field(default=None, description="where the run was taken over from; null: it was recorded here")
     derived: list[JudgedAgain] = Field(default=[], description="what it was found to be when it was judged again, oldest first")

@@ -21,7 +21,18 @@ from cmmlink.events import Answered, Event, RunStarted, Sink
 from cmmlink.from_plan import inspection_of, notes_on_datum, notes_on_nominal, notes_on_temperature, run_started, with_section, zone_of
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan import FileDevice, LinesDevice, Plan
-from cmmlink.record import PATIENCE_S, QUEUE_BYTES, Recorder, RecordReference, RunInputs, anchor_ends, open_to_record, seal_of
+from cmmlink.record import (
+    PATIENCE_S,
+    QUEUE_BYTES,
+    Recorder,
+    RecordReference,
+    RunInputs,
+    anchor_ends,
+    answer_document,
+    keep_answer,
+    open_to_record,
+    seal_of,
+)
 from cmmlink.result_folder import folder_of
 from cmmlink.result_json import density_notes, density_of, result_json, run_document, stations_of
 from cmmlink.run_log import log_event
@@ -89,7 +100,11 @@ class FinishedRun:
         evidence = asdict(self.evidence) if self.evidence else {}
         found = result_json(self.outcome.result, self.outcome.counts)
         document = run_document(found, self.started, self.notes, self.outcome.ending, utc_words(self.began), evidence)
-        return document if self.answer is None else {**document, "answer": _answer_json(self.answer)}
+        return (
+            document
+            if self.answer is None
+            else {**document, "answer": answer_document(self.answer) | {"unrecorded": self.answer.unrecorded or None}}
+        )
 
     def folder_of(self, pattern: Path) -> Path:
         """The folder of this run's results, its placeholders filled in; without a record the run is named by when it began."""
@@ -160,7 +175,10 @@ def carry_out(
             cut_short="when failed" if plan.stop_when_failed else "never",
         )
         evidence = recorder.evidence if recorder else None
-        answered = answer.deliver(outcome, evidence.run if evidence else "") if answer else None  # a machine waits: before all others
+        answered: Answered | None = None
+        if answer is not None:  # a machine waits: before all others
+            run = evidence.run if evidence else ""
+            answered = answer.deliver(outcome, run, lambda given: keep_answer(store, seal, run, given))
         if evidence is not None:
             told = anchor_ends(store, seal, plan.records.places, utc_words(now()), [evidence])
             evidence = replace(evidence, anchors=[asdict(one) for one in told])
@@ -179,16 +197,6 @@ def _answer_of(plan: Plan, followers: Sequence[Sink], now: Callable[[], datetime
     if plan.answer is None or not isinstance(plan.device, LinesDevice):
         return None
     return MachineAnswer(plan.answer, plan.device.unit, tell, now)
-
-
-def _answer_json(answer: Answered) -> dict[str, Any]:
-    return {
-        "request": answer.request,
-        "sent": answer.state == "sent",
-        "verdict": answer.verdict.word if answer.verdict is not None else None,
-        "at": utc_words(answer.at),
-        "problem": answer.problem or None,
-    }
 
 
 def _notes_on_end(plan: Plan) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ def log_event(event: Event) -> None:
         if isinstance(event.arrival, _TOLD):
             _log.log(logging.WARNING if isinstance(event.arrival, LinkDown) else logging.INFO, "link: %s", event.arrival)
     elif isinstance(event, Answered):
-        _log.log(logging.INFO if event.state == "sent" else logging.ERROR, "answer to the machine: %s", event)
+        _log.log(logging.INFO if event.state == "sent" and not event.unrecorded else logging.ERROR, "answer to the machine: %s", event)
     elif isinstance(event, RunFinished):
         _log.info(
             "run %s, %s: %s. %s", event.ending, event.result.verdict.word if event.result else "no result", event.counts, event.message

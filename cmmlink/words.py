@@ -59,6 +59,14 @@ def judgement_words(judged: Mapping[str, Any]) -> str:
     return f"{local_words(datetime.fromisoformat(judged['when']))} by {judged['who']}: {verdict}; {changes}; {judged['why']}"
 
 
+def answer_words(answer: Mapping[str, Any]) -> str:
+    """What came of the answer to a machine."""
+    if not answer["sent"]:
+        return f"not sent: {answer['problem']}"
+    told = VERDICT_WORDS[Verdict[answer["verdict"].upper()]] if answer["verdict"] else "nothing"
+    return f"sent {local_words(datetime.fromisoformat(answer['at']))}: {told}, request {answer['request']}"
+
+
 def repetition_words(serial_number: str, run: str) -> str:
     """What is said of a part that was measured before, as a question and beside its verdict."""
     return f"the serial number {serial_number} of this part was measured before: run {run}"

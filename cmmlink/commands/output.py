@@ -116,6 +116,8 @@ def _say_answer(answer: "Answered", output: Output) -> None:
     elif not output.as_json:
         told = VERDICT_WORDS[answer.verdict] if answer.verdict is not None else ""
         typer.echo(f"sent to the machine at {answer.at:%H:%M:%S}: {told}, request {answer.request}")
+    if answer.unrecorded:
+        say(f"what the machine was told is not on record: {answer.unrecorded}")
 
 
 def say_untold(anchors: Sequence[Mapping[str, str]]) -> None:

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
@@ -14,9 +14,9 @@ from cmmlink.commands.exit_codes import EXIT_OF, NO_RECORD, UNUSABLE, fail, say
 from cmmlink.commands.options import Json, Out, Records, RunName, RunOrFolder, records_folder, who_asks
 from cmmlink.commands.output import now, print_json, terminal
 from cmmlink.commands.progress import progress
-from cmmlink.errors import PlanError, RunError
+from cmmlink.errors import PlanError, RunError, YamlError
 from cmmlink.version import RESULT_SCHEMA
-from cmmlink.words import headline_of, judgement_words, local_words, printable, section_words, utc_words
+from cmmlink.words import answer_words, headline_of, judgement_words, local_words, printable, section_words, utc_words
 from inspection import Method, Verdict
 
 if TYPE_CHECKING:
@@ -101,6 +101,7 @@ def show(name: RunName, records: Records = None, as_json: Json = False) -> int:
         _say(f"{key:<14} {', '.join(f'{name} {value}' for name, value in found[key].items() if value)}")
     if (signature := found["signature"]) is not None:
         _say(f"{'signed':<14} by the key {signature['key_id']}")
+    _say_answer(found)
     for told in found["anchors"]:
         _say(f"{'anchor':<14} {told['place']}: {'not told, ' + told['problem'] if told['problem'] else 'told'}")
     if (origin := found["origin"]) is not None:
@@ -112,6 +113,18 @@ def show(name: RunName, records: Records = None, as_json: Json = False) -> int:
         _say(f"  {event['time_s'] - found['clock_s']:9.3f} s  after {event['after_points']} points: {event['event']} {told}")
     _say("\n" + found["plan"].rstrip())
     return 0
+
+
+def _say_answer(found: Mapping[str, Any]) -> None:
+    """Say what a machine tool was told of a run, or that the records do not say so, though the plan asks for an answer."""
+    from cmmlink.plan import texts_of
+
+    if found["answer"] is not None:
+        _say(f"{'answer':<14} {answer_words(found['answer'])}")
+    elif found["state"] != "running":
+        with suppress(YamlError):
+            if "answer.file" in texts_of(found["plan"]):
+                _say(f"{'answer':<14} none is on record, though the plan asks for one: whether the machine was told is not known")
 
 
 def _say(text: str) -> None:

@@ -44,8 +44,11 @@ class Alarms:
                 self._stalls = event.counts.stalls
         elif isinstance(event, RunFinished):
             self._take_end(event)
-        elif isinstance(event, Answered) and event.problem:
-            self.raise_alarm("fault", _NOT_ANSWERED[event.state], event.problem)
+        elif isinstance(event, Answered):
+            if event.problem:
+                self.raise_alarm("fault", _NOT_ANSWERED[event.state], event.problem)
+            if event.unrecorded:
+                self.raise_alarm("fault", "What the machine was told is not on record", event.unrecorded)
 
     @property
     def shown(self) -> AlarmList:

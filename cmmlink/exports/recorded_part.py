@@ -13,6 +13,7 @@ from cmmlink.record import (
     RecordedRun,
     Store,
     anchors_of,
+    answer_of,
     end_missing,
     recorded_plan,
     recorded_profile,
@@ -80,4 +81,12 @@ def _evidence(store: Store, recorded: RecordedRun) -> Mapping[str, Any]:
         **{key: header[key] for key in _HASHES if key in header},
         "signature": None if signature is None else signature.beside_result(),
         "anchors": [asdict(one) for one in anchors_of(store, recorded.run)],
+        **_answer(store, recorded.run),
     }
+
+
+def _answer(store: Store, run: str) -> Mapping[str, Any]:
+    """What came of the answer to the machine, as the result told it, where that is on record."""
+    kept = answer_of(store, run)
+    told = {key: value for key, value in (kept or {}).items() if key not in ("text", "chain_sha256")}
+    return {"answer": {**told, "unrecorded": None}} if told else {}

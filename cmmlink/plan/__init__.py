@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from cmmlink.plan.serial_numbers import SerialNumbers, next_serial_number
     from cmmlink.plan.stack_characteristics import AskedOfStack
     from cmmlink.plan.surface import CtPlan, NominalAt, load_ct_plan
-    from cmmlink.plan.yaml_model import Positive, Settings, line_of, read_model, value_of, words_of_allowed
+    from cmmlink.plan.yaml_model import Positive, Settings, line_of, read_model, texts_of, value_of, words_of_allowed
 else:
     from cmmlink.front_door import load_on_use
 
@@ -78,7 +78,7 @@ else:
         "cmmlink.plan.dme": ("CircleScan", "CurveScan", "LineScan", "PointsScan", "UnknownScan"),
         "cmmlink.plan.stack_characteristics": ("AskedOfStack",),
         "cmmlink.plan.surface": ("CtPlan", "NominalAt", "load_ct_plan"),
-        "cmmlink.plan.yaml_model": ("Positive", "Settings", "line_of", "read_model", "value_of", "words_of_allowed"),
+        "cmmlink.plan.yaml_model": ("Positive", "Settings", "line_of", "read_model", "texts_of", "value_of", "words_of_allowed"),
     }
 
     __getattr__ = load_on_use(__name__, _PLACES)
@@ -140,6 +140,7 @@ __all__ = [
     "plan_given_by",
     "read_model",
     "schema_of_plans",
+    "texts_of",
     "value_of",
     "with_own_maps",
     "words_of_allowed",

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from cmmlink.record.export import export_run
     from cmmlink.record.handover import handover_words, handovers_of, rotate_key
     from cmmlink.record.keys import make_key, public_key_given, read_key
+    from cmmlink.record.machine_answer import answer_document, answer_of, keep_answer
     from cmmlink.record.origin import origin_of
     from cmmlink.record.reader import (
         RecordedRun,
@@ -56,6 +57,7 @@ else:
         "cmmlink.record.export": ("export_run",),
         "cmmlink.record.handover": ("handover_words", "handovers_of", "rotate_key"),
         "cmmlink.record.keys": ("make_key", "public_key_given", "read_key"),
+        "cmmlink.record.machine_answer": ("answer_document", "answer_of", "keep_answer"),
         "cmmlink.record.origin": ("origin_of",),
         "cmmlink.record.reader": (
             "RecordedRun",
@@ -117,6 +119,8 @@ __all__ = [
     "VerdictSought",
     "anchor_ends",
     "anchors_of",
+    "answer_document",
+    "answer_of",
     "arrivals_of",
     "back_up",
     "check_chain",
@@ -134,6 +138,7 @@ __all__ = [
     "has_records",
     "heads_in",
     "is_evidence",
+    "keep_answer",
     "keep_judgement",
     "key_id_of",
     "last_serial_number",

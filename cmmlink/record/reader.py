@@ -21,6 +21,7 @@ from cmmlink.record.anchors import anchors_of
 from cmmlink.record.bodies import PlacedArrival, unpack_arrivals, unpack_document, unpack_points, unpack_reads
 from cmmlink.record.chain import Record, is_damaged
 from cmmlink.record.derived import derived_of
+from cmmlink.record.machine_answer import answer_of
 from cmmlink.record.origin import origin_of
 from cmmlink.record.recorder import end_draft
 from cmmlink.record.search import RunSearch
@@ -256,6 +257,7 @@ def describe(store: Store, run: str) -> dict[str, Any]:
         "result": recorded.result,
         "chain_sha256": recorded.chain_sha256,
         "signature": None if (signature := signature_of(store, run)) is None else signature.beside_result(),
+        "answer": answer_of(store, run),
         "anchors": [dataclasses.asdict(one) for one in anchors_of(store, run)],
         "origin": None if (origin := origin_of(store, run)) is None else origin.model_dump(mode="json"),
         "derived": derived_of(store, run),

@@ -16,6 +16,7 @@ from cmmlink.record.anchors import Head
 from cmmlink.record.bodies import pack_document, unpack_document
 from cmmlink.record.chain import BEHIND_THE_END, GENESIS, Alteration, Record, problem_of
 from cmmlink.record.handover import handovers_of, is_sound, of_one_station
+from cmmlink.record.machine_answer import problem_of_answer
 from cmmlink.record.origin import origin_of, original_chain_sha256
 from cmmlink.record.seal import PUBLIC_FILE, station_name
 from cmmlink.record.shapes import Header, checked
@@ -156,6 +157,7 @@ def _trusted(store: Store, begin: Record, end: Record | None) -> RunTrusted:
     if len(signatures) > 1:
         raise AlteredError(Alteration(signatures[1].number, run, "signature", "is a second signature of the run"))
     signature = _signature(store, signatures[0], end, head) if signatures else None
+    _require_answer(store, end)
     later, keys = _countersigned(store, run)
     return RunTrusted(
         run, _station_of(begin), end.number, head, signature, tuple(_stamps(store, run, head)), later, keys, origin is not None
@@ -174,9 +176,17 @@ def _stamps(store: Store, run: str, head: str) -> Iterator[datetime]:
         yield stamp.moment
 
 
+def _require_answer(store: Store, end: Record) -> None:
+    """Raise AlteredError for an answer to the machine that the run cannot have given, and for a second one."""
+    for count, record in enumerate(store.records(end.run, "answer"), start=1):
+        problem = problem_of_answer(record, end) if count == 1 else "is a second answer to the machine"
+        if problem:
+            raise AlteredError(Alteration(record.number, record.run, record.kind, problem))
+
+
 def _countersigned(store: Store, run: str) -> tuple[int, tuple[str, ...]]:
     """How many records behind the end of a run nobody signed, and the keys of the others. Raises AlteredError for a wrong signature."""
-    left = [record for kind in ("anchors", "timestamp", "derived") for record in store.records(run, kind)]
+    left = [record for kind in ("answer", "anchors", "timestamp", "derived") for record in store.records(run, kind)]
     found, keys = list(store.records(run, "countersignature")), []
     if not found:
         return len(left), ()

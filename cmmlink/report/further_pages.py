@@ -28,7 +28,8 @@ from cmmlink.report.picture_content import PictureContent
 from cmmlink.report.profile_drawing import draw_cut_out, prepare_axes
 from cmmlink.report.report_input import ReportInput
 from cmmlink.report.speech import Speech
-from cmmlink.words import Shape, VerdictName
+from cmmlink.words import VERDICT_WORDS, Shape, VerdictName
+from inspection import Verdict
 
 SHAPES: Mapping[VerdictName, Shape] = {"conform": "conform", "uncertain": "not-proven", "nonconform": "not-conform"}
 WORDS: Mapping[VerdictName, str] = {"conform": "CONFORM", "uncertain": "NOT PROVEN", "nonconform": "NOT CONFORM"}
@@ -213,8 +214,18 @@ def _signature_words(document: Mapping[str, Any], say: Speech) -> Iterator[tuple
     else:
         yield say("Signed"), say("with the key {key}, public key {public}", key=signature["key_id"], public=signature["public_key"])
         yield say("Signature (Ed25519)"), signature["signature"]
+    if (answer := document.get("answer")) is not None:
+        yield say("Answer to the machine"), _answer_words(answer, say)
     for told in document.get("anchors", ()):
         yield say("Anchored"), say("not told to {place} yet", place=told["place"]) if told["problem"] else told["place"]
+
+
+def _answer_words(answer: Mapping[str, Any], say: Speech) -> str:
+    """What a machine was told, with the moment in UTC, or why it was not."""
+    if not answer["sent"]:
+        return say("not sent: {problem}", problem=answer["problem"])
+    verdict = say(VERDICT_WORDS[Verdict[answer["verdict"].upper()]]) if answer["verdict"] else ""
+    return say("{verdict} for request {request}, sent {at}", verdict=verdict, request=answer["request"], at=answer["at"])
 
 
 def _pose_words(pose: Mapping[str, Any], say: Speech) -> str:

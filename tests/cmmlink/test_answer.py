@@ -48,7 +48,7 @@ class Told:
     """A machine's answer, with a list of what was told of it."""
 
     def __init__(self, file: Path, unit: str = "mm", **more: Any) -> None:
-        self.file, self.events = file, list[Event]()
+        self.file, self.events, self.kept, self.no_room = file, list[Event](), list[Answered](), ""
         answer = Answer(file=file, characteristics={"chord (LE-TE)": 160, "twist": 161}, **more)
         self.sink = MachineAnswer(answer, unit, self.events.append, lambda: NOON)
 
@@ -56,7 +56,13 @@ class Told:
         self.sink(STARTED)
         for request in requests:
             self.sink(Arrived(0.0, ScanOpened("G800", "", None, request)))
-        return self.sink.deliver(outcome, run)
+        return self.sink.deliver(outcome, run, self.keep)
+
+    def keep(self, answered: Answered) -> str:
+        """Stand in for the records, which hold an answer before anybody else is told of it."""
+        assert answered not in self.events
+        self.kept.append(answered)
+        return self.no_room
 
     @property
     def variables(self) -> dict[int, float]:
@@ -74,7 +80,7 @@ def told(tmp_path: Path) -> Told:
 def test_an_answer_is_a_program_of_assignments_byte_for_byte(told: Told) -> None:
     answered = told.run(7, outcome=outcome_of(Verdict.CONFORM))
     assert told.file.read_bytes() == DELIVERED
-    assert answered == Answered("sent", 7, NOON, "", Verdict.CONFORM) == told.events[-1]
+    assert answered == Answered("sent", 7, NOON, "", Verdict.CONFORM, DELIVERED.decode("ascii")) == told.events[-1] == told.kept[0]
 
 
 @pytest.mark.parametrize(("verdict", "code"), [(Verdict.CONFORM, 1), (Verdict.NONCONFORM, 2), (Verdict.UNCERTAIN, 3), (None, 3)])
@@ -110,8 +116,16 @@ def test_the_newest_request_is_answered_and_none_that_was_not_told(
 
 
 def test_a_run_that_is_not_on_record_passes_no_part(told: Told) -> None:
-    assert told.run(7, outcome=outcome_of(Verdict.CONFORM), run="").problem == NOT_RECORDED
+    answered = told.run(7, outcome=outcome_of(Verdict.CONFORM), run="")
+    assert (answered.problem, answered.text, told.kept) == (NOT_RECORDED, "", [])
     assert told.variables[150] == 9
+
+
+def test_an_answer_that_the_records_do_not_hold_was_sent_all_the_same_and_that_is_told(told: Told) -> None:
+    told.no_room = "the disk is full"
+    answered = told.run(7, outcome=outcome_of(Verdict.CONFORM))
+    assert (answered.state, answered.unrecorded, answered) == ("sent", "the disk is full", told.events[-1])
+    assert told.file.read_bytes() == DELIVERED
 
 
 def test_lengths_are_in_the_unit_of_the_control_and_angles_are_not(tmp_path: Path) -> None:
@@ -144,6 +158,7 @@ def test_what_cannot_be_told_is_told_to_everybody_else(tmp_path: Path) -> None:
     assert "there is no folder" in answered.problem
     assert answered.problem.endswith(STILL_STANDING)
     assert answered.verdict is None
+    assert told.kept == [answered]
 
 
 def test_two_values_never_share_a_variable() -> None:

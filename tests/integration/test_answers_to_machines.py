@@ -1,5 +1,6 @@
 """A machine tool that asks for the verdict and waits: what it does in the end, whatever went wrong on either side."""
 
+import os
 import socket
 import sqlite3
 import sys
@@ -9,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -24,6 +26,7 @@ from tests.integration.split_off import split_off
 POSIX_ONLY = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals exist on POSIX systems only")
 COUNT = 120
 REQUEST = 4711
+KILLED = 99
 PLAN = """\
 part: {{name: oval}}
 nominal: {{file: oval.yaml}}
@@ -99,7 +102,19 @@ def test_a_machine_does_what_the_verdict_says(options: tuple[str, ...], code: in
         worst = f"{round(found[1]['worst']['deviation_mm'], 4):g}"
         assert end_of(machine) == f"request {REQUEST}: {does.format(worst=worst)}"
     run = found[1]["run"]
-    assert f"(RUN {run})\r\n".encode("ascii") in (tmp_path / "O9100.nc").read_bytes()
+    written = (tmp_path / "O9100.nc").read_bytes()
+    assert f"(RUN {run})\r\n".encode("ascii") in written
+    kept = shown(tmp_path)["answer"]
+    assert (kept.pop("text").encode("ascii"), len(kept.pop("chain_sha256"))) == (written, 64)
+    assert kept | {"unrecorded": None} == found[1]["answer"]
+
+
+def shown(folder: Path) -> dict[str, Any]:
+    """The run as its record tells it, which is as it was written and signed."""
+    assert cmmlink("verify", "--records", folder / "records", "--json").json()["state"] == "intact and signed"
+    described = cmmlink("show", "last", "--records", folder / "records", "--json").json()
+    assert isinstance(described, dict)
+    return described
 
 
 def test_what_cannot_be_sent_is_told_and_changes_no_verdict(tmp_path: Path) -> None:
@@ -110,6 +125,10 @@ def test_what_cannot_be_sent_is_told_and_changes_no_verdict(tmp_path: Path) -> N
         assert found[1]["answer"]["sent"] is False
         assert "NOT SENT to the machine: " in found[2]
         assert "there is no folder" in found[2]
+        kept = shown(tmp_path)["answer"]
+        assert (kept["sent"], kept["verdict"], kept["problem"]) == (False, None, found[1]["answer"]["problem"])
+        assert kept["text"].startswith("O9100 (CMMLINK ANSWER)\r\n")
+        assert f"answer         not sent: {kept['problem']}" in cmmlink("show", "last", "--records", tmp_path / "records").out
         assert end_of(machine) == f"request {REQUEST}: no answer within 0.2 s: the machine stops"
 
 
@@ -194,6 +213,23 @@ def test_a_killed_run_passes_no_part_and_the_machine_stops(tmp_path: Path) -> No
         run.kill()
         run.join()
     assert what_follows(tmp_path) == f"request {REQUEST}: no answer within 0 s: the machine stops"
+
+
+def test_of_an_answer_that_a_kill_kept_from_the_records_nothing_is_claimed(tmp_path: Path) -> None:
+    """Killed behind the writing of the answer and before it is on record: the run is whole, and says that nobody knows what was told."""
+    with asking(tmp_path) as machine:
+        run = split_off(carry_out_until_answered, planned(tmp_path, machine.address))
+        run.join(60)
+        assert run.exitcode == KILLED
+        assert "the part is released" in end_of(machine)
+    assert (shown(tmp_path)["answer"], shown(tmp_path)["verdict"]) == (None, "conform")
+    told = cmmlink("show", "last", "--records", tmp_path / "records").out
+    assert "answer         none is on record, though the plan asks for one: whether the machine was told is not known" in told
+
+
+def carry_out_until_answered(plan: Path) -> None:
+    with patch("cmmlink.run.keep_answer", lambda *_: os._exit(KILLED)):
+        carry_out(plan)
 
 
 def what_follows(folder: Path) -> str:

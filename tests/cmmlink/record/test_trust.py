@@ -8,20 +8,24 @@ from pathlib import Path
 import pytest
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
 
+from cmmlink.events import Answered
 from cmmlink.record.anchors import anchor_ends
 from cmmlink.record.backup import back_up, merge, restore
 from cmmlink.record.chain import Draft
 from cmmlink.record.handover import rotate_key
 from cmmlink.record.keys import make_key, public_key_given, write_public_key
+from cmmlink.record.machine_answer import keep_answer
 from cmmlink.record.reader import open_to_record
 from cmmlink.record.seal import KEY_FILE, PUBLIC_FILE, seal_of
 from cmmlink.record.signature import Signature, signature_of, signed_message
 from cmmlink.record.store import FILE_NAME, Store
+from inspection import Verdict
 from tests.cmmlink.record.sealed import BEGAN, Clock, add_signed, forge, key_id, state_of, trust
 
 NONE_SIGNED = "intact but unsigned"
 SIGNED = "intact and signed"
 ANOTHER = "signed by another key"
+KINDS = {"run", "plan", "points", "end", "signature", "key", "answer", "anchors", "derived", "countersignature"}
 
 
 @pytest.fixture(scope="module")
@@ -35,6 +39,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     last = add_signed(folder, "c-0003")
     with Store(folder, writing=True, epoch_s=lambda: 101.0) as store:
         seal = seal_of(store, station="cmm-1", key=None)
+        keep_answer(store, seal, "c-0003", Answered("sent", 7, BEGAN, "", Verdict.UNCERTAIN, "M99"))
         anchor_ends(store, seal, [str(folder.parent / "heads.txt")], "2026-03-14T15:09:27.000Z", [last])
         store.append([Draft("c-0003", "derived", b'{"verdict":"conform"}')], seal.countersign)
     return folder
@@ -71,7 +76,7 @@ def test_no_byte_of_any_value_can_be_altered_and_the_records_stay_signed(station
     sound = file.read_bytes()
     with closing(sqlite3.connect(file)) as connection:
         rows = connection.execute("SELECT number, run, kind, time_s, count, body FROM record").fetchall()
-    assert {row[2] for row in rows} == {"run", "plan", "points", "end", "signature", "key", "anchors", "derived", "countersignature"}
+    assert {row[2] for row in rows} == KINDS
     tried = 0
     for number, *values in rows:
         for column, value in zip(("run", "kind", "time_s", "count", "body"), values, strict=True):
