@@ -18,22 +18,16 @@ if TYPE_CHECKING:
     from cmmlink.plan.report import ReportSettings
     from cmmlink.plan.results import NO_RESULTS, Results
     from cmmlink.plan.scan import (
-        Device,
         Discretisation,
-        DmeDevice,
-        FileDevice,
-        LinesDevice,
-        ModbusDevice,
         Nominal,
         Part,
         Plan,
         Registration,
         Section,
-        SerialDevice,
         load_plan,
         place_of,
-        with_own_maps,
     )
+    from cmmlink.plan.scan_devices import Device, DmeDevice, FileDevice, LinesDevice, ModbusDevice, SerialDevice, with_own_maps
     from cmmlink.plan.schema import schema_of_plans
     from cmmlink.plan.serial_numbers import SerialNumbers, next_serial_number
     from cmmlink.plan.stack_characteristics import AskedOfStack
@@ -56,22 +50,16 @@ else:
         "cmmlink.plan.report": ("ReportSettings",),
         "cmmlink.plan.results": ("NO_RESULTS", "Results"),
         "cmmlink.plan.datum": ("Datum",),
+        "cmmlink.plan.scan_devices": ("Device", "DmeDevice", "FileDevice", "LinesDevice", "ModbusDevice", "SerialDevice", "with_own_maps"),
         "cmmlink.plan.scan": (
-            "Device",
             "Discretisation",
-            "DmeDevice",
-            "FileDevice",
-            "LinesDevice",
-            "ModbusDevice",
             "Nominal",
             "Part",
             "Plan",
             "Registration",
             "Section",
-            "SerialDevice",
             "load_plan",
             "place_of",
-            "with_own_maps",
         ),
         "cmmlink.plan.characteristics": ("AskedCharacteristic", "AskedDatum", "AskedFilter", "AskedProfile", "Place"),
         "cmmlink.plan.cutters": ("CutterName",),

@@ -18,7 +18,8 @@ from cmmlink.plan.deciding import Deciding, check_names
 from cmmlink.plan.keeping import RECORDS, RecordKeeping, RecordsOrFolder
 from cmmlink.plan.report import REPORT, ReportSettings
 from cmmlink.plan.results import NO_RESULTS, OUT, ResultsOrFolder
-from cmmlink.plan.scan import Nominal, Part, Registration, Unit, place_of
+from cmmlink.plan.scan import Nominal, Part, Registration, place_of
+from cmmlink.plan.scan_devices import Unit
 from cmmlink.plan.stack_characteristics import AskedOfStack
 from cmmlink.plan.yaml_model import Positive, Settings, read_model
 from drivers import PointFileError, mm_per, read_text

@@ -7,7 +7,8 @@ from cmmlink.demo import plan_file
 from cmmlink.dme_job import course_along_nominal, job_of, questions_of
 from cmmlink.from_plan import profile_of
 from cmmlink.plan.datum import Datum
-from cmmlink.plan.scan import DmeDevice, Plan, Section, load_plan
+from cmmlink.plan.scan import Plan, Section, load_plan
+from cmmlink.plan.scan_devices import DmeDevice
 from inspection import deviations
 
 CHORD_ERROR_MM = 0.002

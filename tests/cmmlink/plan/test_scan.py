@@ -10,7 +10,8 @@ from pydantic import ValidationError
 
 from cmmlink.errors import PlanError
 from cmmlink.plan.own_maps import map_of
-from cmmlink.plan.scan import FileDevice, ModbusDevice, Plan, SerialDevice, load_plan
+from cmmlink.plan.scan import Plan, load_plan
+from cmmlink.plan.scan_devices import FileDevice, ModbusDevice, SerialDevice
 from cmmlink.plan.yaml_model import read_model
 from cmmlink.record.run_inputs import RunInputs
 from inspection import ToleranceZone
