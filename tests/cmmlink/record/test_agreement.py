@@ -24,7 +24,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_nominal(folder / "oval.yaml")
     write_points(folder / "points.csv", oval_points(np.linspace(-0.02, 0.04, 360)))
     plan = "part: {name: oval}\nnominal: {file: oval.yaml}\ndevice: {type: file, file: points.csv}\nregistration: {fit: none, datum: {}}\n"
-    plan += "characteristics:\n  - {name: form, type: line-profile, zone: {width_mm: 0.1}}\n  - {name: chord, type: chord, upper_mm: 0.2}\n"
+    plan += "out: null\ncharacteristics:\n"
+    plan += "  - {name: form, type: line-profile, zone: {width_mm: 0.1}}\n  - {name: chord, type: chord, upper_mm: 0.2}\n"
     (folder / "plan.yaml").write_text(plan, encoding="utf-8")
     assert cmmlink("run", folder / "plan.yaml", "--headless", "--records", folder / "records").code in (0, 1, 3)
     return folder

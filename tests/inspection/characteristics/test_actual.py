@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from cmmlink.reference import reference_cases
 from inspection import (
     ActualSection,
     Deviations,
@@ -24,6 +23,7 @@ from inspection import (
     maximum_camber,
     maximum_thickness,
 )
+from tests.cmmlink.qualification.few_cases import case_named
 from tests.inspection.characteristics.airfoils import Array
 from tests.inspection.profiles import ellipse, even_in_arc_length, left_normal, naca
 
@@ -195,7 +195,7 @@ def test_too_few_points_and_knots_too_far_apart_are_refused() -> None:
 
 def test_a_part_beside_a_section_of_arcs_and_lines_has_its_numbers_though_the_curvature_jumps() -> None:
     """A spline across the joints would swing there: a radius by curvature was a sixth off, and a camber 4 um."""
-    case = next(case for case in reference_cases() if case.name == "section-bent-too-large")
+    case = case_named("section-bent-too-large")
     given, pose = case.nominal, case.truth.pose
     assert pose is not None
     nominal = discretize(NurbsCurve(given.degree, given.control_points, given.knots, given.weights, closed=True), samples=2000)
