@@ -44,7 +44,7 @@ def qualify(
         )
     try:
         files = _written(certificate, out or station)
-        keep_as_last(last_from(certificate, installation, files[0]), station)
+        keep_as_last(last_from(certificate, installation, files[0].absolute()), station)
     except OSError as error:
         return fail(f"{error.filename or out or station}: the certificate cannot be kept: {error.strerror or error}", NO_RECORD)
     if as_json:
