@@ -28,6 +28,15 @@ CHANGED = {
 }
 
 
+@pytest.mark.parametrize("made", [PASSED, FAILED])
+@pytest.mark.parametrize("changes", [(), ("Python",), ("Python", "numba", "numpy", "scipy")])
+def test_whatever_is_said_of_it_has_its_german_words(made: LastQualification, changes: tuple[str, ...]) -> None:
+    for said in filter(None, [made.words(changes), made.warning(changes)]):
+        german = Speech("de").sentence(said)
+        assert german != said
+        assert not {"installation", "qualification", "changed", "makes"} & set(german.split())
+
+
 @pytest.fixture
 def station(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr(named, "station_folder", lambda: tmp_path / "station")

@@ -87,6 +87,12 @@ def test_an_answer_that_was_not_sent_is_a_fault_and_one_that_was_is_none(alarms:
     assert told == [("Not sent to the machine", "fault"), ("Earlier answer to the machine not withdrawn", "fault")]
 
 
+def test_an_answer_that_is_not_on_record_is_a_fault_though_it_was_sent(alarms: Alarms) -> None:
+    alarms(Answered("sent", 7, datetime(2026, 11, 22, 12, 0), "", Verdict.CONFORM, unrecorded="the disk is full"))
+    (alarm,) = alarms.newest_first()
+    assert (alarm.what, alarm.detail, alarms.fault) == ("What the machine was told is not on record", "the disk is full", True)
+
+
 def test_an_anchor_that_was_not_told_is_a_warning_and_no_fault(alarms: Alarms) -> None:
     alarms.take_anchors([{"place": "heads.txt", "problem": ""}, {"place": "far.txt", "problem": "it did not answer within 5 s"}])
     (alarm,) = alarms.newest_first()

@@ -1,6 +1,8 @@
 """What a machine was told stands in the records behind the end of its run: whatever is altered of it is found, and no other passes."""
 
 import shutil
+import sqlite3
+from contextlib import closing
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -12,7 +14,7 @@ from cmmlink.record.chain import Draft
 from cmmlink.record.machine_answer import answer_of, keep_answer
 from cmmlink.record.recorder import end_draft
 from cmmlink.record.seal import seal_of
-from cmmlink.record.store import Store
+from cmmlink.record.store import FILE_NAME, Store
 from inspection import Verdict
 from tests.cmmlink.record.sealed import Clock, add_signed, forge, state_of, trust
 
@@ -122,6 +124,20 @@ def test_the_words_of_an_answer_count_as_much_as_what_is_said_of_them(tmp_path: 
 @pytest.mark.parametrize(("verdict", "code"), [("nonconform", 2), ("uncertain", 3)])
 def test_what_passes_nothing_may_stand_behind_any_run(verdict: str, code: int, tmp_path: Path) -> None:
     assert state_of(told(tmp_path, given(Verdict[verdict.upper()], code), verdict=verdict)) == SIGNED
+
+
+def test_an_answer_for_which_the_records_have_no_room_is_told_and_ends_nothing(tmp_path: Path) -> None:
+    """Nor is half of it on record, without its signature."""
+    folder = told(tmp_path, given(Verdict.CONFORM, 1), times=0)
+    full = "WHEN NEW.kind = 'countersignature' BEGIN SELECT RAISE(ABORT, 'the disk is full'); END"
+    with closing(sqlite3.connect(folder / FILE_NAME)) as connection:
+        connection.execute(f"CREATE TRIGGER full BEFORE INSERT ON record {full}")
+    with Store(folder, writing=True, epoch_s=lambda: 99.0) as store:
+        assert "the disk is full" in keep_answer(store, seal_of(store, station="cmm-1", key=None), RUN, given(Verdict.CONFORM, 1))
+        assert answer_of(store, RUN) is None
+    with closing(sqlite3.connect(folder / FILE_NAME)) as connection:
+        connection.execute("DROP TRIGGER full")
+    assert state_of(folder) == SIGNED
 
 
 def test_no_run_answers_twice(tmp_path: Path) -> None:

@@ -79,6 +79,19 @@ def test_the_text_of_the_report_says_the_numbers_of_the_result(bad: ReportInput,
     assert "2026-03-14 15:09:26 UTC" in told
 
 
+@pytest.mark.parametrize(
+    ("answer", "told"),
+    [
+        ({"sent": True, "verdict": "nonconform", "problem": None}, "NOT CONFORM for request 4711, sent 2026-03-14T15:09:27.000Z"),
+        ({"sent": False, "verdict": None, "problem": "there is no folder"}, "not sent: there is no folder"),
+    ],
+)
+def test_the_report_says_what_the_machine_was_told(answer: dict[str, Any], told: str, profile: NominalProfile, tmp_path: Path) -> None:
+    known = {"signature": None, "answer": {"request": 4711, "at": "2026-03-14T15:09:27.000Z", "unrecorded": None, **answer}}
+    write_report(report_of(inspect_oval(profile, bumped()), profile, **known), tmp_path / "a.pdf")
+    assert f"Answer to the machine {told}" in text_of(tmp_path / "a.pdf")
+
+
 def test_every_characteristic_stands_in_the_table_with_what_it_is_out_by(bad: ReportInput, tmp_path: Path) -> None:
     base = bad.document["characteristics"][0]
     chord = {"type": "chord", "method": "caliper", "nominal": 20.0, "value": 20.031, "deviation": 0.031, "lower": None, "upper": 0.025}
