@@ -87,7 +87,7 @@ def test_the_text_of_the_report_says_the_numbers_of_the_result(bad: ReportInput,
     ],
 )
 def test_the_report_says_what_the_machine_was_told(answer: dict[str, Any], told: str, profile: NominalProfile, tmp_path: Path) -> None:
-    known = {"signature": None, "answer": {"request": 4711, "at": "2026-03-14T15:09:27.000Z", "unrecorded": None, **answer}}
+    known: dict[str, Any] = {"signature": None, "answer": {"request": 4711, "at": "2026-03-14T15:09:27.000Z", "unrecorded": None, **answer}}
     write_report(report_of(inspect_oval(profile, bumped()), profile, **known), tmp_path / "a.pdf")
     assert f"Answer to the machine {told}" in text_of(tmp_path / "a.pdf")
 
