@@ -224,7 +224,7 @@ def test_records_that_cannot_be_read_whole_are_not_said_to_be_sound(tmp_path: Pa
 def test_runs_are_kept_in_the_users_data_folder_unless_told_otherwise(station: Station, tmp_path: Path) -> None:
     plan = tmp_path / "plan.yaml"
     points = (station.plan.parent / "points.npy").as_posix()
-    plan.write_text(station.plan.read_text().replace("records: kept\n", "").replace("points.npy", f"'{points}'"))
+    plan.write_text(station.plan.read_text().replace("records: kept\n", "").replace("points.npy", f"'{points}'") + "out: null\n")
     command = [sys.executable, "-m", "cmmlink", "run", str(plan), "--headless", "--json"]  # a process of its own: no folder in place
     ended = subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).resolve().parents[2], check=True)
     assert json.loads(ended.stdout)["run"] == told("runs", "--records", default_folder())["runs"][-1]["run"]
