@@ -41,7 +41,10 @@ def export(
     records: Records = None,
     as_json: Json = False,
 ) -> int:
-    """Write recorded runs for other programs, or all that is on record of one as csv, npy, json and raw bytes."""
+    """Write recorded runs for other programs, or all that is on record of one as csv, npy, json and raw bytes.
+
+    Who checks such a folder needs the hash of the run's end from elsewhere: the printed report, an anchor, or `cmmlink show RUN`.
+    """
     from cmmlink.record import export_run, find_run, open_to_read
 
     wanted = _formats_in(formats or ())

@@ -2,19 +2,9 @@
 
     python verify.py FOLDER [--head SHA256] [--key HEX]
 
-FOLDER is what `cmmlink export RUN --out FOLDER` wrote. This file needs Python 3.11 and numpy, and shares nothing with cmmlink. It says
-what it proved, what is not true, and what it did not check. Exit status: 0 nothing is untrue, 1 something is, 2 the evidence cannot be
-read. --head is the hash that left the station on the day, by the report or otherwise; --key is the station's public key, or the first 16
-digits of its SHA-256, as you were given it beforehand. The formulas, in their order:
-
-    chain       hash_k = SHA-256(hash_{k-1}, number, run, kind, time, count, length, body)
-    signature   s B = R + SHA-512(R, key, message) A on the curve -x^2 + y^2 = 1 + d x^2 y^2 (Ed25519, RFC 8032)
-    placement   p = R(angle) s + t, where s are the coordinates of a point in the section's plane
-    deviation   d = sign * min_u |p - C(u)| - r, positive out of material; r is the radius of the probe's tip, 0 for surface points
-    station     s(u) = integral of |C'| from the start of the curve
-    coverage    sum of the gaps between neighbouring stations that are no longer than allowed, by the length of the curve
-    refutation  |d(p) - d(q)| <= |p - q|. So a box of placements, in which point i moves by at most m_i, holds none that passes where
-                d_i is by more than m_i out of the loosest limits that it may meet, for one i. Boxes that are not refuted are halved.
+FOLDER is what `cmmlink export RUN --out FOLDER` wrote. Needs Python 3.11 and numpy. Exit status: 0 nothing is untrue, 1 something is, 2 the
+evidence cannot be read. --head is the hash that left the station on the day; --key is the station's public key, or the first 16 digits of
+its SHA-256. Take both from elsewhere than the folder: README.md, which stands beside this file, says from where, and has the formulas.
 """
 
 import csv
@@ -53,15 +43,13 @@ def unpack(data: bytes) -> tuple[int, int]:
     square = (y * y - 1) * pow(CURVE_D * y * y + 1, -1, PRIME) % PRIME
     x = pow(square, (PRIME + 3) // 8, PRIME)
     x = x if x * x % PRIME == square else x * pow(2, (PRIME - 1) // 4, PRIME) % PRIME
-    wrong = len(data) != 32 or y >= PRIME or x * x % PRIME != square or (odd and not x)
-    return (0, 0) if wrong else (x if x % 2 == odd else PRIME - x, y)
+    return (x if x % 2 == odd else PRIME - x, y) if len(data) == 32 and y < PRIME and x * x % PRIME == square and (x or not odd) else (0, 0)
 
 
 def add(p: tuple[int, int], q: tuple[int, int]) -> tuple[int, int]:
     """The sum of two points of the curve: RFC 8032, 5.1.4."""
     both = CURVE_D * p[0] * q[0] * p[1] * q[1]
-    x, y = (p[0] * q[1] + q[0] * p[1]) * pow(1 + both, -1, PRIME), (p[1] * q[1] + p[0] * q[0]) * pow(1 - both, -1, PRIME)
-    return x % PRIME, y % PRIME
+    return (p[0] * q[1] + q[0] * p[1]) * pow(1 + both, -1, PRIME) % PRIME, (p[1] * q[1] + p[0] * q[0]) * pow(1 - both, -1, PRIME) % PRIME
 
 
 def multiply(factor: int, p: tuple[int, int]) -> tuple[int, int]:
@@ -94,8 +82,7 @@ class Curve:
         degree, knots, weights = int(stated["degree"]), np.array(stated["knots"], dtype=float), np.array(stated["weights"], dtype=float)
         control = np.column_stack([np.array(stated["control_points_mm"], dtype=float) * weights[:, None], weights])
         size = np.hypot(*np.ptp(control[:, :2] / weights[:, None], axis=0))
-        waiting = [(k, knots[k], knots[k + 1]) for k in range(degree, len(control)) if knots[k + 1] > knots[k]][::-1]
-        found = []
+        waiting, found = [(k, knots[k], knots[k + 1]) for k in range(degree, len(control)) if knots[k + 1] > knots[k]][::-1], list[Array]()
         while waiting:
             span, first, last = waiting.pop()
             piece = np.array([blossom(knots, control, degree, span, [first] * (degree - j) + [last] * j) for j in range(degree + 1)])
@@ -214,74 +201,63 @@ class Check:
             return
         for path, kind in ((folder / "plan.yaml", "plan"), (next(folder.glob("nominal-*")), "nominal")):  # the files that people read
             self.say(path.read_bytes() == self.bodies[kind][0], f"{path.name} is what was recorded.")
-        shown, self.result = json.loads((folder / "result.json").read_text(encoding="utf-8")), json.loads(self.bodies["result"][0])
-        self.say({**shown, **self.result} == shown, "result.json says what was recorded.")
-        self.plan, told = read_plan(self.bodies["plan"][0].decode("utf-8")), self.result["characteristics"]
+        now = {path.stem: json.loads(path.read_text(encoding="utf-8")) for path in folder.glob("*.json")}
+        run, result, end = (json.loads(self.bodies[kind][0]) for kind in ("run", "result", "end"))
+        text, found, zone = self.bodies["plan"][0].decode(), result["characteristics"], now.get("zone", {})
+        self.plan, self.result, own = read_plan(text), result, {"run": run["run"], "chain_sha256": self.head}
+        both = [(now["result"], result | {"ending": end["state"]}), (now["run"], run | end | own | {"result": result, "plan": text})]
+        both += [(end, result), (now.get("signature", {}), own | (now["run"]["signature"] or {})), (zone, {"nominal": now.get("nominal")})]
+        both += [(said, one["certificate"] or {}) for said in zone.get("zones", ()) for one in found if one["name"] == said["name"]]
+        same = all(said[k] == x for said, right in both for k, x in right.items() if k in said) and result.keys() <= now["result"].keys()
+        self.say(same, "result.json, run.json, zone.json and signature.json say what was recorded, and nothing contradicts itself.")
         if self.result["registration"] is None:
             self.say(self.result["verdict"] == "uncertain", "NOT PROVEN follows: no point was judged.")
             return
         self.curve = Curve(json.loads((folder / "nominal.json").read_text(encoding="utf-8")))
-        self.check_nominal()
+        pairs = re.findall(r"^\s*([-+.\de]+)[\s,;]+([-+.\de]+)\s*$", self.bodies["nominal"][0].decode("latin-1"), re.MULTILINE)
+        points = np.array(pairs, dtype=float).reshape(-1, 2)
+        points = points[(points % 1 != 0).any(axis=1)] * self.plan["nominal.scale"]  # whole numbers may be counts
+        known, off = len(pairs) > 9 and self.plan["nominal.unit"] in (None, "mm"), np.abs(self.curve.closest(points)[0]).max(initial=0.0)
+        self.say(off <= 1e-7 if known else None, f"The curve runs through {len(points)} points of the nominal.", f"within {off:.1e} mm")
         self.check_deviations()
-        for at, one in enumerate(told, -1 if "tolerance.lower_mm" in self.plan else 0):
+        for at, one in enumerate(found, -1 if "tolerance.lower_mm" in self.plan else 0):
             self.check_profile(one, at)
-        worst = next(verdict for verdict in ("nonconform", "uncertain", "conform") if verdict in [one["verdict"] for one in told])
+        worst = next(verdict for verdict in ("nonconform", "uncertain", "conform") if verdict in [one["verdict"] for one in found])
         self.say(self.result["verdict"] == worst, f"The verdict on the part is the worst of all, {worst}.")
 
     def say(self, holds: object, sentence: str, detail: str = "") -> None:
         """Put a sentence where it belongs; None says that nothing was checked."""
-        heap = "Not checked" if holds is None else "Proved" if holds else "NOT TRUE"
-        self.findings.setdefault(heap, []).append(sentence + (f" ({detail})" if detail else ""))
+        heap = self.findings.setdefault("Not checked" if holds is None else "Proved" if holds else "NOT TRUE", [])
+        heap.append(sentence + (f" ({detail})" if detail else ""))
 
     def read_records(self, head: str, key: str) -> None:
         """The bodies of the records by kind, after recomputing every hash over them, and the signature over the last hash."""
         data, offset, before, last, broken = (self.folder / "records.bin").read_bytes(), 0, None, "", []
         run = json.loads((self.folder / "run.json").read_text(encoding="utf-8"))["run"]
         for row in csv.DictReader((self.folder / "chain.csv").read_text(encoding="utf-8").splitlines()):
-            number, body = int(row["number"]), data[offset : offset + int(row["bytes"])]
-            offset += int(row["bytes"])
+            number, body, offset = int(row["number"]), data[offset : offset + int(row["bytes"])], offset + int(row["bytes"])
             stated = f"{number}\n{run}\n{row['kind']}\n{float(row['time_s'])!r}\n{int(row['count'])}\n{len(body)}\n".encode()
             sound = hashlib.sha256(bytes.fromhex(row["previous_sha256"]) + stated + body).hexdigest() == row["sha256"]
             if not sound or (before and not last and before != (number - 1, row["previous_sha256"])):  # others may stand behind the end
                 broken.append(f"not so: record {number}, {row['kind']}")
-            before = number, row["sha256"]
             self.bodies.setdefault(row["kind"], []).append(body)
-            last = row["sha256"] if row["kind"] == "end" else last
-        whole = not broken and offset == len(data) and last
+            before, last = (number, row["sha256"]), row["sha256"] if row["kind"] == "end" else last
+        whole, self.head = not broken and offset == len(data) and last, last
         self.say(whole, f"Every record of run {run} is as it was hashed, and none is missing up to its end.", "; ".join(broken[:3]))
         anew = "Nothing, hashes included, was written anew since: the last hash is the one that was kept elsewhere."
-        self.say(last == head if head else None, anew, "" if head else "give the hash from the report with --head")
+        self.say(whole and last == head if head else None, anew, "" if head else "give the hash from the report with --head")
         path, message = self.folder / "signature.json", f"cmmlink run\n{run}\n{last}\n".encode()
         told = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {"public_key": "", "signature": ""}
         public, signature = bytes.fromhex(told["public_key"]), bytes.fromhex(told["signature"])
         name = hashlib.sha256(public).hexdigest()[:16] if public else "none"
-        self.say(is_signed(public, message, signature) if public else False if key else None, f"The run is signed, by the key {name}.")
-        self.say(key in (name, public.hex()) if key else None, "That key is the station's.", "" if key else "give it with --key")
-
-    def check_nominal(self) -> None:
-        """Whether the curve runs through the points of the nominal's file, where it holds pairs of numbers, a pair a line."""
-        pairs = re.findall(r"^\s*([-+.\de]+)[\s,;]+([-+.\de]+)\s*$", self.bodies["nominal"][0].decode("latin-1"), re.MULTILINE)
-        points = np.array(pairs, dtype=float).reshape(-1, 2)
-        points = points[(points % 1 != 0).any(axis=1)] * self.plan["nominal.scale"]  # whole numbers may be counts
-        known, off = len(pairs) > 9 and self.plan["nominal.unit"] in (None, "mm"), np.abs(self.curve.closest(points)[0]).max(initial=0.0)
-        self.say(off <= 1e-7 if known else None, f"The curve runs through {len(points)} points of the nominal.", f"within {off:.1e} mm")
+        signed, known = whole and public and is_signed(public, message, signature), key in (name, public.hex())
+        self.say(signed if public or key else None, f"The run is signed, by the key {name}.")
+        why = "give it with --key" if not key else "it is, but did not sign this run" if known and not signed else ""
+        self.say(None if why else known, "That key is the station's.", why)
 
     def column(self, kind: str, of: int, at: int, numbers: str) -> Array:
         """A column of records of points, which have `of` bytes a point and hold column after column; `at` of them stand before it."""
         return np.concatenate([np.frombuffer(b, numbers, len(b) // of, len(b) // of * at) for b in self.bodies.get(kind, [b""])])
-
-    def read_points(self) -> Array:
-        """Places (m, 2) in the plane of the section at the reference temperature."""
-        plan, self.radius = self.plan, self.plan["probe.tip_radius_mm"]
-        origin, normal, x = (np.array([plan[f"section.{key}.{k}"] for k in range(3)]) for key in ("origin_mm", "normal", "x_axis"))
-        x = x - (x @ normal) * normal / (normal @ normal)
-        axes = np.column_stack([x, np.cross(normal, x)])
-        flat = (self.column("points", 40, 16, "<3f8") - origin) @ (axes / np.linalg.norm(axes, axis=0))
-        if plan.get("temperature.compensate"):
-            fixed = np.array([plan["temperature.fixed_mm.0"], plan["temperature.fixed_mm.1"]])
-            size = 1 + plan["temperature.cte_per_k"] * (plan["temperature.part_c"] - plan["temperature.reference_c"])
-            flat, self.radius = fixed + (flat - fixed) / size, self.radius / size
-        return flat
 
     def check_counts(self, rejection: Array) -> None:
         """Counts anew, from what arrived: points with their numbers, and what the device said."""
@@ -302,9 +278,17 @@ class Check:
 
     def check_deviations(self) -> None:
         """Every deviation anew, at the recorded placement."""
-        flat, result, plan, curve = self.read_points(), self.result, self.plan, self.curve
-        places = ((0, "<2f8"), (32, "<f8"), (40, "<f8"), (49, "i1"))
-        actual, station, recorded, rejection = (self.column("deviations", 50, *place) for place in places)
+        result, plan, curve, self.radius = self.result, self.plan, self.curve, self.plan["probe.tip_radius_mm"]
+        origin, normal, x = (np.array([plan[f"section.{key}.{k}"] for k in range(3)]) for key in ("origin_mm", "normal", "x_axis"))
+        x = x - (x @ normal) * normal / (normal @ normal)
+        axes = np.column_stack([x, np.cross(normal, x)])  # of the section's plane, in which points have places (m, 2)
+        flat = (self.column("points", 40, 16, "<3f8") - origin) @ (axes / np.linalg.norm(axes, axis=0))
+        if plan.get("temperature.compensate"):  # to the reference temperature
+            fixed = np.array([plan["temperature.fixed_mm.0"], plan["temperature.fixed_mm.1"]])
+            size = 1 + plan["temperature.cte_per_k"] * (plan["temperature.part_c"] - plan["temperature.reference_c"])
+            flat, self.radius = fixed + (flat - fixed) / size, self.radius / size
+        at = ((0, "<2f8"), (32, "<f8"), (40, "<f8"), (49, "i1"))
+        actual, station, recorded, rejection = (self.column("deviations", 50, *place) for place in at)
         self.say(len(flat) == len(rejection), "Every point that came has a deviation, or a reason to have none.")
         self.check_counts(rejection)
         kept, flat = rejection == 0, np.resize(flat, (len(rejection), 2))
@@ -314,7 +298,7 @@ class Check:
         self.known = "registration.datum.rotation_deg" in plan or plan["registration.fit"] == "none"
         same = not self.known or np.abs(pose - [math.radians(datum[0]), *datum[1:]]).max() <= SAME_MM
         self.say(same, "The placement is the one that the plan states, where it states one.")
-        self.flat, self.station, judged = flat[kept], station[kept], placed(flat[kept], pose)
+        self.every, self.flat, self.station, judged = flat, flat[kept], station[kept], placed(flat[kept], pose)
         distance, along, at_end = curve.closest(judged)
         apart, self.deviation = np.abs(along - self.station), recorded[kept]
         off = np.abs([distance - self.radius - self.deviation, np.linalg.norm(actual[kept] - judged, axis=1) - self.radius]).max()
@@ -330,7 +314,10 @@ class Check:
         gaps = np.diff(s, append=s[0] + curve.length) if curve.closed else np.diff(s, prepend=0.0, append=curve.length)
         self.facts = {"coverage": gaps[gaps <= self.gap_mm].sum() / curve.length, "largest_gap_mm": gaps.max()}
         found = {"max_deviation_mm": d.max(), "min_deviation_mm": d.min(), "profile_error_mm": 2 * np.abs(d).max()} | self.facts
+        found |= {"rms_mm": math.sqrt((d @ d) / len(d)), "zone_error_mm": 2 * np.abs(d - sum(zone[:2]) / 2).max()}
         out = int(((d > zone[1] + guard) | (d < zone[0] - guard)).sum())
+        there = {"best-fit": "best_fit_error_mm", "minimum-zone": "minimum_zone_mm" if not out else ""}.get(result["fit"], "")
+        found |= {key: found["zone_error_mm"] for key in [there] if result.get(key) is not None}  # what it is at this very placement
         same = all(abs(result[key] - value) < FITTED_MM for key, value in found.items()) and result["out_of_tolerance"] == out
         self.say(same, f"The longest gap is {gaps.max():.3f} mm; {self.facts['coverage']:.1%} was measured; {out} points are out.")
 
@@ -345,20 +332,28 @@ class Check:
 
     def check_profile(self, one: Any, at: int) -> None:
         """A line-profile of the whole profile at the run's placement: its value, its verdict, and the proof of its minimum zone."""
-        zone, name, plan, d = self.zone_of(at), one["name"], self.plan, self.deviation
+        zone, name, plan, d, proof = self.zone_of(at), one["name"], self.plan, self.deviation, one["certificate"]
+        self.check_twice(one, zone)
         if zone is None or one["region"] or one["pose"] != self.placement or one["filter"] != "none":
             self.say(None, f"{name}: its value, {one['value']} {one['unit']}, and its verdict, {one['verdict']}.")
             return
         u, found = one["uncertainty"], {"value": 2 * np.abs(d - sum(zone) / 2).max(), "lower": zone[0], "upper": zone[1], **self.facts}
-        same = at > 0 or [one["lower"], one["upper"], u] == self.zone  # of the first, the run's own
-        same &= all(abs(one[key] - value) < FITTED_MM for key, value in found.items())
+        same = (at > 0 or [one["lower"], one["upper"], u] == self.zone) and all(abs(one[k] - x) < FITTED_MM for k, x in found.items())
         self.say(same, f"{name}: it is {found['value']:.6f} mm, and its zone {zone[0]:g} .. {zone[1]:g} mm that of the plan.")
         own = plan.get(f"characteristics.{at}.uncertainty_mm", plan.get("tolerance.uncertainty_mm"))
         self.say(own if own is None else own == u, f"{name}: U = {u:g} mm is stated by the plan.")
         guard, rule = 0.0 if plan["decision_rule"] == "simple" else u, plan.get(f"characteristics.{at}.rule") or plan["rule"]
-        low, high, proof = zone[0] + self.radius, zone[1] + self.radius, one["certificate"]
-        beyond = bool(((d > zone[1] + guard) | (d < zone[0] - guard)).any())
-        doubt = "; ".join(words for words, holds in self.find_doubts(one, zone, d, guard).items() if holds)
+        low, high, beyond = zone[0] + self.radius, zone[1] + self.radius, bool(((d > zone[1] + guard) | (d < zone[0] - guard)).any())
+        (share, gap), end_mm, unseen_mm = self.facts.values(), plan["end_allowance_mm"], plan["allow.unseen_mm"]
+        doubts = self.doubts | {  # what keeps it from being proven to conform
+            "points are missing": self.missing and gap > (-1 if unseen_mm is None else unseen_mm),
+            "too little was measured": share < plan["registration.coverage_min"],
+            "a gap is too long": gap > self.gap_mm * (1 + 1e-9),
+            "points lie beyond an end": self.beyond_mm > ((zone[1] - zone[0]) / 2 if end_mm is None else end_mm),
+            "points are out or in doubt": bool(((d > zone[1] - guard) | (d < zone[0] + guard)).any()),
+            "the record names another reason": any(reason["kind"] in UNPROVED for reason in one["reasons"]),
+        }
+        doubt = "; ".join(words for words, holds in doubts.items() if holds)
         known, verdict = self.known and one["fit"] in ("none", "datum"), f"{name}: {one['verdict'].upper()} follows"
         if known or one["verdict"] != "nonconform":
             self.say(one["verdict"] == ("nonconform" if known and beyond else "uncertain" if doubt else "conform"), f"{verdict}.", doubt)
@@ -367,28 +362,33 @@ class Check:
         else:
             self.say(self.curve.search(self.flat, low - guard, high + guard), f"{verdict}, for no placement passes.")
         if proof and proof["proven"]:
-            middle, half, same = (low + high) / 2, found["value"] / 2 - proof["gap_mm"], abs(proof["zone_mm"] - found["value"]) < FITTED_MM
-            none = half < 0 or self.curve.search(self.flat, middle - half, middle + half) if same else None  # not of all points
-            self.say(none, f"{name}: no placement has a zone of less than {2 * half:.6f} mm.")
+            none = proof["bound"] < 0 or self.curve.search(self.flat, *((low + high) / 2 + np.array([-1, 1]) * proof["bound"]))
+            self.say(none, f"{name}: no placement has a zone of less than {2 * proof['bound']:.6f} mm.")
 
-    def find_doubts(self, one: Any, zone: list[float], d: Array, guard: float) -> dict[str, bool]:
-        """What keeps a line-profile with deviations d (k,) from being proven to conform."""
-        plan, (share, gap), end_mm = self.plan, self.facts.values(), self.plan["end_allowance_mm"]
-        return self.doubts | {
-            "points are missing": self.missing and gap > (-1 if plan["allow.unseen_mm"] is None else plan["allow.unseen_mm"]),
-            "too little was measured": share < plan["registration.coverage_min"],
-            "a gap is too long": gap > self.gap_mm * (1 + 1e-9),
-            "points lie beyond an end": self.beyond_mm > ((zone[1] - zone[0]) / 2 if end_mm is None else end_mm),
-            "points are out or in doubt": bool(((d > zone[1] - guard) | (d < zone[0] + guard)).any()),
-            "the record names another reason": any(reason["kind"] in UNPROVED for reason in one["reasons"]),
-        }
+    def check_twice(self, one: Any, zone: list[float] | None) -> None:
+        """Whether a characteristic says the same wherever it says it twice, and its certificate what its points say."""
+        value, off, limits, proof, apart = one["value"], one["deviation"], (one["lower"], one["upper"]), one["certificate"], [0.0]
+        if off is not None:
+            apart += [value - abs(2 * off - sum(zone))] if zone else []
+            turn, worst = 360.0 if one["unit"] == "deg" else math.inf, one["worst"]
+            apart += [worst["deviation_mm"] - off if worst else math.remainder(value - (one["nominal"] or 0.0) - off, turn)]
+            apart += [] if None in limits else [one["consumption"] * (limits[1] - limits[0]) - abs(2 * off - sum(limits))]
+        if proof:
+            held, half, pose, of_zone = proof["active"], (proof["zone_mm"] or 0.0) / 2, proof["pose"], proof["kind"] == "minimum-zone"
+            places, told = self.every[[point["index"] for point in held]], [point["deviation_mm"] for point in held]
+            apart += [x for at, point in zip(places, held, strict=True) for x in at - [point["x_mm"], point["y_mm"]]]
+            apart += [half - proof["gap_mm"] - proof["bound"]] if of_zone else []
+            apart += [f"{x:.9f}" not in proof["words"] for x in ([half] if of_zone else [proof["consumption"], proof["bound"]])]
+            off = self.curve.closest(placed(places, [math.radians(pose["rotation_deg"]), *pose["translation_mm"]]))[0] - self.radius
+            apart += [not np.allclose(np.abs([off - proof["middle_mm"], told]), half, 0, FITTED_MM)] if of_zone else []
+        self.say(np.abs(apart).max() <= SAME_MM, f"{one['name']}: its numbers agree with each other, and its certificate with its points.")
 
 
 def main(arguments: list[str]) -> int:
     """Check what the command line names, print the findings and give the exit status."""
     try:
-        options = {name.removeprefix("--"): value for name, value in zip(arguments[1::2], arguments[2::2], strict=True)}
-        findings = Check(Path(arguments[0]), **options).findings
+        named = zip(arguments[1::2], arguments[2::2], strict=True)
+        findings = Check(Path(arguments[0]), **{name.removeprefix("--"): value for name, value in named}).findings
     except (OSError, ValueError, LookupError, TypeError, StopIteration) as error:
         print(f"The evidence cannot be read: {type(error).__name__}: {error}" if len(arguments) % 2 else __doc__)
         return 2

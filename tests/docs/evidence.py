@@ -47,14 +47,35 @@ class Evidence:
     def replace(self, kind: str, body: bytes) -> None:
         """Exchange the first body of a kind, and compute the whole chain anew. Whoever does so has no key: the signature is taken away."""
         (self.folder / "signature.json").unlink(missing_ok=True)
-        at = next(k for k, row in enumerate(self.rows) if row["kind"] == kind)
-        self.bodies[at] = body
+        self._put(kind, body)
+        self._say_elsewhere()
         run, previous = json.loads(self.body("run"))["run"], self.rows[0]["previous_sha256"]
         for row, one in zip(self.rows, self.bodies, strict=True):
             row["bytes"], row["previous_sha256"] = str(len(one)), previous
             head = f"{row['number']}\n{run}\n{row['kind']}\n{row['time_s']}\n{row['count']}\n{len(one)}\n".encode()
             previous = row["sha256"] = hashlib.sha256(bytes.fromhex(previous) + head + one).hexdigest()
         self.write()
+        told = json.loads((self.folder / "run.json").read_text())
+        told |= {"result": self.result, "plan": self.body("plan").decode(), "chain_sha256": self.head, "signature": None}
+        told |= {key: value for key, value in (json.loads(self.body("run")) | json.loads(self.body("end"))).items() if key in told}
+        (self.folder / "run.json").write_text(json.dumps(told))
+        if (self.folder / "zone.json").exists():
+            zone, proofs = (
+                json.loads((self.folder / "zone.json").read_text()),
+                {c["name"]: c["certificate"] for c in self.result["characteristics"]},
+            )
+            zone["zones"] = [{key: (proofs[one["name"]] | {"name": one["name"]})[key] for key in one} for one in zone["zones"]]
+            (self.folder / "zone.json").write_text(json.dumps(zone))
+
+    def _put(self, kind: str, body: bytes) -> None:
+        self.bodies[next(k for k, row in enumerate(self.rows) if row["kind"] == kind)] = body
+
+    def _say_elsewhere(self) -> None:
+        """Say at the begin and at the end of the records what they now hold between."""
+        run, end, result = json.loads(self.body("run")), json.loads(self.body("end")), self.result
+        run |= {f"{kind}_sha256": hashlib.sha256(self.body(kind)).hexdigest() for kind in ("plan", "nominal")}
+        self._put("run", json.dumps(run).encode())
+        self._put("end", json.dumps(end | {key: result[key] for key in ("received", "verdict", "coverage")}).encode())
 
     def write(self) -> None:
         (self.folder / "records.bin").write_bytes(b"".join(self.bodies))
@@ -164,6 +185,52 @@ def _value(evidence: Evidence) -> bool:
     return True
 
 
+def _certificate(key: str, change: float) -> Callable[[Evidence], bool]:
+    """Alter one number of a certificate of a minimum zone, and nothing else."""
+
+    def alter(evidence: Evidence) -> bool:
+        found = evidence.result["characteristics"]
+        proof = next((one["certificate"] for one in found if (one["certificate"] or {}).get(key) is not None), None)
+        if proof is None:
+            return False
+        proof[key] += change
+        evidence.set_result(characteristics=found)
+        return True
+
+    return alter
+
+
+def _any_value(key: str) -> Callable[[Evidence], bool]:
+    """Alter one number of the last characteristic, whatever it is, by a micrometre."""
+
+    def alter(evidence: Evidence) -> bool:
+        found = evidence.result["characteristics"]
+        if found[-1]["value"] is None or "varying" in found[-1]["name"]:
+            return False
+        found[-1][key] += 1e-3
+        evidence.set_result(characteristics=found)
+        return True
+
+    return alter
+
+
+def _in_file(name: str, key: str) -> Callable[[Evidence], bool]:
+    """Alter a number in a file that people read, and not in the records."""
+
+    def alter(evidence: Evidence) -> bool:
+        path = evidence.folder / name
+        text = path.read_text() if path.exists() else ""
+        before = json.loads(text) if text else {}
+        place = before["zones"][0] if name == "zone.json" and text else before.get("result", before)
+        if place.get(key) is None:
+            return False
+        place[key] += 1e-3
+        path.write_text(json.dumps(before))
+        return True
+
+    return alter
+
+
 def _byte(evidence: Evidence) -> bool:
     path = evidence.folder / "records.bin"
     data = path.read_bytes()
@@ -184,6 +251,14 @@ ALTERATIONS: dict[str, Callable[[Evidence], bool]] = {
     "the losses left out": _say_nothing_of_losses,
     "a run that is cut off": _cut,
     "a value made smaller": _value,
+    "the zone of a certificate": _certificate("zone_mm", -1e-3),
+    "the bound of a certificate": _certificate("bound", 1e-3),
+    "the gap of a certificate": _certificate("gap_mm", -1e-5),
+    "the last value": _any_value("value"),
+    "the last deviation": _any_value("deviation"),
+    "the zone in zone.json": _in_file("zone.json", "zone_mm"),
+    "the minimum zone in result.json": _in_file("result.json", "minimum_zone_mm"),
+    "the zone error in run.json": _in_file("run.json", "zone_error_mm"),
     "a byte of the records": _byte,
 }
 """Ways to alter any run; each tells whether the run has what it alters. All but the last two compute the chain anew."""

@@ -77,6 +77,8 @@ def test_the_signature_is_held_against_a_key_that_was_given_beforehand(sound: Ev
     assert verify.Check(sound.folder, key="ab" * 32).findings["NOT TRUE"] == ["That key is the station's."]
     (altered.folder / "signature.json").write_text(json.dumps(told | {"signature": "00" + told["signature"][2:]}))
     assert "NOT TRUE" in verify.Check(altered.folder).findings
+    findings = verify.Check(altered.folder, key=told["key_id"]).findings
+    assert not any(sentence.startswith(("The run is signed", "That key")) for sentence in findings["Proved"])
     (altered.folder / "signature.json").unlink()
     assert "NOT TRUE" not in verify.Check(altered.folder).findings
     assert "NOT TRUE" in verify.Check(altered.folder, key=told["key_id"]).findings
@@ -191,9 +193,12 @@ def widen_everything(evidence: Evidence) -> None:
     """Alter the zone in the plan, and all that follows from it in the result."""
     result = json.loads(evidence.body("result"))
     evidence.set_plan("upper_mm: 0.05", "upper_mm: 0.08")
-    value = 2 * max(result["max_deviation_mm"] - 0.015, 0.015 - result["min_deviation_mm"])
-    found = [result["characteristics"][0] | {"upper": 0.08, "value": value}]
-    evidence.set_result(tolerance=result["tolerance"] | {"upper_mm": 0.08}, characteristics=found)
+    off = max(result["max_deviation_mm"], result["min_deviation_mm"], key=lambda d: abs(d - 0.015))
+    value = 2 * abs(off - 0.015)
+    first = result["characteristics"][0]
+    first |= {"upper": 0.08, "value": value, "deviation": off, "consumption": value / 0.13, "worst": first["worst"] | {"deviation_mm": off}}
+    errors = {"zone_error_mm": value, "best_fit_error_mm": value}
+    evidence.set_result(tolerance=result["tolerance"] | {"upper_mm": 0.08}, characteristics=[first], **errors)
 
 
 ALTERATIONS: dict[str, Callable[[Evidence], None]] = {
