@@ -117,11 +117,11 @@ def show(name: RunName, records: Records = None, as_json: Json = False) -> int:
 
 def _say_answer(found: Mapping[str, Any]) -> None:
     """Say what a machine tool was told of a run, or that the records do not say so, though the plan asks for an answer."""
-    from cmmlink.plan import texts_of
-
     if found["answer"] is not None:
         _say(f"{'answer':<14} {answer_words(found['answer'])}")
-    elif found["state"] != "running":
+    elif found["state"] != "running" and "answer" in found["plan"] and "answer: null" not in found["plan"].splitlines():
+        from cmmlink.plan import texts_of
+
         with suppress(YamlError):
             if "answer.file" in texts_of(found["plan"]):
                 _say(f"{'answer':<14} none is on record, though the plan asks for one: whether the machine was told is not known")
