@@ -45,6 +45,7 @@ let clock = { nowMs: 0, at: 0 }; // the station's time of day, and when it was h
 let alarms = [];
 let version = "";
 let page = 0; // the number that the station has given this page
+let newest = NaN; // the number of the newest run that the station told of, 0 before the first; not known before it tells
 /** @type {Cursor | null} */
 let cursor = null;
 let isPainting = false;
@@ -102,12 +103,18 @@ function greet(hello) {
   page = hello.page;
   heard.isRemote = hello.remote && location.protocol !== "https:";
   heard.run = heard.station = heard.control = cursor = null;
+  newest = NaN;
   scan.clear();
 }
 
-/** @param {ShownRun} message */
+/**
+ * A run that is new is looked at, also one so short that the page first hears of it when it is finished.
+ * @param {ShownRun} message
+ */
 function takeRun({ run, recorded }) {
-  const isNew = run && run.phase !== "finished" && heard.run?.number !== run.number;
+  const number = run ? Number(run.number) : 0;
+  const isNew = run && (run.phase === "finished" ? !recorded && number > newest : heard.run?.number !== run.number);
+  if (!recorded) newest = number;
   heard.run = run;
   heard.isRecorded = recorded;
   if (isNew && heard.view !== "wall") go("live");
