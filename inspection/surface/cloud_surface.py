@@ -100,7 +100,8 @@ def _turn_outward(frames: Array, points: Array, around: Index, normals: ArrayLik
         _turn_over(frames, (frames[:, 2] * given).sum(axis=1) < 0)
         return ()
     n = len(points)
-    rows, columns = np.repeat(np.arange(n), _NEAR), around[:, 1 : _NEAR + 1].ravel()
+    rows = np.repeat(np.arange(n, dtype=np.int32), _NEAR)  # scipy before 1.16 walks graphs with 32-bit numbers only
+    columns = around[:, 1 : _NEAR + 1].ravel().astype(np.int32)
     differs = 1.0 - np.abs((frames[rows, 2] * frames[columns, 2]).sum(axis=1)) + 1e-9
     tree = minimum_spanning_tree(coo_array((differs, (rows, columns)), shape=(n, n)).tocsr())
     order, parent = breadth_first_order(tree, 0, directed=False, return_predecessors=True)
