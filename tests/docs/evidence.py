@@ -261,4 +261,4 @@ ALTERATIONS: dict[str, Callable[[Evidence], bool]] = {
     "the zone error in run.json": _in_file("run.json", "zone_error_mm"),
     "a byte of the records": _byte,
 }
-"""Ways to alter any run; each tells whether the run has what it alters. All but the last two compute the chain anew."""
+"""Ways to alter any run; each tells whether the run has what it alters. Those of a file, and the last, leave the chain as it was."""

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inspection.kernels.compiling import array_at, claim_chunk, inlined_kernel, inner_kernel, kernel, stack_integers, stack_reals
-from inspection.kernels.feet import flatten, share_out
 from inspection.kernels.layout import CHUNK
 from inspection.kernels.surfaces.layout import (
     BORDER_STEPS,
@@ -37,10 +36,8 @@ from inspection.kernels.surfaces.piece_minimum import closest_on_piece, piece_at
 from inspection.kernels.surfaces.space_feet import (
     AT_ONCE,
     SpaceFeet,
-    empty_space_feet,
-    nearby_first,
     next_leaf,
-    put_back,
+    project_in_chunks,
     square_from_last,
     store_no_foot,
 )
@@ -86,11 +83,7 @@ def project_on_patches(points_mm: Array, tables: PatchTables, threads: int | Non
 
     threads : None chooses by the number of points; the result is the same.
     """
-    order = nearby_first(points_mm)
-    points = flatten(points_mm if order is None else points_mm[order])
-    feet = empty_space_feet(len(points_mm))
-    share_out(lambda claimed: _project_chunks(points, tables, feet, claimed), len(points_mm), threads)
-    return put_back(feet, order)
+    return project_in_chunks(points_mm, lambda points, feet, claimed: _project_chunks(points, tables, feet, claimed), threads)
 
 
 @kernel

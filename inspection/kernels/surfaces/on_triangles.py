@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inspection.kernels.compiling import array_at, claim_chunk, inlined_kernel, kernel, stack_integers, stack_reals
-from inspection.kernels.feet import flatten, share_out
 from inspection.kernels.layout import CHUNK
 from inspection.kernels.surfaces.layout import (
     CLUSTER,
@@ -41,10 +40,8 @@ from inspection.kernels.surfaces.layout import (
 from inspection.kernels.surfaces.space_feet import (
     AT_ONCE,
     SpaceFeet,
-    empty_space_feet,
-    nearby_first,
     next_leaf,
-    put_back,
+    project_in_chunks,
     square_from_last,
     store_no_foot,
 )
@@ -87,11 +84,7 @@ def project_on_triangles(points_mm: Array, tables: TriangleTables, threads: int 
 
     threads : None chooses by the number of points; the result is the same.
     """
-    order = nearby_first(points_mm)
-    points = flatten(points_mm if order is None else points_mm[order])
-    feet = empty_space_feet(len(points_mm))
-    share_out(lambda claimed: _project_chunks(points, tables, feet, claimed), len(points_mm), threads)
-    return put_back(feet, order)
+    return project_in_chunks(points_mm, lambda points, feet, claimed: _project_chunks(points, tables, feet, claimed), threads)
 
 
 @kernel

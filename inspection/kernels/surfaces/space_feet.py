@@ -1,11 +1,13 @@
 """Closest points on surfaces as a record of arrays, and the walk through the search tree that every kind of surface shares."""
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inspection.kernels.compiling import inlined_kernel, inner_kernel
+from inspection.kernels.feet import flatten, share_out
 from inspection.kernels.surfaces.layout import BOX_HIGH, BOX_LOW, BOX_SIDES, LEAF, NO_FOOT, SQUARES_OF_EIGHT, WAYS
 
 Array = NDArray[np.float64]
@@ -36,6 +38,19 @@ class SpaceFeet(NamedTuple):
     kind: NDArray[np.uint8]
 
 
+def project_in_chunks(points_mm: Array, project: Callable[[Array, SpaceFeet, NDArray[np.int64]], None], threads: int | None) -> SpaceFeet:
+    """Closest points to points (m, 3), which threads take in chunks; points near each other are projected one after the other.
+
+    project : the loop of a kind of surface: it takes the coordinates (3 m,), the feet to fill in, and the counter of claimed chunks
+    threads : None chooses by the number of points; the result is the same
+    """
+    order = nearby_first(points_mm)
+    points = flatten(points_mm if order is None else points_mm[order])
+    feet = _empty_feet(len(points_mm))
+    share_out(lambda claimed: project(points, feet, claimed), len(points_mm), threads)
+    return _put_back(feet, order)
+
+
 def nearby_first(points_mm: Array) -> NDArray[np.int64] | None:
     """An order (m,) of points (m, 3) in which those near each other follow each other; None where they do already, as in a scan.
 
@@ -58,7 +73,7 @@ def nearby_first(points_mm: Array) -> NDArray[np.int64] | None:
     return np.argsort(key, kind="stable")
 
 
-def put_back(feet: SpaceFeet, order: NDArray[np.int64] | None) -> SpaceFeet:
+def _put_back(feet: SpaceFeet, order: NDArray[np.int64] | None) -> SpaceFeet:
     """Feet of points that were ordered, in their own order."""
     if order is None:
         return feet
@@ -68,7 +83,7 @@ def put_back(feet: SpaceFeet, order: NDArray[np.int64] | None) -> SpaceFeet:
     return SpaceFeet(foot_mm[back], distance_mm[back], normal[back], item[back], parameter[back], kind[back])
 
 
-def empty_space_feet(m: int) -> SpaceFeet:
+def _empty_feet(m: int) -> SpaceFeet:
     """Feet of m points, not filled in."""
     return SpaceFeet(
         np.empty((m, 3)), np.empty(m), np.empty((m, 3)), np.empty(m, dtype=np.int32), np.empty((m, 2)), np.empty(m, dtype=np.uint8)
