@@ -111,7 +111,7 @@ def _parser(program: str | None, *, needs_path: bool) -> argparse.ArgumentParser
     parser.add_argument("--backward", action="store_true", help="against the order of the path")
     parser.add_argument("--seed", type=int, metavar="N", help="of form error, noise and faults [0]")
     parser.add_argument("--answer", type=Path, metavar="FILE", help="a machine tool asks for the verdict, and waits for it in this file")
-    parser.add_argument("--request", type=_request, metavar="N", help="the number by which it asks [another one each time]")
+    parser.add_argument("--request", type=_request_number, metavar="N", help="the number by which it asks [another one each time]")
     parser.add_argument("--answer-within", dest="answer_s", type=float, metavar="S", help="how long it waits for the answer [60]")
     for name, meaning in _MILLIMETRES.items():
         parser.add_argument(f"--{name}-mm", type=float, metavar="MM", help=meaning)
@@ -120,11 +120,10 @@ def _parser(program: str | None, *, needs_path: bool) -> argparse.ArgumentParser
     return parser
 
 
-def _request(text: str) -> int:
-    number = int(text)
-    if not 1 <= number <= LAST_REQUEST:
-        raise argparse.ArgumentTypeError(f"expected a number from 1 to {LAST_REQUEST}")
-    return number
+def _request_number(text: str) -> int:
+    if not (text.isascii() and text.isdecimal() and len(text) <= len(str(LAST_REQUEST)) and int(text) >= 1):
+        raise argparse.ArgumentTypeError(f"expected a whole number from 1 to {LAST_REQUEST}, got {text!r}")
+    return int(text)
 
 
 _MILLIMETRES: Mapping[str, str] = MappingProxyType(

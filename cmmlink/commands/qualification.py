@@ -36,6 +36,11 @@ def qualify(
     from cmmlink.reference import reference_cases
 
     station = station_folder()
+    folder = out or station
+    try:
+        folder.mkdir(parents=True, exist_ok=True)  # before a minute's work, which could not be kept
+    except OSError as error:
+        return _refuse(error, folder)
     with progress("qualifying this installation, about a minute") as tell:
         cases = list(reference_cases())
         done = iter(range(len(cases) + 2))
@@ -43,10 +48,10 @@ def qualify(
             cases, now, lambda: read_installation(station), on_case=lambda _: tell(next(done) / (len(cases) + 2))
         )
     try:
-        files = _written(certificate, out or station)
+        files = _written(certificate, folder)
         keep_as_last(last_from(certificate, installation, files[0].absolute()), station)
     except OSError as error:
-        return fail(f"{error.filename or out or station}: the certificate cannot be kept: {error.strerror or error}", NO_RECORD)
+        return _refuse(error, folder)
     if as_json:
         print_json(certificate)
     else:
@@ -54,6 +59,10 @@ def qualify(
             typer.echo(line)
         typer.echo(f"certificate in {' and '.join(map(str, files))}")
     return EXIT_OF[Verdict.CONFORM if certificate["result"] == "passed" else Verdict.NONCONFORM]
+
+
+def _refuse(error: OSError, folder: Path) -> int:
+    return fail(f"{error.filename or folder}: the certificate cannot be kept: {error.strerror or error}", NO_RECORD)
 
 
 def _written(certificate: Mapping[str, Any], folder: Path) -> list[Path]:

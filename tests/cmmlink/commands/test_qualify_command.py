@@ -1,5 +1,6 @@
 """The command `qualify`: its certificate, its exit status, and what results and the doctor say afterwards."""
 
+import errno
 import json
 from collections.abc import Iterator
 from dataclasses import replace
@@ -9,6 +10,7 @@ import pypdf
 import pytest
 
 import cmmlink.reference
+import cmmlink.report
 from cmmlink import installation
 from cmmlink.commands import setup
 from cmmlink.installation import Installation
@@ -118,7 +120,19 @@ def test_a_certificate_that_cannot_be_written_leaves_the_last_one_in_its_place(
 ) -> None:
     monkeypatch.setattr(cmmlink.reference, "reference_cases", tuple)
     monkeypatch.setattr(wire, "simulated_device", None)
+    (tmp_path / "certificates").mkdir()
+
+    def fill(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device", str(tmp_path / "certificates"))
+
+    monkeypatch.setattr(cmmlink.report, "write_certificate", fill)
+    assert "the certificate cannot be kept: No space left" in run("qualify", "--out", tmp_path / "certificates").failed(5)
+    assert last_qualification(station) is None
+
+
+def test_a_place_that_takes_no_certificate_is_refused_first(station: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").touch()
+    monkeypatch.setattr(cmmlink.reference, "reference_cases", None)  # which cannot be asked for cases
     assert "the certificate cannot be kept" in run("qualify", "--out", tmp_path / "file").failed(5)
     assert last_qualification(station) is None
 
