@@ -68,7 +68,7 @@ class CloudSurface:
 
     def project(self, points_mm: ArrayLike, threads: int | None = None) -> SurfaceFeet:
         """Closest points of the jets to points (m, 3); see `NominalSurface`. The face of a foot is the number of its jet."""
-        return surface_feet(project_on_patches(points_in_space(points_mm), self._tables, threads))
+        return surface_feet(project_on_patches(points_in_space(points_mm), self._tables, threads), self.nominal_error_mm)
 
     def sample(self, count: int) -> tuple[Array, Array]:
         """The points that jets stand on, each as often as it takes to have `count` (n, 3), and the outward normals (n, 3) there."""

@@ -37,6 +37,8 @@ class SurfaceFeet:
     face        : (m,) number of the face, from 0, that the foot lies on; -1 where there is no foot
     parameter   : (m, 2) where on it: u and v of a spline face; of a triangle the weights of its second and third corner
     kind        : (m,) codes of `FootKind`
+    error_mm    : (m,) bound of how far the nominal may lie off what it stands for there: 0 on faces of CAD that are projected on as they
+                  are. It counts against the verdict on that point as U does; none is above the nominal's `nominal_error_mm`
     """
 
     foot_mm: Array
@@ -45,11 +47,12 @@ class SurfaceFeet:
     face: NDArray[np.int32]
     parameter: Array
     kind: NDArray[np.uint8]
+    error_mm: Array
 
     def __post_init__(self) -> None:
         m = len(self.distance_mm)
-        shapes = ((m, 3), (m,), (m, 3), (m,), (m, 2), (m,))
-        arrays: tuple[NDArray[Any], ...] = (self.foot_mm, self.distance_mm, self.normal, self.face, self.parameter, self.kind)
+        shapes = ((m, 3), (m,), (m, 3), (m,), (m, 2), (m,), (m,))
+        arrays: list[NDArray[Any]] = [self.foot_mm, self.distance_mm, self.normal, self.face, self.parameter, self.kind, self.error_mm]
         if any(array.shape != shape for array, shape in zip(arrays, shapes, strict=True)):
             raise ValueError(f"expected {shapes}, got {[array.shape for array in arrays]}")
         for array in arrays:
@@ -69,7 +72,7 @@ class NominalSurface(Protocol):
 
     @property
     def nominal_error_mm(self) -> float:
-        """Bound of how far this surface may lie off the one that it stands for. It counts against every verdict as U does."""
+        """Bound of how far this surface may lie off the one that it stands for, anywhere. `SurfaceFeet.error_mm` is that of each point."""
 
     @property
     def area_mm2(self) -> float:
@@ -110,10 +113,11 @@ def rejections(feet: SurfaceFeet, farthest_mm: float, scan_normals: ArrayLike | 
     return result
 
 
-def surface_feet(found: SpaceFeet, face: NDArray[np.int32] | None = None) -> SurfaceFeet:
+def surface_feet(found: SpaceFeet, error_mm: float, face: NDArray[np.int32] | None = None) -> SurfaceFeet:
     """Feet as the loops fill them in, as a record. The face of an item (n,) stands in for its number, where there is more than one item."""
+    error = np.full(len(found.kind), error_mm)
     items = found.item if face is None else np.where(found.item >= 0, face[found.item], np.int32(-1))
-    return SurfaceFeet(found.foot_mm, found.distance_mm, found.normal, items, found.parameter, found.kind)
+    return SurfaceFeet(found.foot_mm, found.distance_mm, found.normal, items, found.parameter, found.kind, error)
 
 
 def points_in_space(points_mm: ArrayLike) -> Array:

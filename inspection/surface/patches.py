@@ -90,7 +90,7 @@ class PatchSurface:
     def project(self, points_mm: ArrayLike, threads: int | None = None) -> SurfaceFeet:
         """Closest points of the surface to points (m, 3); see `NominalSurface`. The number of threads changes no bit."""
         found = project_on_patches(points_in_space(points_mm), self._tables, threads)
-        return surface_feet(found, self._pieces.face.astype(np.int32))
+        return surface_feet(found, self.nominal_error_mm, self._pieces.face.astype(np.int32))
 
     def sample(self, count: int) -> tuple[Array, Array]:
         """At least `count` places (n, 3) spread over the area, and the outward normals (n, 3) there."""

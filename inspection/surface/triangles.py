@@ -54,7 +54,7 @@ class TriangleSurface:
 
     def project(self, points_mm: ArrayLike, threads: int | None = None) -> SurfaceFeet:
         """Closest points of the surface to points (m, 3); see `NominalSurface`. The number of threads changes no bit."""
-        return surface_feet(project_on_triangles(points_in_space(points_mm), self._tables, threads), self._face)
+        return surface_feet(project_on_triangles(points_in_space(points_mm), self._tables, threads), self.nominal_error_mm, self._face)
 
     def sample(self, count: int) -> tuple[Array, Array]:
         """At least `count` places (n, 3) spread over the area, and the normals (n, 3) there: each triangle is cut into like ones."""
