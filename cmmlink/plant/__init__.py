@@ -5,7 +5,9 @@ TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer 
 if TYPE_CHECKING:
     from cmmlink.plant.capability_indices import Capability, CapabilityIndex, capability
     from cmmlink.plant.control_charts import ControlChart, ControlCharts, individuals_charts, mean_range_charts
+    from cmmlink.plant.drift import Drift, DriftingStretch, drift_of
     from cmmlink.plant.gauge_studies import CrossedStudy, StationStudy, TypeOneStudy, crossed_study, station_study, type_one_study
+    from cmmlink.plant.trend import FORM_TYPES, Trend, alarm_words, new_violations, trend_of
     from cmmlink.plant.western_electric import ControlLimits, RuleViolation
 else:
     from cmmlink.front_door import load_on_use
@@ -13,6 +15,7 @@ else:
     _PLACES = {
         "cmmlink.plant.capability_indices": ("Capability", "CapabilityIndex", "capability"),
         "cmmlink.plant.control_charts": ("ControlChart", "ControlCharts", "individuals_charts", "mean_range_charts"),
+        "cmmlink.plant.drift": ("Drift", "DriftingStretch", "drift_of"),
         "cmmlink.plant.gauge_studies": (
             "CrossedStudy",
             "StationStudy",
@@ -21,6 +24,7 @@ else:
             "station_study",
             "type_one_study",
         ),
+        "cmmlink.plant.trend": ("FORM_TYPES", "Trend", "alarm_words", "new_violations", "trend_of"),
         "cmmlink.plant.western_electric": ("ControlLimits", "RuleViolation"),
     }
 
@@ -28,19 +32,27 @@ else:
 
 
 __all__ = [
+    "FORM_TYPES",
     "Capability",
     "CapabilityIndex",
     "ControlChart",
     "ControlCharts",
     "ControlLimits",
     "CrossedStudy",
+    "Drift",
+    "DriftingStretch",
     "RuleViolation",
     "StationStudy",
+    "Trend",
     "TypeOneStudy",
+    "alarm_words",
     "capability",
     "crossed_study",
+    "drift_of",
     "individuals_charts",
     "mean_range_charts",
+    "new_violations",
     "station_study",
+    "trend_of",
     "type_one_study",
 ]

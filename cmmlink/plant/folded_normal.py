@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import ndtr
-from scipy.stats import foldnorm
 
 _LEAST_RATIO = math.sqrt(2 / math.pi)  # of the mean to the root mean square, of a half-normal distribution
 _FAR = 30.0  # standard deviations from zero: beyond, the fold is not seen and the distribution is normal
@@ -25,7 +24,9 @@ class FoldedNormal:
 
     def quantile(self, share: float) -> float:
         """The value below which that share of all values lies."""
-        return float(foldnorm.ppf(share, self.mean / self.sigma, scale=self.sigma))
+        ratio = self.mean / self.sigma
+        farthest = ratio + _FAR
+        return self.sigma * float(brentq(lambda value: _share_below(value, ratio) - share, 0.0, farthest, xtol=1e-13))
 
     def share_below(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """The share of all values that lies below each one."""
@@ -51,6 +52,11 @@ def fit_folded_normal(values: NDArray[np.float64]) -> FoldedNormal:
     theta = float(brentq(lambda theta: _ratio_of(theta) - ratio, 0.0, _FAR, xtol=1e-12))
     sigma = root / math.sqrt(1 + theta * theta)
     return FoldedNormal(theta * sigma, sigma)
+
+
+def _share_below(value: float, ratio: float) -> float:
+    """The share below a value, of a distribution whose normal one lies so far from zero; both in standard deviations."""
+    return (math.erf((value - ratio) / math.sqrt(2)) + math.erf((value + ratio) / math.sqrt(2))) / 2
 
 
 def _ratio_of(theta: float) -> float:
