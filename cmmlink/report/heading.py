@@ -2,7 +2,7 @@
 
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, BinaryIO
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,11 +44,11 @@ def short_title(title: str) -> str:
     return f"{line[:half].rstrip()} ... {line[-half:].lstrip()}"
 
 
-def save_picture(figure: "Figure", path: Path) -> None:
-    """Write the picture. A sign that the font does not have is drawn as a box, and is no reason for a warning."""
+def save_picture(figure: "Figure", path: Path | BinaryIO) -> None:
+    """Write the picture, to a path as its name says, else as PNG. A sign that the font does not have is drawn as a box, and is no reason for a warning."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")
-        if path.suffix == ".svg":
+        if isinstance(path, Path) and path.suffix == ".svg":
             figure.savefig(path, metadata={"Date": None})
         else:
             figure.savefig(path, pil_kwargs={"compress_level": _PACKED})
