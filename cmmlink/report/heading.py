@@ -45,7 +45,10 @@ def short_title(title: str) -> str:
 
 
 def save_picture(figure: "Figure", path: Path | BinaryIO) -> None:
-    """Write the picture, to a path as its name says, else as PNG. A sign that the font does not have is drawn as a box, and is no reason for a warning."""
+    """Write the picture: a path as its name says, a file as PNG.
+
+    A sign that the font does not have is drawn as a box, and is no reason for a warning.
+    """
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")
         if isinstance(path, Path) and path.suffix == ".svg":
