@@ -20,6 +20,7 @@ from cmmlink.exports import tables
 from cmmlink.plan.reference import Group, groups_of, table
 from cmmlink.plan.scan import Plan
 from cmmlink.plan.surface import CtPlan
+from cmmlink.plan.whole_surface import SurfacePlan
 from cmmlink.qualification import QUANTITIES
 from cmmlink.qualification_keys import Qualified
 from cmmlink.record import evidence, export
@@ -76,6 +77,21 @@ mesh: {file: blade.stl}
 nominal: {file: blade.dat, scale: 60}
 tolerance: {lower_mm: -0.05, upper_mm: 0.05}
 sections: {normal: [0, 0, 1], heights_mm: [20, 50, 80]}
+```
+"""
+
+SURFACE_PLAN = """
+# The plan of a whole surface
+
+A plan with a `surface` in place of a `nominal` holds points in space against a whole surface: CAD, a mesh or a cloud of points.
+`cmmlink run plan.yaml` carries it out with any device that gives points in space, and `cmmlink surface` does the same for a file of
+points, with options in place of a plan. Relative paths are relative to the plan's own folder.
+
+```yaml
+part: {name: blade}
+surface: {file: blade.stp}
+tolerance: {lower_mm: -0.05, upper_mm: 0.05}
+device: {type: serial, address: /dev/ttyUSB0}
 ```
 """
 
@@ -307,6 +323,7 @@ def result_schema() -> str:
 PAGES: dict[str, Callable[[], str]] = {
     "plan.md": _plan,
     "ct-plan.md": lambda: page(CT_PLAN, CtPlan),
+    "surface-plan.md": lambda: page(SURFACE_PLAN, SurfacePlan),
     "register-map.md": _register_map,
     "results.md": results,
     "result.schema.json": result_schema,

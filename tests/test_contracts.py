@@ -250,6 +250,8 @@ def test_the_plans_and_maps_of_a_page_can_be_read(page: str, text: str, tmp_path
         map_of(file)
     elif "\nmesh:" in text:
         load_ct_plan(file)
+    elif "\nsurface:" in text:
+        load_surface_plan(file)
     else:
         load_plan(file)
 

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from cmmlink.plan.serial_numbers import SerialNumbers, next_serial_number
     from cmmlink.plan.stack_characteristics import AskedOfStack
     from cmmlink.plan.surface import CtPlan, NominalAt, load_ct_plan
+    from cmmlink.plan.whole_surface import SurfacePlan, load_surface_plan
     from cmmlink.plan.yaml_model import Positive, Settings, line_of, read_model, texts_of, value_of, words_of_allowed
 else:
     from cmmlink.front_door import load_on_use
@@ -59,6 +60,7 @@ else:
             "Registration",
             "Section",
             "load_plan",
+            "load_surface_plan",
             "place_of",
         ),
         "cmmlink.plan.characteristics": ("AskedCharacteristic", "AskedDatum", "AskedFilter", "AskedProfile", "Place"),
@@ -66,6 +68,7 @@ else:
         "cmmlink.plan.dme": ("CircleScan", "CurveScan", "LineScan", "PointsScan", "UnknownScan"),
         "cmmlink.plan.stack_characteristics": ("AskedOfStack",),
         "cmmlink.plan.surface": ("CtPlan", "NominalAt", "load_ct_plan"),
+        "cmmlink.plan.whole_surface": ("SurfacePlan", "load_surface_plan"),
         "cmmlink.plan.yaml_model": ("Positive", "Settings", "line_of", "read_model", "texts_of", "value_of", "words_of_allowed"),
     }
 
@@ -114,6 +117,7 @@ __all__ = [
     "SerialDevice",
     "SerialNumbers",
     "Settings",
+    "SurfacePlan",
     "UnknownScan",
     "all_keys",
     "find_mistakes",
@@ -122,6 +126,7 @@ __all__ = [
     "line_of",
     "load_ct_plan",
     "load_plan",
+    "load_surface_plan",
     "map_of",
     "next_serial_number",
     "place_of",

@@ -1,17 +1,15 @@
 """What every plan says of how a part is judged: the tolerance, the characteristics, and what the verdict rests on."""
 
-import json
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
-from typing import Annotated, Protocol, Self
+from typing import Annotated, Protocol
 
-import yaml
-from pydantic import Field, PrivateAttr, ValidationInfo, field_validator
+from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from cmmlink.plan.characteristics import AskedCharacteristic, AskedProfile
+from cmmlink.plan.spelled import Spelled
 from cmmlink.plan.uncertainty import DECISION_RULE, TEMPERATURE, UNCERTAINTY, Temperature, Uncertainty
 from cmmlink.plan.yaml_model import Positive, Settings
 from inspection import DecisionRule, RuleName, ToleranceZone, WeightName
@@ -81,10 +79,8 @@ def _first_profile(asked: tuple[AskedCharacteristic, ...]) -> AskedProfile | Non
     return first if first is not None and first.is_whole else None
 
 
-class Deciding(Settings):
-    """How the verdict on the part is reached: what every plan may say, and how every plan is spelled in full."""
-
-    _file_name: str = PrivateAttr("")
+class Deciding(Spelled):
+    """How the verdict on the part is reached: what every plan of sections may say."""
 
     rule: RuleName = Field(
         default="minimum-zone",
@@ -107,17 +103,6 @@ class Deciding(Settings):
     decision_rule: DecisionRule = Field(default="iso-14253-1", description=DECISION_RULE)
     uncertainty: Uncertainty | None = Field(default=None, description=UNCERTAINTY)
     temperature: Temperature | None = Field(default=None, description=TEMPERATURE)
-
-    @property
-    def file_name(self) -> str:
-        """The name of the file that the plan was read from; empty where it was made without one."""
-        return self._file_name
-
-    def named(self, file_name: str) -> Self:
-        """The same plan, read from a file of this name."""
-        plan = self.model_copy()
-        plan._file_name = file_name
-        return plan
 
     @field_validator("characteristics")
     @classmethod
@@ -178,13 +163,3 @@ class Deciding(Settings):
         own_mm = 0.0 if self.uncertainty or self.tolerance else self.first_profile.uncertainty_mm or 0.0
         zone = self.tolerance.zone if self.tolerance else self.first_profile.envelope(own_mm)
         return replace(zone, rule=self.decision_rule)
-
-    def effective_yaml(self) -> str:
-        """Spell the plan with every default filled in and every path absolute; as a plan it means the same."""
-        return "".join(_spelled(key, json.dumps(value)) for key, value in self.model_dump(mode="json").items())
-
-
-@lru_cache(maxsize=64)
-def _spelled(key: str, value_json: str) -> str:
-    """One key of a plan as YAML. The sections of a stack share all but one of theirs, and to spell twenty characteristics takes 10 ms."""
-    return yaml.safe_dump({key: json.loads(value_json)}, sort_keys=False, allow_unicode=True)

@@ -12,6 +12,7 @@ from pydantic import BaseModel
 
 from cmmlink.plan.scan import Plan
 from cmmlink.plan.surface import CtPlan
+from cmmlink.plan.whole_surface import SurfacePlan
 from cmmlink.plan.yaml_model import models_in, type_of
 
 SCAN = """
@@ -236,6 +237,36 @@ _SCANS_OF_A_MACHINE = (
     "end_mm: [9, 0, 0], end_diameter_mm: 1.4, end_count: 1, end_direction: [0, 1, 0], dialect: 1.4.3}",
 )
 
+_WHOLE_SURFACE = """
+part: {name: blade 9}
+surface: {file: blade.stl, scale: 1, chord_mm: 0.01}
+tolerance: {lower_mm: -0.1, upper_mm: 0.1, uncertainty_mm: 0.005}
+device: {type: file, file: scan.csv}
+registration:
+  fit: best-fit
+  start: {rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]], translation_mm: [12.5, -3, 40]}
+  locked: [z]
+  coverage_min: 0.95
+  reject_outliers: false
+  gross_mm: 2
+gap_max_mm: 3
+"""
+
+_SURFACE_IN_INCHES = """
+part: {name: blade 9}
+operator: A. Weber
+serial_number: {required: true, pattern: B-####}
+surface: {file: blade.ply, unit: inch}
+tolerance: {lower_mm: -0.1, upper_mm: 0.1}
+decision_rule: iso-14253-1
+device: {type: serial, address: COM3}
+probe: {tip_radius_mm: 1.0}
+buffer_points: 500000
+out: "results/{part}/{serial}_{run}"
+report: {language: en}
+records: records
+"""
+
 PLANS: tuple[tuple[type[BaseModel], str], ...] = (
     (Plan, SCAN),
     (CtPlan, _SURFACE),
@@ -248,6 +279,8 @@ PLANS: tuple[tuple[type[BaseModel], str], ...] = (
     (Plan, _MORE_OF_A_SCAN),
     (Plan, _OWN_DATUMS),
     (CtPlan, _MANY_SECTIONS),
+    (SurfacePlan, _WHOLE_SURFACE),
+    (SurfacePlan, _SURFACE_IN_INCHES),
     *((Plan, _ON_A_MACHINE % scan) for scan in _SCANS_OF_A_MACHINE),
 )
 

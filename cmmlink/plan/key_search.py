@@ -14,8 +14,9 @@ from cmmlink.plan.examples import example_at
 from cmmlink.plan.reference import REQUIRED, groups_of
 from cmmlink.plan.scan import Plan
 from cmmlink.plan.surface import CtPlan
+from cmmlink.plan.whole_surface import SurfacePlan
 
-_KINDS: Mapping[str, type[BaseModel]] = {"a scan": Plan, "a CT surface": CtPlan}
+_KINDS: Mapping[str, type[BaseModel]] = {"a scan": Plan, "a CT surface": CtPlan, "a whole surface": SurfacePlan}
 _TAG = re.compile(r" \(type: (\S+)\)")
 
 
@@ -40,7 +41,7 @@ class KeyEntry:
     def lines(self) -> Iterator[str]:
         """The entry for a terminal."""
         kind = f"  (type: {self.of_type})" if self.of_type else ""
-        only = "" if len(self.plans) == len(_KINDS) else f"; in plans of {self.plans[0]} only"
+        only = "" if len(self.plans) == len(_KINDS) else f"; in plans of {' and of '.join(self.plans)} only"
         default = "required" if self.default == REQUIRED else f"default {self.default}"
         yield f"{self.name}{kind}"
         yield f"    {self.takes}; {default}{only}"

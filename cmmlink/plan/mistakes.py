@@ -10,10 +10,11 @@ from cmmlink.errors import PlanError, YamlError
 from cmmlink.plan.examples import example_of
 from cmmlink.plan.scan import Plan
 from cmmlink.plan.surface import CtPlan
+from cmmlink.plan.whole_surface import SurfacePlan
 from cmmlink.plan.yaml_model import mistakes_in, texts_of
 from drivers import PointFileError, RegisterMap, read_text
 
-_FILES = ("nominal.file", "device.file", "device.format.sample", "mesh.file", "report.logo")
+_FILES = ("nominal.file", "device.file", "device.format.sample", "mesh.file", "report.logo", "surface.file")
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,9 +25,14 @@ class PlanMistake:
     example: str = ""
 
 
-def kind_of(text: str) -> type[Plan] | type[CtPlan] | type[RegisterMap]:
-    """Which kind of file a text is: a plan of a CT surface has a mesh, a register map a pattern, and a scan neither. Raises YamlError."""
+def kind_of(text: str) -> type[Plan] | type[SurfacePlan] | type[CtPlan] | type[RegisterMap]:
+    """Which kind of file a text is. Raises YamlError.
+
+    A plan of a CT surface has a mesh, that of a scan of a whole surface has a surface, a register map has a pattern, and a scan none of it.
+    """
     keys = {line.partition(":")[0].rstrip() for line in text.splitlines() if line[:1].isalpha()}
+    if "surface" in keys:
+        return SurfacePlan
     return CtPlan if "mesh" in keys else RegisterMap if "pattern" in keys and "part" not in keys else Plan
 
 

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from math import hypot
 from os import PathLike
 from pathlib import Path
+from typing import Any, Protocol, TypeVar
 
 from pydantic import Field, TypeAdapter, ValidationError, ValidationInfo, field_validator, model_validator
 
@@ -170,10 +171,7 @@ class Plan(Deciding):
     @field_validator("serial_number")
     @classmethod
     def _spelled_so(cls, asked: SerialNumbers | None, info: ValidationInfo) -> SerialNumbers | None:
-        part: Part | None = info.data.get("part")
-        if asked is not None and part is not None and part.serial_number and (problem := asked.problem_with(part.serial_number)):
-            raise ValueError(f"a pattern that part.serial_number has: {problem}")
-        return asked
+        return spelled_as(asked, info.data.get("part"))
 
     @field_validator("answer")
     @classmethod
@@ -195,28 +193,73 @@ class Plan(Deciding):
 
         operator : None leaves the plan's
         """
-        problem = self.serial_number.problem_with(serial_number) if self.serial_number is not None else ""
-        if problem:
-            raise PlanError(problem)
-        given = {"name": self.part.name, "serial_number": serial_number or None}
-        try:
-            part, who = Part.model_validate(given), Operator.validate_python(self.operator if operator is None else operator or None)
-        except ValidationError:
-            raise PlanError("a serial number and the name of an operator are printable text on one line") from None
-        return self.model_copy(update={"part": part, "operator": who})
+        return part_given(self, serial_number, operator)
 
     def with_address(self, address: str) -> "Plan":
         """Give the same plan with its device at another address. Raises PlanError for an address that is none."""
-        try:
-            device_address(address)
-        except ValueError as error:
-            raise PlanError(str(error)) from None
-        return self.model_copy(update={"device": self.device.model_copy(update={"address": address})})
+        return address_given(self, address)
+
+    @property
+    def nominal_file(self) -> Path:
+        """The file of the nominal."""
+        return self.nominal.file
+
+    def with_nominal_file(self, file: Path) -> "Plan":
+        """Give the same plan with its nominal in another file."""
+        return self.model_copy(update={"nominal": self.nominal.model_copy(update={"file": file})})
 
     @property
     def has_address(self) -> bool:
         """Whether the device is reached at an address, and not read from a file."""
         return getattr(self.device, "address", None) is not None
+
+
+class _OfOnePart(Protocol):
+    """A plan that one part at a time is measured by, with a device."""
+
+    @property
+    def serial_number(self) -> SerialNumbers | None: ...
+    @property
+    def part(self) -> Part: ...
+    @property
+    def operator(self) -> str | None: ...
+    @property
+    def device(self) -> Device: ...
+    def model_copy(self, *, update: dict[str, Any]) -> Any: ...
+
+
+OfOnePart = TypeVar("OfOnePart", bound=_OfOnePart)
+
+
+def spelled_as(asked: SerialNumbers | None, part: Part | None) -> SerialNumbers | None:
+    """What a plan asks of serial numbers, which that of its own part has. Raises ValueError where it has not."""
+    if asked is not None and part is not None and part.serial_number and (problem := asked.problem_with(part.serial_number)):
+        raise ValueError(f"a pattern that part.serial_number has: {problem}")
+    return asked
+
+
+def part_given(plan: OfOnePart, serial_number: str, operator: str | None) -> OfOnePart:
+    """The same plan for one part, and who measures it; None leaves who does in the plan. Raises PlanError."""
+    problem = plan.serial_number.problem_with(serial_number) if plan.serial_number is not None else ""
+    if problem:
+        raise PlanError(problem)
+    given = {"name": plan.part.name, "serial_number": serial_number or None}
+    try:
+        part, who = Part.model_validate(given), Operator.validate_python(plan.operator if operator is None else operator or None)
+    except ValidationError:
+        raise PlanError("a serial number and the name of an operator are printable text on one line") from None
+    found: OfOnePart = plan.model_copy(update={"part": part, "operator": who})
+    return found
+
+
+def address_given(plan: OfOnePart, address: str) -> OfOnePart:
+    """The same plan with its device at another address. Raises PlanError for an address that is none."""
+    try:
+        device_address(address)
+    except ValueError as error:
+        raise PlanError(str(error)) from None
+    found: OfOnePart = plan.model_copy(update={"device": plan.device.model_copy(update={"address": address})})
+    return found
 
 
 def load_plan(path: str | PathLike[str]) -> Plan:
@@ -258,13 +301,6 @@ def place_of(path: Path, key: str) -> str:
 
 def _with_paths_from(folder: Path, plan: Plan) -> Plan:
     """Make the paths of a plan absolute, seen from its folder."""
-    device = with_own_maps(plan.device, lambda own: str(folder / own))
-    if isinstance(device, FileDevice):
-        device = device.model_copy(update={"file": folder / device.file})
-    elif isinstance(device, LinesDevice):
-        sample = None if device.format.sample is None else folder / device.format.sample
-        file = None if device.file is None else folder / device.file
-        device = device.model_copy(update={"file": file, "format": device.format.model_copy(update={"sample": sample})})
     datum = plan.registration.datum
     if datum is not None and datum.result is not None:
         datum = datum.model_copy(update={"result": folder / datum.result})
@@ -272,10 +308,22 @@ def _with_paths_from(folder: Path, plan: Plan) -> Plan:
         update={
             "registration": plan.registration.model_copy(update={"datum": datum}),
             "nominal": plan.nominal.model_copy(update={"file": folder / plan.nominal.file}),
-            "device": device,
+            "device": device_from(folder, plan.device),
             "out": plan.out.with_path_from(folder),
             "answer": None if plan.answer is None else plan.answer.model_copy(update={"file": folder / plan.answer.file}),
             "records": plan.records.with_path_from(folder),
             "report": plan.report.with_path_from(folder),
         }
     )
+
+
+def device_from(folder: Path, device: Device) -> Device:
+    """The device of a plan with its paths absolute, seen from a folder."""
+    device = with_own_maps(device, lambda own: str(folder / own))
+    if isinstance(device, FileDevice):
+        device = device.model_copy(update={"file": folder / device.file})
+    elif isinstance(device, LinesDevice):
+        sample = None if device.format.sample is None else folder / device.format.sample
+        file = None if device.file is None else folder / device.file
+        device = device.model_copy(update={"file": file, "format": device.format.model_copy(update={"sample": sample})})
+    return device

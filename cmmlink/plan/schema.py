@@ -7,14 +7,15 @@ from cmmlink.plan.scan import Plan
 from cmmlink.plan.serial_numbers import SerialNumbers
 from cmmlink.plan.surface import CtPlan
 from cmmlink.plan.uncertainty import Mpe
+from cmmlink.plan.whole_surface import SurfacePlan
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def schema_of_plans() -> dict[str, Any]:
-    """One schema for plans of every kind: a plan of a CT surface has a mesh, one of a scan has a device."""
-    scan, surface = (_as_yaml(model.model_json_schema()) for model in (Plan, CtPlan))
-    definitions = scan.pop("$defs") | surface.pop("$defs")
+    """One schema for plans of every kind: a plan of a CT surface has a mesh, one of a whole surface has a surface."""
+    scan, stack, surface = (_as_yaml(model.model_json_schema()) for model in (Plan, CtPlan, SurfacePlan))
+    definitions = scan.pop("$defs") | stack.pop("$defs") | surface.pop("$defs")
     for notation in (ProfileZone, Mpe, SerialNumbers):  # they may be spelled as text as well
         definitions[notation.__name__] = {"anyOf": [definitions[notation.__name__], {"type": "string"}]}
     return {
@@ -22,8 +23,12 @@ def schema_of_plans() -> dict[str, Any]:
         "title": "Inspection plan of cmmlink",
         "if": {"required": ["mesh"]},
         "then": {"$ref": "#/$defs/CtPlan"},
-        "else": {"$ref": "#/$defs/Plan"},
-        "$defs": definitions | {"Plan": scan, "CtPlan": surface},
+        "else": {
+            "if": {"required": ["surface"]},
+            "then": {"$ref": "#/$defs/SurfacePlan"},
+            "else": {"$ref": "#/$defs/Plan"},
+        },
+        "$defs": definitions | {"Plan": scan, "CtPlan": stack, "SurfacePlan": surface},
     }
 
 

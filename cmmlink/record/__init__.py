@@ -34,8 +34,9 @@ if TYPE_CHECKING:
         recorded_result,
         recorded_run,
     )
+    from cmmlink.record.recorded_inputs import is_of_surface, recorded_plan, recorded_surface_plan
     from cmmlink.record.recorder import QUEUE_BYTES, Recorder, RecordReference
-    from cmmlink.record.replay import Replay, keep_judgement, recorded_plan, recorded_profile, replay_run
+    from cmmlink.record.replay import Replay, keep_judgement, recorded_profile, replay_run
     from cmmlink.record.run_inputs import RunInputs, software
     from cmmlink.record.seal import KEY_FILE, PUBLIC_FILE, Seal, seal_of
     from cmmlink.record.search import RunSearch, VerdictSought
@@ -80,8 +81,9 @@ else:
             "recorded_result",
             "recorded_run",
         ),
+        "cmmlink.record.recorded_inputs": ("is_of_surface", "recorded_plan", "recorded_surface_plan"),
         "cmmlink.record.recorder": ("QUEUE_BYTES", "Recorder", "RecordReference"),
-        "cmmlink.record.replay": ("Replay", "keep_judgement", "recorded_plan", "recorded_profile", "replay_run"),
+        "cmmlink.record.replay": ("Replay", "keep_judgement", "recorded_profile", "replay_run"),
         "cmmlink.record.run_inputs": ("RunInputs", "software"),
         "cmmlink.record.seal": ("KEY_FILE", "PUBLIC_FILE", "Seal", "seal_of"),
         "cmmlink.record.search": ("RunSearch", "VerdictSought"),
@@ -138,6 +140,7 @@ __all__ = [
     "has_records",
     "heads_in",
     "is_evidence",
+    "is_of_surface",
     "keep_answer",
     "keep_judgement",
     "key_id_of",
@@ -158,6 +161,7 @@ __all__ = [
     "recorded_profile",
     "recorded_result",
     "recorded_run",
+    "recorded_surface_plan",
     "replay_run",
     "restore",
     "rotate_key",

@@ -17,6 +17,7 @@ from cmmlink.plan.reference import groups_of
 from cmmlink.plan.scan import Plan
 from cmmlink.plan.schema import schema_of_plans
 from cmmlink.plan.surface import CtPlan
+from cmmlink.plan.whole_surface import SurfacePlan
 from cmmlink.plan.yaml_model import models_in
 
 SCHEMA = schema_of_plans()
@@ -27,7 +28,7 @@ DOCS = Path(__file__).resolve().parents[3] / "docs"
 
 def all_models() -> set[type[BaseModel]]:
     found: set[type[BaseModel]] = set()
-    waiting: list[type[BaseModel]] = [Plan, CtPlan]
+    waiting: list[type[BaseModel]] = [Plan, CtPlan, SurfacePlan]
     while waiting:
         model = waiting.pop()
         if model not in found:
@@ -44,7 +45,7 @@ def test_every_key_has_an_example(model: type[BaseModel]) -> None:
 
 def test_every_key_is_found_by_its_name_with_its_meaning_and_an_example() -> None:
     keys = all_keys()
-    described = {key.name for model in (Plan, CtPlan) for group in groups_of(model) for key in group.keys}
+    described = {key.name for model in (Plan, CtPlan, SurfacePlan) for group in groups_of(model) for key in group.keys}
     assert described == {key.name.rpartition(".")[2] for key in keys}
     for key in keys:
         assert key in keys_named(key.name)

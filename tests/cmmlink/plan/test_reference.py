@@ -6,6 +6,7 @@ from pydantic import BaseModel, Field
 from cmmlink.plan.reference import REQUIRED, Key, groups_of, table
 from cmmlink.plan.scan import Plan
 from cmmlink.plan.surface import CtPlan
+from cmmlink.plan.whole_surface import SurfacePlan
 from drivers.codecs.register_map import RegisterMap
 
 
@@ -61,13 +62,13 @@ def test_every_type_of_characteristic_has_its_group() -> None:
     assert keys_of(Plan)[": characteristics"].takes == "a list of mappings, see `characteristics[]` of each type"
 
 
-@pytest.mark.parametrize("model", [Plan, CtPlan, RegisterMap])
+@pytest.mark.parametrize("model", [Plan, CtPlan, SurfacePlan, RegisterMap])
 def test_every_key_and_every_mapping_is_explained(model: type[BaseModel]) -> None:
     assert [path for path, key in keys_of(model).items() if not key.meaning] == []
     assert [group.path for group in groups_of(model) if not group.meaning or group.meaning.startswith("Usage docs")] == []
 
 
-@pytest.mark.parametrize("model", [Plan, CtPlan, RegisterMap])
+@pytest.mark.parametrize("model", [Plan, CtPlan, SurfacePlan, RegisterMap])
 def test_no_key_takes_something_unsaid(model: type[BaseModel]) -> None:
     assert [path for path, key in keys_of(model).items() if "any value" in key.takes] == []
 
