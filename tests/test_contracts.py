@@ -23,6 +23,7 @@ import inspection
 from cmmlink.plan.own_maps import map_of
 from cmmlink.plan.scan import load_plan
 from cmmlink.plan.surface import load_ct_plan
+from cmmlink.plan.whole_surface import load_surface_plan
 from tests.cmmlink.command import cmmlink as cmmlink_command
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -250,6 +250,8 @@ registration:
   reject_outliers: false
   gross_mm: 2
 gap_max_mm: 3
+edge_allowance_mm: 0.05
+allow: {unseen_mm: 1}
 """
 
 _SURFACE_IN_INCHES = """

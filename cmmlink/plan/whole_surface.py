@@ -85,8 +85,8 @@ class SurfacePlacing(Settings):
     locked: tuple[FreedomName, ...] = Field(
         default=(), description="shifts and turns in the coordinates of the nominal that stay as start has them, like [z, rx]"
     )
-    coverage_min: float | None = Field(
-        default=None, ge=0, le=1, description="the share of the nominal's area that must be measured before conform is proven; null: 0.95"
+    coverage_min: float = Field(
+        default=0.95, ge=0, le=1, description="the share of the nominal's area that must be measured before conform is proven"
     )
     reject_outliers: bool = Field(
         default=False, description="find gross outliers, fit without them and report them as rejected; conform is then not proven"
@@ -113,6 +113,16 @@ class SurfacePlacing(Settings):
         return reject
 
 
+class SurfaceAllow(Settings):
+    """What may be missing although conformity is to be proven."""
+
+    unseen_mm: float | None = Field(
+        default=None,
+        ge=0,
+        description="the width of the widest place that may be unseen where points were lost, damaged or rejected; null: none may be",
+    )
+
+
 class SurfacePlan(Spelled):
     """One inspection of a whole surface: what, against what, with what, and where the results go."""
 
@@ -126,8 +136,13 @@ class SurfacePlan(Spelled):
     probe: Probe = Field(default=Probe(), description="the tip of the probe")
     registration: SurfacePlacing = Field(default=SurfacePlacing(), description="how the scan comes onto the nominal")
     gap_max_mm: Positive | None = Field(
-        default=None, description="the widest place without a point that counts as measured; null: as the size of the nominal gives it"
+        default=None,
+        description="the diameter of the widest place without a point that counts as measured; null: a fiftieth of the nominal's size",
     )
+    edge_allowance_mm: Annotated[float, Field(ge=0)] | None = Field(
+        default=None, description="how far points may lie beyond the border of an open surface; null: half the width of the zone"
+    )
+    allow: SurfaceAllow = Field(default=SurfaceAllow(), description="what may be missing although conformity is to be proven")
     buffer_points: int = Field(default=CAPACITY_POINTS, ge=1, description="how many points may wait between the device and the inspection")
     out: ResultsOrFolder = Field(default=Results(), description=OUT)
     report: ReportSettings = Field(default=ReportSettings(), description=REPORT)
