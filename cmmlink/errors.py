@@ -6,6 +6,8 @@ StoreError    the record of a run could not be kept or read
   StationBusyError another process records at this station just now
 RunError      no such run is recorded
 AnswerError   the machine that asked for a verdict cannot be told it
+PlantError    the results database of a plant cannot be used
+  PlantAwayError   it cannot be reached just now
 
 A message says what, where (file, line, key), what was found and what is allowed.
 """
@@ -33,3 +35,11 @@ class RunError(ValueError):
 
 class AnswerError(Exception):
     """The machine that asked for a verdict cannot be told it."""
+
+
+class PlantError(Exception):
+    """The results database of a plant cannot be used."""
+
+
+class PlantAwayError(PlantError):
+    """The results database of a plant cannot be reached just now."""

@@ -28,6 +28,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--require-browser", action="store_true", help="fail where the tests in a browser would be skipped")
     group.addoption("--require-open3d", action="store_true", help="fail where the tests with Open3D would be skipped")
     group.addoption("--require-cad", action="store_true", help="fail where the tests with Open CASCADE would be skipped")
+    group.addoption("--require-postgresql", action="store_true", help="fail where the tests with a PostgreSQL server would be skipped")
     group.addoption("--screenshots", metavar="DIR", help="keep pictures of the console's pages in this folder")
     parser.getgroup("quick").addoption("--first-case", action="store_true", help="run the first case only of tests that have several")
 

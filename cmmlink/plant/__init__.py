@@ -1,21 +1,47 @@
-"""What a plant learns from many runs: control charts, capability of a process and studies of gauges. This is the front door."""
+"""What a plant learns from many runs: its results database, control charts, capability of a process and studies of gauges.
+
+This is the front door.
+"""
 
 TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer to load than all of this
 
 if TYPE_CHECKING:
     from cmmlink.plant.capability_indices import Capability, CapabilityIndex, capability
     from cmmlink.plant.control_charts import ControlChart, ControlCharts, individuals_charts, mean_range_charts
+    from cmmlink.plant.database_address import address_of, is_server, without_password, words_of
     from cmmlink.plant.drift import Drift, DriftingStretch, drift_of
     from cmmlink.plant.gauge_studies import CrossedStudy, StationStudy, TypeOneStudy, crossed_study, station_study, type_one_study
+    from cmmlink.plant.profile_strip import STRIP_PARTS, ProfileStrip, strip_of
+    from cmmlink.plant.result_rows import PartCharacteristic, ProfileStrips, ResultSeries, RunFound, StoredEvent, StoredRun, StoredValue
+    from cmmlink.plant.results_database import ResultsDatabase, month_of
     from cmmlink.plant.trend import FORM_TYPES, Trend, alarm_words, new_violations, trend_of
     from cmmlink.plant.western_electric import ControlLimits, RuleViolation
 else:
     from cmmlink.front_door import load_on_use
 
     _PLACES = {
-        "cmmlink.plant.capability_indices": ("Capability", "CapabilityIndex", "capability"),
-        "cmmlink.plant.control_charts": ("ControlChart", "ControlCharts", "individuals_charts", "mean_range_charts"),
-        "cmmlink.plant.drift": ("Drift", "DriftingStretch", "drift_of"),
+        "cmmlink.plant.capability_indices": (
+            "Capability",
+            "CapabilityIndex",
+            "capability",
+        ),
+        "cmmlink.plant.control_charts": (
+            "ControlChart",
+            "ControlCharts",
+            "individuals_charts",
+            "mean_range_charts",
+        ),
+        "cmmlink.plant.database_address": (
+            "address_of",
+            "is_server",
+            "without_password",
+            "words_of",
+        ),
+        "cmmlink.plant.drift": (
+            "Drift",
+            "DriftingStretch",
+            "drift_of",
+        ),
         "cmmlink.plant.gauge_studies": (
             "CrossedStudy",
             "StationStudy",
@@ -24,8 +50,35 @@ else:
             "station_study",
             "type_one_study",
         ),
-        "cmmlink.plant.trend": ("FORM_TYPES", "Trend", "alarm_words", "new_violations", "trend_of"),
-        "cmmlink.plant.western_electric": ("ControlLimits", "RuleViolation"),
+        "cmmlink.plant.profile_strip": (
+            "STRIP_PARTS",
+            "ProfileStrip",
+            "strip_of",
+        ),
+        "cmmlink.plant.result_rows": (
+            "PartCharacteristic",
+            "ProfileStrips",
+            "ResultSeries",
+            "RunFound",
+            "StoredEvent",
+            "StoredRun",
+            "StoredValue",
+        ),
+        "cmmlink.plant.results_database": (
+            "ResultsDatabase",
+            "month_of",
+        ),
+        "cmmlink.plant.trend": (
+            "FORM_TYPES",
+            "Trend",
+            "alarm_words",
+            "new_violations",
+            "trend_of",
+        ),
+        "cmmlink.plant.western_electric": (
+            "ControlLimits",
+            "RuleViolation",
+        ),
     }
 
     __getattr__ = load_on_use(__name__, _PLACES)
@@ -33,6 +86,7 @@ else:
 
 __all__ = [
     "FORM_TYPES",
+    "STRIP_PARTS",
     "Capability",
     "CapabilityIndex",
     "ControlChart",
@@ -41,18 +95,33 @@ __all__ = [
     "CrossedStudy",
     "Drift",
     "DriftingStretch",
+    "PartCharacteristic",
+    "ProfileStrip",
+    "ProfileStrips",
+    "ResultSeries",
+    "ResultsDatabase",
     "RuleViolation",
+    "RunFound",
     "StationStudy",
+    "StoredEvent",
+    "StoredRun",
+    "StoredValue",
     "Trend",
     "TypeOneStudy",
+    "address_of",
     "alarm_words",
     "capability",
     "crossed_study",
     "drift_of",
     "individuals_charts",
+    "is_server",
     "mean_range_charts",
+    "month_of",
     "new_violations",
     "station_study",
+    "strip_of",
     "trend_of",
     "type_one_study",
+    "without_password",
+    "words_of",
 ]
