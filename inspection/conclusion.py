@@ -34,6 +34,8 @@ ReasonKind = Literal[
     "unseen",
     "no-value",
     "datum",
+    "nominal",
+    "pose",
 ]
 
 
@@ -125,7 +127,9 @@ def conclude(found: Findings, missing: Missing, limits: Limits, complete: bool) 
     if missing.begun > 1:
         reasons.append(Reason("begun-anew", f"The device began anew: points of {missing.begun} scans were judged together."))
     if limits.allow_unseen_mm is None or found.gap.length_mm > limits.allow_unseen_mm:
-        reasons += _missing_points(found, missing, limits.allow_unseen_mm)
+        allowed = "none" if limits.allow_unseen_mm is None else f"{limits.allow_unseen_mm:g} mm"
+        unseen = f"up to {found.gap.length_mm:.4g} mm of the profile are unseen, {allowed} allowed"
+        reasons += reasons_of_missing(found.rejected, missing, unseen)
     reasons += _unmeasured(found, limits)
     if not found.converged:
         reasons.append(Reason("fit", "The fit did not settle: the pose is not the best one."))
@@ -148,23 +152,24 @@ def word_points(zone: ToleranceZone, beyond: int, within_uncertainty: int) -> Re
     if beyond:
         limit = f"beyond the limits {zone.lower_mm:g} .. {zone.upper_mm:g} mm"
         by = f" by more than U = {zone.uncertainty_mm:g} mm" if zone.guard_mm else ""
-        return Reason("out-of-tolerance", f"{_count(beyond, 'point')} {_verb(beyond, 'lies', 'lie')} {limit}{by}.")
+        return Reason("out-of-tolerance", f"{of_many(beyond, 'point')} {verb_of(beyond, 'lies', 'lie')} {limit}{by}.")
     if within_uncertainty:
-        lies = _verb(within_uncertainty, "lies", "lie")
+        lies = verb_of(within_uncertainty, "lies", "lie")
         return Reason(
             "within-uncertainty",
-            f"{_count(within_uncertainty, 'point')} {lies} nearer to a limit than U = {zone.uncertainty_mm:g} mm: neither side is proven.",
+            f"{of_many(within_uncertainty, 'point')} {lies} nearer to a limit than U = {zone.uncertainty_mm:g} mm: neither side is proven.",
         )
     return None
 
 
-def _missing_points(found: Findings, missing: Missing, allowed_mm: float | None) -> list[Reason]:
-    """Points that are known to be missing; they may hide a defect."""
-    unseen = (
-        f"up to {found.gap.length_mm:.4g} mm of the profile are unseen, {'none' if allowed_mm is None else f'{allowed_mm:g} mm'} allowed"
-    )
+def reasons_of_missing(rejected_here: Mapping[str, int], missing: Missing, unseen: str) -> list[Reason]:
+    """Points that are known to be missing; they may hide a defect.
+
+    rejected_here : points that the inspection itself rejected, by reason
+    unseen        : how much is unseen and how much may be, as the end of a sentence
+    """
     reasons = []
-    lost = [_count(missing.lost, "point") + _verb(missing.lost, " was lost", " were lost")] if missing.lost > 0 else []
+    lost = [of_many(missing.lost, "point") + verb_of(missing.lost, " was lost", " were lost")] if missing.lost > 0 else []
     if missing.damaged_bytes:
         lost.append(f"{missing.damaged_bytes} bytes were damaged")
     if lost:
@@ -172,7 +177,7 @@ def _missing_points(found: Findings, missing: Missing, allowed_mm: float | None)
     short = 0 if missing.announced is None else missing.announced - missing.arrived - max(missing.lost, 0)
     if missing.announced is not None and short > 0:
         reasons.append(Reason("announced", f"The device announced {missing.announced} points and {missing.arrived} arrived: {unseen}."))
-    rejected = {**missing.rejected, **found.rejected}
+    rejected = {**missing.rejected, **rejected_here}
     if rejected:
         which = ", ".join(f"{number} {reason}" for reason, number in rejected.items())
         reasons.append(Reason("rejected", f"Points were rejected ({which}): {unseen}."))
@@ -187,7 +192,7 @@ def _unmeasured(found: Findings, limits: Limits) -> list[Reason]:
         reasons.append(
             Reason(
                 "ends",
-                f"{_count(number, 'point')} beyond an end of the open profile {_verb(number, 'lies', 'lie')} up to "
+                f"{of_many(number, 'point')} beyond an end of the open profile {verb_of(number, 'lies', 'lie')} up to "
                 f"{found.beyond_end_mm:.4g} mm off it; {limits.end_allowance_mm:.4g} mm are allowed.",
             )
         )
@@ -207,9 +212,11 @@ def _unmeasured(found: Findings, limits: Limits) -> list[Reason]:
     return reasons
 
 
-def _count(number: int, noun: str) -> str:
+def of_many(number: int, noun: str) -> str:
+    """A number with its noun: 1 point, 2 points."""
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
-def _verb(number: int, one: str, many: str) -> str:
+def verb_of(number: int, one: str, many: str) -> str:
+    """The verb that goes with a number."""
     return one if number == 1 else many

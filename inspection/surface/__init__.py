@@ -8,10 +8,14 @@ TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer 
 if TYPE_CHECKING:
     from inspection.surface.cloud_surface import CloudSurface
     from inspection.surface.feet import FootKind, NominalSurface, SurfaceFeet, rejections
+    from inspection.surface.judged_surface import judge_surface
+    from inspection.surface.live_surface import LiveSurface, SurfaceUpdate
     from inspection.surface.patches import PatchSurface
     from inspection.surface.rigid_motion import RigidMotion
     from inspection.surface.spline_face import SplineFace
     from inspection.surface.surface_fit import SurfaceFreedom, SurfaceRegistration, register_surface
+    from inspection.surface.surface_result import Defect, SurfaceResult, Unmeasured
+    from inspection.surface.surface_terms import SurfaceTerms
     from inspection.surface.triangles import TriangleSurface
     from inspection.surface.weakness import Weakness
 else:
@@ -20,8 +24,12 @@ else:
     _PLACES = {
         "inspection.surface.cloud_surface": ("CloudSurface",),
         "inspection.surface.feet": ("FootKind", "NominalSurface", "SurfaceFeet", "rejections"),
+        "inspection.surface.judged_surface": ("judge_surface",),
+        "inspection.surface.live_surface": ("LiveSurface", "SurfaceUpdate"),
         "inspection.surface.patches": ("PatchSurface",),
         "inspection.surface.surface_fit": ("SurfaceFreedom", "SurfaceRegistration", "register_surface"),
+        "inspection.surface.surface_result": ("Defect", "SurfaceResult", "Unmeasured"),
+        "inspection.surface.surface_terms": ("SurfaceTerms",),
         "inspection.surface.rigid_motion": ("RigidMotion",),
         "inspection.surface.spline_face": ("SplineFace",),
         "inspection.surface.triangles": ("TriangleSurface",),
@@ -33,7 +41,9 @@ else:
 
 __all__ = [
     "CloudSurface",
+    "Defect",
     "FootKind",
+    "LiveSurface",
     "NominalSurface",
     "PatchSurface",
     "RigidMotion",
@@ -41,8 +51,13 @@ __all__ = [
     "SurfaceFeet",
     "SurfaceFreedom",
     "SurfaceRegistration",
+    "SurfaceResult",
+    "SurfaceTerms",
+    "SurfaceUpdate",
     "TriangleSurface",
+    "Unmeasured",
     "Weakness",
+    "judge_surface",
     "register_surface",
     "rejections",
 ]

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 _ORTHOGONAL = 1e-9
+_TURN_GRID, _SHIFT_GRID = 2.0**44, 2.0**30  # a turn about 100 mm and a shift of 1e-9 mm are worth the same
 _TINY_RAD = 1e-8  # below it the sine of an angle is the angle
 
 
@@ -61,6 +62,11 @@ class RigidMotion:
         """The motion that makes `first` and then this one."""
         u, _, v = np.linalg.svd(self.rotation @ first.rotation)  # the nearest rotation: round-off must not add up
         return RigidMotion(u @ v, self.rotation @ first.translation_mm + self.translation_mm)
+
+    def snap_to_grid(self) -> "RigidMotion":
+        """The motion on a grid of 2**-44 and 2**-30 mm: without the last bits, in which processors and their libraries differ."""
+        turn, shift = np.round(self.rotation * _TURN_GRID) / _TURN_GRID, np.round(self.translation_mm * _SHIFT_GRID) / _SHIFT_GRID
+        return RigidMotion(turn, shift)
 
     @property
     def angle_rad(self) -> float:

@@ -48,6 +48,8 @@ class SurfaceRegistration:
     outlier           : (m,) points left out as outliers, by six median deviations; none unless that was asked for
     weakest           : the direction that the points determine least; directions that they do not determine at all were held
     rivals            : other poses that fit as well, as in a symmetric part: how many
+    rival_poses       : these poses, refined in the same way
+    centre_mm         : the middle of the points that took part, on the nominal, about which the weakest direction turns
     """
 
     nominal_from_scan: RigidMotion
@@ -57,7 +59,17 @@ class SurfaceRegistration:
     used: Truth
     outlier: Truth
     weakest: Weakness
+    centre_mm: Array
     rivals: int = 0
+    rival_poses: tuple[RigidMotion, ...] = ()
+
+    def slid_poses(self) -> tuple[RigidMotion, ...]:
+        """The poses as far off both ways along the weakest direction as the part may lie (95 %); none where the points do not fix it."""
+        weakest, far = self.weakest, self.weakest.shift_95_mm
+        if not 0 < far < np.inf:
+            return ()
+        ways = (RigidMotion.about(self.centre_mm, sign * far * weakest.turn_rad, sign * far * weakest.shift) for sign in (1, -1))
+        return tuple(way.after(self.nominal_from_scan).snap_to_grid() for way in ways)
 
 
 def register_surface(
@@ -67,6 +79,7 @@ def register_surface(
     locked: Sequence[SurfaceFreedom] = (),
     target_mm: float = 0.0,
     gross_mm: float | None = None,
+    farthest_mm: float = np.inf,
 ) -> SurfaceRegistration:
     """Bring points (m, 3) onto a nominal.
 
@@ -75,6 +88,7 @@ def register_surface(
     locked    : shifts and turns, in the coordinates of the nominal, that stay as they are in `start`
     target_mm : the deviation that points are brought to, the middle of the zone
     gross_mm  : leave out what deviates more than six times the median and more than this; None leaves nothing out
+    farthest_mm : leave out in any case what lies farther off the surface
 
     Raises RegistrationError where the pose is not found, or too few points lie on the surface.
     """
@@ -88,16 +102,20 @@ def register_surface(
     order = order[np.isfinite(points[order]).all(axis=1)]
     if len(order) < _FEWEST:
         raise RegistrationError(f"{len(order)} points are too few to find a pose: at least {_FEWEST} are needed")
-    given = points[order]
+    is_new = np.append(True, (np.diff(points[order], axis=0) != 0).any(axis=1))  # a point that came twice counts once
+    given = points[order[is_new]]
     weights = _weights(given, _CELL * nominal.size_mm)
-    rivals = 0
+    others: list[RigidMotion] = []
     if start is None:
-        start, rivals = _seek(given, weights, nominal, target_mm)
+        start, others = _seek(given, weights, nominal, target_mm)
     free = np.array([name not in locked for name in _FREEDOMS])
-    found = _fit(given, weights, nominal, start, free, target_mm, gross_mm)
+    limits = gross_mm, farthest_mm
+    found = _fit(given, weights, nominal, start, free, target_mm, limits)
+    rivals = tuple(_fit(given, weights, nominal, other, free, target_mm, limits).nominal_from_scan for other in others)
     used, outlier = (np.zeros(len(points), dtype=bool) for _ in range(2))
-    used[order], outlier[order] = found.used, found.outlier
-    return replace(found, used=used, outlier=outlier, rivals=rivals)
+    same = np.cumsum(is_new) - 1
+    used[order], outlier[order] = found.used[same], found.outlier[same]
+    return replace(found, used=used, outlier=outlier, rivals=len(rivals), rival_poses=rivals)
 
 
 def _weights(points: Array, cell_mm: float) -> Array:
@@ -109,20 +127,27 @@ def _weights(points: Array, cell_mm: float) -> Array:
 
 
 def _fit(
-    points: Array, weights: Array, nominal: NominalSurface, start: RigidMotion, free: Truth, target_mm: float, gross_mm: float | None
+    points: Array,
+    weights: Array,
+    nominal: NominalSurface,
+    start: RigidMotion,
+    free: Truth,
+    target_mm: float,
+    limits: tuple[float | None, float],
 ) -> SurfaceRegistration:
-    """The pose of least squares from a start; where asked, outliers are left out until they stay the same."""
+    """The pose of least squares from a start; what lies too far off, by the limits, is left out until that stays the same."""
     outlier = np.zeros(len(points), dtype=bool)
     found = _settle(points, weights, nominal, start, free, target_mm, outlier)
-    if gross_mm is None:
+    gross_mm, farthest_mm = limits
+    if gross_mm is None and farthest_mm == np.inf:
         return found
     for _ in range(_ROUNDS):
         feet = nominal.project(found.nominal_from_scan.apply(points))
         inside = feet.kind < FootKind.BORDER
-        middle = _median(feet.distance_mm[inside], weights[inside])
-        off = np.abs(feet.distance_mm - middle)
-        limit = max(gross_mm, _MADS * _median(off[inside], weights[inside]))
-        now = inside & (off > limit)
+        now = inside & (np.abs(feet.distance_mm) > farthest_mm)
+        if gross_mm is not None:
+            off = np.abs(feet.distance_mm - _median(feet.distance_mm[inside], weights[inside]))
+            now |= inside & (off > max(gross_mm, _MADS * _median(off[inside], weights[inside])))
         if (now == outlier).all():
             break
         outlier = now
@@ -157,8 +182,10 @@ def _settle(
             damping = max(10 * damping, 1e-3)
             continue
         motion, state, damping = following, there, damping / 10 if damping > 1e-6 else 0.0
-    weakest = weakness_of(state.rows, state.weights, state.arms, free, float(np.sqrt(state.mean_square)))
-    return SurfaceRegistration(motion, float(np.sqrt(state.mean_square)), steps, converged, state.used, outlier, weakest)
+    places, normals = nominal.sample(_PLACES)
+    whole = np.column_stack([normals, np.cross(places - state.centre, normals)])
+    weakest = weakness_of(state.rows, state.weights, state.arms, free, float(np.sqrt(state.mean_square)), whole)
+    return SurfaceRegistration(motion, float(np.sqrt(state.mean_square)), steps, converged, state.used, outlier, weakest, state.centre)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -208,8 +235,11 @@ def _step(state: _State, free: Truth, damping: float) -> Array:
     return np.asarray(change * scale)
 
 
-def _seek(points: Array, weights: Array, nominal: NominalSurface, target_mm: float) -> tuple[RigidMotion, int]:
-    """The start for a scan of the whole part: principal axes on principal axes in all ways, each refined, the least rms wins."""
+def _seek(points: Array, weights: Array, nominal: NominalSurface, target_mm: float) -> tuple[RigidMotion, list[RigidMotion]]:
+    """The start for a scan of the whole part, and others that fit as well.
+
+    Principal axes are laid on principal axes in all ways, each is refined, the least rms wins.
+    """
     places, _ = nominal.sample(_PLACES)
     to_middle, to_axes = _axes(places, np.ones(len(places)))
     from_middle, from_axes = _axes(points, weights)
@@ -233,7 +263,7 @@ def _seek(points: Array, weights: Array, nominal: NominalSurface, target_mm: flo
         far = all(np.abs(motion.apply(corners) - known.apply(corners)).max() > _OTHER_POSE * nominal.size_mm for known in [best, *others])
         if rms <= _RIVAL * least + 1e-9 * nominal.size_mm and far:
             others.append(motion)
-    return best, len(others)
+    return best, others
 
 
 def _axes(points: Array, weights: Array) -> tuple[Array, Array]:

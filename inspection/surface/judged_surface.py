@@ -1,0 +1,265 @@
+"""All points of a scan judged together: registered, every one judged at that pose, and the verdict on the part.
+
+The points are taken in an order of their own, by their coordinates, so that no bit of the result depends on the order in which they
+came; its rows stand in the order of arrival.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from inspection.conclusion import Missing, Reason, word_points
+from inspection.errors import NotMeasured
+from inspection.surface.covered_area import measure_area
+from inspection.surface.defect_regions import find_defects
+from inspection.surface.feet import NominalSurface, SurfaceFeet, points_in_space, rejections
+from inspection.surface.nominal_places import nearest_of, spread_places
+from inspection.surface.rigid_motion import RigidMotion
+from inspection.surface.surface_fit import SurfaceRegistration, register_surface
+from inspection.surface.surface_result import SurfaceResult
+from inspection.surface.surface_terms import SurfaceTerms
+from inspection.surface.surface_verdict import SurfaceFindings, conclude_surface
+from inspection.tolerance import ToleranceZone
+from inspection.verdict import NOT_JUDGED, Rejection, Verdict
+
+Array = NDArray[np.float64]
+Codes = NDArray[np.int8]
+Index = NDArray[np.int64]
+
+_PLACED = 0.95  # share of the area whose points place the part, where no coverage is asked for
+_FAR_OFF = 0.5  # share of the points off the surface beyond which the set-up is wrong
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JudgedPoints:
+    """Points at a pose: where they lie on the nominal, their verdicts (m,), NOT_JUDGED for rejected ones, and why (m,) they were."""
+
+    feet: SurfaceFeet
+    verdicts: Codes
+    rejection: Codes
+
+    def count_of(self, verdict: Verdict) -> int:
+        """Points that have this verdict."""
+        return int(np.count_nonzero(self.verdicts == verdict))
+
+
+def judge_points(
+    points_mm: Array, normals: Array | None, nominal: NominalSurface, pose: RigidMotion, zone: ToleranceZone, farthest_mm: float
+) -> JudgedPoints:
+    """Points (m, 3) as they are at a pose; a point's result depends on nothing but itself.
+
+    normals : (m, 3) outward directions of the measured surface, or None
+    zone    : with the error of the nominal in its U
+    """
+    feet = nominal.project(pose.apply(points_mm))
+    rejection = rejections(feet, farthest_mm, None if normals is None else pose.turn(normals))
+    verdicts = np.where(rejection == Rejection.NONE, zone.verdicts(feet.distance_mm), np.int8(NOT_JUDGED)).astype(np.int8)
+    return JudgedPoints(feet, verdicts, rejection)
+
+
+def judge_surface(
+    points_mm: ArrayLike,
+    nominal: NominalSurface,
+    terms: SurfaceTerms,
+    normals: ArrayLike | None = None,
+    complete: bool = True,
+    missing: Missing | None = None,
+) -> SurfaceResult:
+    """Register all points (m, 3) of a scan together, judge every one at that pose, and conclude.
+
+    normals  : (m, 3) outward directions of the measured surface, of any length, where the scanner gives them; zero or NaN where not
+    complete : the scan came to its end; conformity of one that was cut short is not proven
+    missing  : points that are known to be missing before they came here; None for none
+
+    Raises RegistrationError when the points cannot be brought onto the nominal, NotMeasured when the set-up contradicts them.
+    """
+    points, directions = points_in_space(points_mm), directions_of(normals, points_mm)
+    order = np.lexsort(np.column_stack([points, *([] if directions is None else [directions])]).T[::-1])
+    scan = _Scan(points[order], None if directions is None else directions[order], nominal, terms, complete, missing or Missing())
+    return _in_order_of_arrival(scan.settle(), np.asarray(points_mm, dtype=np.float64), order)
+
+
+def directions_of(normals: ArrayLike | None, points_mm: ArrayLike) -> Array | None:
+    """Normals as a float array of the shape of the points, or None."""
+    if normals is None:
+        return None
+    directions = np.asarray(normals, dtype=np.float64)
+    if directions.shape != np.shape(points_mm):
+        raise ValueError(f"normals must have the shape of the points, {np.shape(points_mm)}, got {directions.shape}")
+    return directions
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Scan:
+    """Points (m, 3) in the order of their coordinates with their normals, and what they are judged by."""
+
+    points: Array
+    normals: Array | None
+    nominal: NominalSurface
+    terms: SurfaceTerms
+    complete: bool
+    missing: Missing
+
+    @property
+    def zone(self) -> ToleranceZone:
+        return self.terms.zone_on(self.nominal)
+
+    def at(self, pose: RigidMotion) -> JudgedPoints:
+        """All points judged at a pose."""
+        return judge_points(self.points, self.normals, self.nominal, pose, self.zone, self.terms.farthest_on(self.nominal))
+
+    def settle(self) -> SurfaceResult:
+        """The result, its rows in the order of the points here."""
+        pose, registration = self.terms.known_pose, None
+        if pose is None:
+            registration = self._fit()
+            pose = registration.nominal_from_scan
+        found = self.at(pose)
+        if registration is not None and registration.outlier.any():
+            found = _without_outliers(found, registration.outlier)
+        self._refuse_far(found)
+        return self._conclude(found, pose, registration)
+
+    def _fit(self) -> SurfaceRegistration:
+        """The best fit about the middle of the zone, snapped to the grid of poses."""
+        terms = self.terms
+        gross = terms.width_mm / 2 if terms.reject_outliers else None
+        farthest = terms.farthest_on(self.nominal)
+        found = register_surface(self.points, self.nominal, terms.start, terms.locked, terms.zone.middle_mm, gross, farthest)
+        return replace(found, nominal_from_scan=found.nominal_from_scan.snap_to_grid())
+
+    def _refuse_far(self, found: JudgedPoints) -> None:
+        """Raise NotMeasured where most points lie off the surface."""
+        there = np.count_nonzero(found.rejection != Rejection.NOT_FINITE)
+        off = np.count_nonzero(found.rejection == Rejection.OFF_SURFACE)
+        if off > _FAR_OFF * there:
+            away = self.terms.farthest_on(self.nominal)
+            raise NotMeasured(
+                f"{off} of {there} points lie more than {away:.4g} mm off the surface: is it the right part, the right unit, and do the "
+                "points lie in the coordinates of the nominal? Else let the pose be fitted, or give a start nearer to it"
+            )
+
+    def _conclude(self, found: JudgedPoints, pose: RigidMotion, registration: SurfaceRegistration | None) -> SurfaceResult:
+        """What the judged points say about the surface, and the verdict on the part."""
+        nominal, terms, zone, feet = self.nominal, self.terms, self.zone, found.feet
+        limits = terms.limits_on(nominal)
+        judged = np.flatnonzero(found.verdicts != NOT_JUDGED)
+        places = spread_places(nominal, limits.gap_max_mm)
+        distance, nearest = nearest_of(places, feet.foot_mm[judged], feet.normal[judged])
+        covered = measure_area(places, distance, limits.gap_max_mm)
+        is_out = found.verdicts[judged] == Verdict.NONCONFORM
+        regions = find_defects(places, feet, judged, is_out, nearest, covered.measured, zone.middle_mm)
+        points = max((verdict for verdict in Verdict if found.count_of(verdict)), default=Verdict.UNCERTAIN)
+        why = word_points(zone, found.count_of(Verdict.NONCONFORM), found.count_of(Verdict.UNCERTAIN))
+        if points is Verdict.NONCONFORM and registration is not None:
+            points, why = self._doubt_free_pose(why, registration, found, covered.coverage)
+        by_reason = _by_reason(found.rejection)
+        beyond = np.abs(feet.distance_mm[found.rejection == Rejection.BEYOND_EDGE])
+        findings = SurfaceFindings(
+            points=points,
+            why=why,
+            judged=len(judged),
+            rejected={reason: count for reason, count in by_reason.items() if reason != Rejection.BEYOND_EDGE.words},
+            beyond_edge_mm=float(beyond.max(initial=0.0)),
+            beyond_edge_count=int(np.count_nonzero(beyond > limits.end_allowance_mm)),
+            covered=covered,
+            registration=registration,
+        )
+        conclusion = conclude_surface(findings, zone, nominal.nominal_error_mm, self.missing, limits, self.complete)
+        deviation = feet.distance_mm[judged]
+        away = np.abs(deviation - zone.middle_mm)
+        return SurfaceResult(
+            verdict=conclusion.verdict,
+            reasons=conclusion.reasons,
+            notes=self._notes(),
+            points_mm=self.points,
+            feet=feet,
+            verdicts=found.verdicts,
+            rejection=found.rejection,
+            judged=len(judged),
+            out_of_tolerance=int(np.count_nonzero(is_out)),
+            rejected_by_reason=by_reason,
+            worst=int(judged[away.argmax()]) if len(judged) else None,
+            rms_mm=float(np.sqrt((deviation**2).mean())) if len(judged) else float("nan"),
+            max_deviation_mm=float(deviation.max()) if len(judged) else float("nan"),
+            min_deviation_mm=float(deviation.min()) if len(judged) else float("nan"),
+            beyond_edge_mm=findings.beyond_edge_mm,
+            regions=regions,
+            coverage=covered.coverage,
+            area_mm2=nominal.area_mm2,
+            unmeasured=covered.unmeasured,
+            gap_mm=covered.gap_mm,
+            gap_max_mm=limits.gap_max_mm,
+            zone=zone,
+            nominal_error_mm=nominal.nominal_error_mm,
+            registration=registration,
+            nominal_from_scan=pose,
+            rule="datum" if registration is None else "best-fit",
+            fit=terms.fit,
+            complete=self.complete,
+        )
+
+    def _doubt_free_pose(
+        self, why: Reason | None, registration: SurfaceRegistration, found: JudgedPoints, coverage: float
+    ) -> tuple[Verdict, Reason | None]:
+        """Doubt a part that is out at the best fit, where another pose fits as well or too little was measured to fix the pose.
+
+        By the rule "best-fit" a part is out when it is out at every best fit that the points allow, and by more than the pose is still
+        free to move.
+        """
+        for rival in registration.rival_poses:
+            if not self.at(rival.snap_to_grid()).count_of(Verdict.NONCONFORM):
+                words = "The part fits the nominal in another pose as well, and there no point is out: only a datum can tell."
+                return Verdict.UNCERTAIN, Reason("placement", words)
+        enough = self.terms.coverage_min or _PLACED
+        if not self.complete or coverage < enough:
+            words = f"Too little of the surface was measured ({coverage:.1%}) to place the part: in another placement less may be out."
+            return Verdict.UNCERTAIN, Reason("placement", words)
+        out = np.flatnonzero(found.verdicts == Verdict.NONCONFORM)
+        few = replace(self, points=self.points[out], normals=None if self.normals is None else self.normals[out])
+        for slid in registration.slid_poses():
+            if not few.at(slid).count_of(Verdict.NONCONFORM):
+                words = f"The part may lie so far off {registration.weakest.words} that no point is out: only a datum can tell."
+                return Verdict.UNCERTAIN, Reason("placement", words)
+        return Verdict.NONCONFORM, why
+
+    def _notes(self) -> tuple[str, ...]:
+        """What was assumed."""
+        notes, error = list(self.nominal.notes), self.nominal.nominal_error_mm
+        if error:
+            notes.append(f"the nominal may lie {error:.4g} mm off the part that it stands for: that was added to U")
+            if self.terms.zone.rule == "simple":
+                notes.append("by simple acceptance U does not count, but the error of the nominal does")
+        return tuple(notes)
+
+
+def _without_outliers(found: JudgedPoints, outlier: NDArray[np.bool_]) -> JudgedPoints:
+    """The same with the points that the fit left out rejected, unless they are for another reason."""
+    which = outlier & (found.rejection == Rejection.NONE)
+    rejection = np.where(which, np.int8(Rejection.OUTLIER), found.rejection)
+    return JudgedPoints(found.feet, np.where(which, np.int8(NOT_JUDGED), found.verdicts), rejection)
+
+
+def _by_reason(rejection: Codes) -> dict[str, int]:
+    """Number of rejected points for each reason that occurred."""
+    counts = np.bincount(rejection, minlength=max(Rejection) + 1)
+    return {each.words: int(counts[each]) for each in Rejection if each != Rejection.NONE and counts[each]}
+
+
+def _in_order_of_arrival(result: SurfaceResult, points_mm: Array, order: Index) -> SurfaceResult:
+    """A result whose rows were in another order (m,), in that of arrival."""
+    at = np.empty_like(order)
+    at[order] = np.arange(len(order))
+    feet, fit = result.feet, result.registration
+    if fit is not None:
+        fit = replace(fit, used=fit.used[at], outlier=fit.outlier[at])
+    return replace(
+        result,
+        points_mm=points_mm.copy(),
+        feet=SurfaceFeet(feet.foot_mm[at], feet.distance_mm[at], feet.normal[at], feet.face[at], feet.parameter[at], feet.kind[at]),
+        verdicts=result.verdicts[at],
+        rejection=result.rejection[at],
+        worst=None if result.worst is None else int(order[result.worst]),
+        registration=fit,
+    )
