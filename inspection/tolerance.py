@@ -63,12 +63,15 @@ class ToleranceZone:
         """How the uncertainty counts, in words."""
         return decision_words(self.rule, self.uncertainty_mm, self.upper_mm - self.lower_mm)
 
-    def verdicts(self, deviation_mm: ArrayLike) -> NDArray[np.int8]:
-        """Verdict (m,) of each deviation (m,), as the codes of `Verdict`. A limit itself belongs to the zone; NaN is UNCERTAIN."""
-        deviation = np.asarray(deviation_mm, dtype=np.float64)
+    def verdicts(self, deviation_mm: ArrayLike, error_mm: ArrayLike = 0.0) -> NDArray[np.int8]:
+        """Verdict (m,) of each deviation (m,), as the codes of `Verdict`. A limit itself belongs to the zone; NaN is UNCERTAIN.
+
+        error_mm : (m,) what counts beside U, by whatever rule: how far the nominal may lie off what it stands for
+        """
+        deviation, guard = np.asarray(deviation_mm, dtype=np.float64), self.guard_mm + np.asarray(error_mm, dtype=np.float64)
         beyond = np.maximum(self.lower_mm - deviation, deviation - self.upper_mm)  # how far outside the zone, negative inside
-        proven = np.where(beyond <= -self.guard_mm, Verdict.CONFORM, Verdict.UNCERTAIN)
-        return np.where(beyond > self.guard_mm, Verdict.NONCONFORM, proven).astype(np.int8)
+        proven = np.where(beyond <= -guard, Verdict.CONFORM, Verdict.UNCERTAIN)
+        return np.where(beyond > guard, Verdict.NONCONFORM, proven).astype(np.int8)
 
     def verdict(self, deviation_mm: ArrayLike) -> Verdict:
         """Verdict on the profile: that of its worst point, and UNCERTAIN where there is no point."""

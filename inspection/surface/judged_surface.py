@@ -50,11 +50,11 @@ def judge_points(
     """Points (m, 3) as they are at a pose; a point's result depends on nothing but itself.
 
     normals : (m, 3) outward directions of the measured surface, or None
-    zone    : with the error of the nominal in its U
+    zone    : with the U of the measuring device alone; the error of the nominal counts where it is
     """
     feet = nominal.project(pose.apply(points_mm))
     rejection = rejections(feet, farthest_mm, None if normals is None else pose.turn(normals))
-    verdicts = np.where(rejection == Rejection.NONE, zone.verdicts(feet.distance_mm), np.int8(NOT_JUDGED)).astype(np.int8)
+    verdicts = np.where(rejection == Rejection.NONE, zone.verdicts(feet.distance_mm, feet.error_mm), np.int8(NOT_JUDGED)).astype(np.int8)
     return JudgedPoints(feet, verdicts, rejection)
 
 
@@ -101,13 +101,9 @@ class _Scan:
     complete: bool
     missing: Missing
 
-    @property
-    def zone(self) -> ToleranceZone:
-        return self.terms.zone_on(self.nominal)
-
     def at(self, pose: RigidMotion) -> JudgedPoints:
         """All points judged at a pose."""
-        return judge_points(self.points, self.normals, self.nominal, pose, self.zone, self.terms.farthest_on(self.nominal))
+        return judge_points(self.points, self.normals, self.nominal, pose, self.terms.zone, self.terms.farthest_on(self.nominal))
 
     def settle(self) -> SurfaceResult:
         """The result, its rows in the order of the points here."""
@@ -142,7 +138,7 @@ class _Scan:
 
     def _conclude(self, found: JudgedPoints, pose: RigidMotion, registration: SurfaceRegistration | None) -> SurfaceResult:
         """What the judged points say about the surface, and the verdict on the part."""
-        nominal, terms, zone, feet = self.nominal, self.terms, self.zone, found.feet
+        nominal, terms, zone, feet = self.nominal, self.terms, self.terms.zone_on(self.nominal), found.feet
         limits = terms.limits_on(nominal)
         judged = np.flatnonzero(found.verdicts != NOT_JUDGED)
         places = spread_places(nominal, limits.gap_max_mm)
@@ -165,8 +161,9 @@ class _Scan:
             beyond_edge_count=int(np.count_nonzero(beyond > limits.end_allowance_mm)),
             covered=covered,
             registration=registration,
+            nominal_error_mm=_error_that_counts(found, terms.zone),
         )
-        conclusion = conclude_surface(findings, zone, nominal.nominal_error_mm, self.missing, limits, self.complete)
+        conclusion = conclude_surface(findings, terms.zone, self.missing, limits, self.complete)
         deviation = feet.distance_mm[judged]
         away = np.abs(deviation - zone.middle_mm)
         return SurfaceResult(
@@ -241,6 +238,12 @@ def _without_outliers(found: JudgedPoints, outlier: NDArray[np.bool_]) -> Judged
     return JudgedPoints(found.feet, np.where(which, np.int8(NOT_JUDGED), found.verdicts), rejection)
 
 
+def _error_that_counts(found: JudgedPoints, zone: ToleranceZone) -> float:
+    """The largest error of the nominal at a point that is uncertain because of it alone; 0 where there is none."""
+    because = (found.verdicts == Verdict.UNCERTAIN) & (zone.verdicts(found.feet.distance_mm) == Verdict.CONFORM)
+    return float(found.feet.error_mm[because].max(initial=0.0))
+
+
 def _by_reason(rejection: Codes) -> dict[str, int]:
     """Number of rejected points for each reason that occurred."""
     counts = np.bincount(rejection, minlength=max(Rejection) + 1)
@@ -257,7 +260,9 @@ def _in_order_of_arrival(result: SurfaceResult, points_mm: Array, order: Index) 
     return replace(
         result,
         points_mm=points_mm.copy(),
-        feet=SurfaceFeet(feet.foot_mm[at], feet.distance_mm[at], feet.normal[at], feet.face[at], feet.parameter[at], feet.kind[at]),
+        feet=SurfaceFeet(
+            feet.foot_mm[at], feet.distance_mm[at], feet.normal[at], feet.face[at], feet.parameter[at], feet.kind[at], feet.error_mm[at]
+        ),
         verdicts=result.verdicts[at],
         rejection=result.rejection[at],
         worst=None if result.worst is None else int(order[result.worst]),

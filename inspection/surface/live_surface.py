@@ -72,7 +72,7 @@ class LiveSurface:
 
     def __init__(self, nominal: NominalSurface, terms: SurfaceTerms, provisional: bool = True) -> None:
         self._nominal, self._terms, self._provisional = nominal, terms, provisional
-        self._zone, self._farthest_mm = terms.zone_on(nominal), terms.farthest_on(nominal)
+        self._farthest_mm = terms.farthest_on(nominal)
         self._rows: dict[str, NDArray[Any]] = {name: np.empty((0, *shape), dtype) for name, (shape, dtype) in _COLUMNS.items()}
         self._has_normals = False
         self._received = 0
@@ -170,7 +170,7 @@ class LiveSurface:
 
     def _judged_at(self, pose: RigidMotion, rows: slice) -> JudgedPoints:
         normals = self._rows["normals"][rows] if self._has_normals else None
-        return judge_points(self._rows["points"][rows], normals, self._nominal, pose, self._zone, self._farthest_mm)
+        return judge_points(self._rows["points"][rows], normals, self._nominal, pose, self._terms.zone, self._farthest_mm)
 
     def _advance(self) -> bool:
         """Seek the pose, or fit it anew, at a block's end; True when every verdict given so far is replaced."""

@@ -75,7 +75,7 @@ class SurfaceTerms:
         return self.zone.upper_mm - self.zone.lower_mm
 
     def zone_on(self, nominal: NominalSurface) -> ToleranceZone:
-        """The zone with the error of the nominal in its U: that counts like U, even where by its rule U itself does not."""
+        """The zone with the error of the nominal in its U, as results state it: that counts even where by its rule U itself does not."""
         error = nominal.nominal_error_mm
         if not error:
             return self.zone

@@ -13,6 +13,7 @@ from inspection.surface.surface_fit import SurfaceRegistration
 from inspection.tolerance import ToleranceZone
 from inspection.verdict import Verdict
 
+_FINE = 0.1  # of what U leaves of the zone: a chord tolerance that hardly counts
 _SLIDES = 0.25  # of the zone's width: a pose that may slide farther places the part too badly
 
 
@@ -26,6 +27,7 @@ class SurfaceFindings:
     beyond_edge_mm, beyond_edge_count : how far the farthest point beyond a border lies off it, and how many lie too far
     covered       : what of the area was measured
     registration  : None where the pose was known
+    nominal_error_mm : the largest error of the nominal at a point that is uncertain because of it alone; 0 where there is none
     """
 
     points: Verdict
@@ -36,18 +38,17 @@ class SurfaceFindings:
     beyond_edge_count: int
     covered: CoveredArea
     registration: SurfaceRegistration | None
+    nominal_error_mm: float
 
 
-def conclude_surface(
-    found: SurfaceFindings, zone: ToleranceZone, nominal_error_mm: float, missing: Missing, limits: Limits, complete: bool
-) -> Conclusion:
+def conclude_surface(found: SurfaceFindings, zone: ToleranceZone, missing: Missing, limits: Limits, complete: bool) -> Conclusion:
     """Say the verdict on the part.
 
-    zone     : with the error of the nominal in its U
+    zone     : with the U of the measuring device alone
     complete : the scan came to its end
     """
     reasons = [] if found.why is None else [found.why]
-    reasons += _nominal(found, zone, nominal_error_mm)
+    reasons += _nominal(found, zone)
     if not found.judged:
         reasons.append(Reason("nothing-judged", "No point was judged."))
     if not complete:
@@ -63,18 +64,17 @@ def conclude_surface(
     return Conclusion(max(found.points, Verdict.UNCERTAIN if reasons else Verdict.CONFORM), tuple(reasons))
 
 
-def _nominal(found: SurfaceFindings, zone: ToleranceZone, error_mm: float) -> list[Reason]:
-    """The error of the nominal, where it is the reason that nothing, or less, is proven."""
-    width = zone.upper_mm - zone.lower_mm
+def _nominal(found: SurfaceFindings, zone: ToleranceZone) -> list[Reason]:
+    """The error of the nominal, where it is the reason that less is proven."""
+    error, width = found.nominal_error_mm, zone.upper_mm - zone.lower_mm
+    if not error or found.points is Verdict.NONCONFORM:
+        return []
     mend = "Bring the STEP or IGES file of the part, or a finer mesh"
-    if error_mm and 2 * zone.guard_mm >= width:
-        enough = max((width / 2 - (zone.guard_mm - error_mm)) / 2, 0.0)
-        finer = f": one exported with a chord tolerance of {enough:.2g} mm" if enough else ""
-        told = f"The nominal may lie {error_mm:.4g} mm off the part that it stands for: nothing is proven of a zone {width:.4g} mm wide."
-        return [Reason("nominal", f"{told} {mend}{finer}.")]
-    if error_mm and found.points is Verdict.UNCERTAIN and found.why is not None and found.why.kind == "within-uncertainty":
-        return [Reason("nominal", f"Of that U, {error_mm:.4g} mm are the error of the nominal. {mend}.")]
-    return []
+    if 2 * (zone.guard_mm + error) < width:
+        return [Reason("nominal", f"The nominal may lie {error:.4g} mm off the part that it stands for, which counts like U. {mend}.")]
+    fine = f": one exported with a chord tolerance of {_FINE * (width - 2 * zone.guard_mm):.2g} mm"
+    told = f"The nominal may lie {error:.4g} mm off the part that it stands for: nothing is proven there of a zone {width:.4g} mm wide."
+    return [Reason("nominal", f"{told} {mend}{fine}.")]
 
 
 def _unmeasured(found: SurfaceFindings, limits: Limits) -> list[Reason]:
