@@ -226,7 +226,7 @@ def _icp(points: Array, nominal: NominalProfile, pose: RigidTransform, method: M
 
 
 def _pose_fit(points: Cloud, nominal: NominalProfile, method: Method, tip_radius_mm: float, at_once: int = AT_ONCE) -> PoseFit:
-    curve = (nominal.grid, nominal.table_for(method), method, nominal.outward, tip_radius_mm)
+    curve = (nominal.grid_for(method), nominal.table_for(method), method, nominal.outward, tip_radius_mm)
     return PoseFit(points.points_mm, *curve, points.left_out, points.room, at_once)
 
 

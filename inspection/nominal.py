@@ -16,6 +16,7 @@ from inspection.curve import NurbsCurve, left_limit
 from inspection.errors import NominalError
 from inspection.first_use import OnFirstUse
 from inspection.foot_grid import FootGrid, build_foot_grid
+from inspection.hermite import HermiteProfile, hermite_profile
 from inspection.kernels import SAMPLE_METHODS
 from inspection.methods import Material, Method
 from inspection.reach import StationReach
@@ -45,6 +46,7 @@ class NominalProfile(ProfileSamples):
     hollowness         : the least and the greatest curvature (1/mm) of the samples, positive where the profile is hollow
     grid               : finds the closest point of the curve
     search, packed     : what is looked up on the samples, made when it is first asked for: see `tree` and `sample_table`
+    cubic              : the cubic pieces between the samples, likewise: see `hermite`
     reach              : which stations the foot of a point may have while the point moves, likewise
     """
 
@@ -55,6 +57,7 @@ class NominalProfile(ProfileSamples):
     grid: FootGrid
     search: "OnFirstUse[cKDTree]"
     packed: OnFirstUse[SampleTable]
+    cubic: OnFirstUse[HermiteProfile]
     reach: OnFirstUse[StationReach]
 
     def __repr__(self) -> str:
@@ -69,6 +72,15 @@ class NominalProfile(ProfileSamples):
     def sample_table(self) -> SampleTable:
         """The samples, with their poles, packed for the compiled methods that look at samples only."""
         return self.packed.value
+
+    @property
+    def hermite(self) -> HermiteProfile:
+        """The cubic pieces between neighbouring samples."""
+        return self.cubic.value
+
+    def grid_for(self, method: Method) -> FootGrid:
+        """What finds the closest point: of the cubic pieces between the samples for `hermite`, of the curve for every other method."""
+        return self.hermite.grid if method == "hermite" else self.grid
 
     def table_for(self, method: Method) -> SampleTable | None:
         """The packed samples where the method looks at samples only; None where it needs none, and so no Voronoi diagram either."""
@@ -123,8 +135,9 @@ def discretize(
     accuracy_mm        : instead of all that, the fewest samples that keep the error of `method` below this, for points
                          nearer than half the local pole radius and a tenth of the size. With spacing h, curvature k, its
                          change k' and pole radius r the error is at most |k'| h^3 / 48 for circle, |k| h^2 / 8 for chord,
-                         and (3/8) |1/r - k| h^2 + (1/2) |k'| h^3 for pcp and veaw on the profile. At corners and sharp
-                         edges r falls to zero, so that no spacing bounds the error of those two there. `exact` and
+                         (3/8) |1/r - k| h^2 + (1/2) |k'| h^3 for pcp and veaw on the profile, and |k'' - k^3| h^4 / 384 for
+                         hermite. At corners and sharp edges r falls to zero, so that no spacing bounds the error of pcp and
+                         veaw there. `exact` and
                          `inversion` are exact at any spacing. The pole angle and the smallest step are not used, because
                          they bound no error.
 
@@ -164,6 +177,7 @@ def _profile(curve: NurbsCurve, material: Material, samples: ProfileSamples, pol
         grid=build_foot_grid(curve),
         search=OnFirstUse(lambda: _search_tree(samples.points_mm)),
         packed=OnFirstUse(lambda: pack_samples(samples, curve)),
+        cubic=OnFirstUse(lambda: hermite_profile(samples, curve)),
         reach=OnFirstUse(lambda: StationReach(curve)),
     )
 

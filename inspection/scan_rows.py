@@ -215,7 +215,9 @@ class ScanRows:
 
     def _judge_few(self, first: int, stop: int, pose: RigidTransform, terms: Terms, reserve_mm: float, taken: Taken = NONE_TAKEN) -> None:
         if self._few is None or self._few[1] is not terms:
-            few = FewRows(self.points, self._columns, terms.nominal.grid, terms.nominal.table_for(terms.method), terms.method)
+            few = FewRows(
+                self.points, self._columns, terms.nominal.grid_for(terms.method), terms.nominal.table_for(terms.method), terms.method
+            )
             few.keep_places(self._places)
             self._few = few, terms
         self._few[0].judge(self.base, first, stop, _numbers_of(pose), _with_reserve(terms.judgement, reserve_mm), taken)

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from inspection.curve import NurbsCurve
 from inspection.inversion import invert_points
-from inspection.kernels import Feet, project, project_on_samples, project_outward
+from inspection.kernels import SAMPLE_METHODS, Feet, project, project_on_samples, project_outward
 from inspection.kernels.layout import INSIDE, OPEN_END
 from inspection.methods import Method
 from inspection.nominal import NominalProfile
@@ -86,13 +86,14 @@ def deviations(points_mm: ArrayLike, nominal: NominalProfile, method: Method = "
     check_method(method)
     if method == "inversion":
         return _invert(check_points(points), nominal, tip_radius_mm)
-    asked = (nominal.grid, nominal.table_for(method), method, nominal.outward, tip_radius_mm, KILOMETRE_MM)
+    asked = (nominal.grid_for(method), nominal.table_for(method), method, nominal.outward, tip_radius_mm, KILOMETRE_MM)
     feet, beyond_end, at_vertex, is_any_far, is_any_at_seam = project_outward(points, *asked)
     if is_any_far:
         check_points(points)
     if is_any_at_seam and method == "exact" and nominal.curve.closed:
         _set_seam(feet, nominal.curve)
-    return Deviations(feet.distance_mm, feet.foot_mm, feet.parameter, feet.station_mm, feet.gradient, feet.curvature, beyond_end, at_vertex)
+    parameter = nominal.hermite.parameters_of_nominal(feet.parameter) if method == "hermite" else feet.parameter
+    return Deviations(feet.distance_mm, feet.foot_mm, parameter, feet.station_mm, feet.gradient, feet.curvature, beyond_end, at_vertex)
 
 
 def _invert(points_mm: Array, nominal: NominalProfile, tip_radius_mm: float) -> Deviations:
@@ -121,10 +122,10 @@ def _set_seam(feet: Feet, curve: NurbsCurve) -> None:
 
 def feet_on(points_mm: Array, nominal: NominalProfile, method: Method) -> Feet:
     """Feet of points (m, 2) on the nominal by a method. Points that are not finite give NaN."""
-    if method == "exact":
-        return project(points_mm, nominal.grid)
     if method == "inversion":
         return invert_points(points_mm, nominal)
+    if method not in SAMPLE_METHODS:
+        return project(points_mm, nominal.grid_for(method))
     return project_on_samples(points_mm, nominal.grid, nominal.sample_table, method)
 
 

@@ -6,6 +6,8 @@ the pole radius r there, the methods' errors are bounded by (METHOD; Hu & Wallne
     circle       |k'| h^3 / 48, and |jump of k| h^2 / 8 beside a knot where the curvature jumps
     chord        |k| h^2 / 8
     pcp, veaw    (3/8) |1/r - k| h^2 + (1/2) |k'| h^3, and d (1/r - k)^2 h^2 / 8 at the distance d from the profile
+    hermite      |k'' - k^3| h^4 / 384, and |jump of k'| h^3 / 192 and |jump of k| h^2 / 61.9 beside a knot: the largest errors of a
+                 cubic Hermite piece for a fourth derivative of 1, and for a third or second one that jumps by 1 at any place of it
 
 They presume that the nearest sample lies on the branch of the foot. The spacing therefore stays below the smaller pole radius,
 so that this holds for points nearer than half of it; a thin edge wants dense samples. `exact` and `inversion` solve on the
@@ -28,6 +30,7 @@ _FEWEST = 64  # samples of a whole profile, however flat
 _TURN = 0.25  # rad; largest turn from one sample to the next, so that the leading terms of the bounds hold
 _SAFETY = 0.7  # of the accuracy; the rest is room for uneven steps and for the terms that the bounds leave out
 _SLOPE = 0.15  # mm by which the step may grow per mm of arc length
+_NO_JUMP = 1e-9  # of the curvature (1/mm) or of its change by arc length: round-off
 _FINEST = 1e-5  # of the length; without it a sharp edge would ask for ever shorter steps
 
 
@@ -54,7 +57,8 @@ def space_out(
     u = _grid(curve, low, high)
     station = np.concatenate([[0.0], np.cumsum(np.abs(_steps_mm(curve, u)))])
     limit = _largest_step_mm(curve, u, accuracy_mm, method, poles)
-    limit = np.minimum(limit, _limits_beside_jumps(curve, u, station, accuracy_mm) if method == "circle" else np.inf)
+    for step in _steps_beside_jumps(curve, u, accuracy_mm, method):
+        limit = np.minimum(limit, _near_by(step, station))
     limit = np.minimum(np.maximum(_smooth_limits(limit, station), _FINEST * curve.length_mm), curve.length_mm / _FEWEST)
     count = np.concatenate([[0.0], np.cumsum(np.diff(station) * (1 / limit[1:] + 1 / limit[:-1]) / 2)])
     steps = max(2, int(np.ceil(count[-1])))
@@ -101,6 +105,8 @@ def _largest_step_mm(curve: NurbsCurve, u: Array, accuracy_mm: float, method: Me
     limit = np.minimum(limit, local.radius_mm)
     if method == "circle":
         return np.minimum(limit, np.cbrt(48 * tau / np.maximum(change, tiny)))
+    if method == "hermite":
+        return np.minimum(limit, (384 * tau / np.maximum(_fourth_derivative(curve, u), tiny)) ** 0.25)
     if method == "chord":
         return np.minimum(limit, np.sqrt(8 * tau / np.maximum(k, tiny)))
     return np.minimum(limit, np.minimum(np.sqrt(tau / (2 * np.maximum(local.pole_error, tiny))), np.cbrt(tau / np.maximum(change, tiny))))
@@ -112,16 +118,52 @@ def _wrap(u: Array, curve: NurbsCurve) -> Array:
     return np.where(u > end, u - (end - start), u) if curve.closed else u
 
 
-def _limits_beside_jumps(curve: NurbsCurve, u: Array, station: Array, accuracy_mm: float) -> Array:
-    """Step limits (g,) near knots where the curvature jumps, because there the circle of one side is used on the other."""
+def _fourth_derivative(curve: NurbsCurve, u: Array) -> Array:
+    """|k'' - k^3| (g,): the part across the curve of its fourth derivative by arc length, the larger of both sides of a knot."""
     wrapped = _wrap(u, curve)
-    jump = np.abs(curve.curvature(wrapped) - curve.curvature(left_limit(wrapped, curve)))
-    jump[[0, -1]] = jump[[0, -1]] if curve.closed and not curve.corners.size else 0.0
-    limit = np.full(len(u), np.inf)
-    for index in np.flatnonzero(jump > 1e-9):
-        step = np.sqrt(8 * _SAFETY * accuracy_mm / jump[index])
-        near = np.abs(station - station[index]) <= 1.5 * step
-        limit[near] = np.minimum(limit[near], step)
+    sides = []
+    for at in (left_limit(wrapped, curve), wrapped):
+        _, first, second, third, fourth = curve.derivatives(at, 4)
+        speed2 = (first * first).sum(axis=1)
+        bend, bend_1 = _cross(first, second), _cross(first, third)  # with its derivatives by the parameter
+        bend_2 = _cross(second, third) + _cross(first, fourth)
+        stretch = (first * second).sum(axis=1)
+        stretch_1 = (second * second).sum(axis=1) + (first * third).sum(axis=1)
+        k_1 = bend_1 / speed2**1.5 - 3 * bend * stretch / speed2**2.5
+        k_2 = bend_2 / speed2**1.5 - 3 * (2 * bend_1 * stretch + bend * stretch_1) / speed2**2.5 + 15 * bend * stretch**2 / speed2**3.5
+        sides.append(np.abs((k_2 - k_1 * stretch / speed2) / speed2 - (bend / speed2**1.5) ** 3))
+    return np.asarray(np.maximum(*sides))
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """The third component (g,) of the vector product, row by row."""
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+
+
+def _steps_beside_jumps(curve: NurbsCurve, u: Array, accuracy_mm: float, method: Method) -> list[Array]:
+    """The largest steps (g,) across a knot where the curvature or its change jumps; infinite where there is none, or it does not count."""
+    if method not in ("circle", "hermite"):
+        return []
+    wrapped, tau = _wrap(u, curve), _SAFETY * accuracy_mm
+    jumps = [
+        np.abs(here - before)
+        for here, before in zip(curvature_and_change(curve, wrapped), curvature_and_change(curve, left_limit(wrapped, curve)), strict=True)
+    ]
+    for jump in jumps:
+        jump[[0, -1]] = jump[[0, -1]] if curve.closed and not curve.corners.size else 0.0
+    bend, change = (np.where(jump > _NO_JUMP, jump, 0.0) for jump in jumps)
+    with np.errstate(divide="ignore"):
+        if method == "circle":  # the circle of one side is used on the other
+            return [np.sqrt(8 * tau / bend)]
+        return [np.sqrt(61.9 * tau / bend), np.cbrt(192 * tau / change)]
+
+
+def _near_by(step: Array, station: Array) -> Array:
+    """Limits (g,): each step that is finite holds as far as a step that crosses its place can begin or end."""
+    limit = np.full(len(step), np.inf)
+    for index in np.flatnonzero(np.isfinite(step)):
+        near = np.abs(station - station[index]) <= 1.5 * step[index]
+        limit[near] = np.minimum(limit[near], step[index])
     return limit
 
 

@@ -68,7 +68,7 @@ class Terms:
             value = getattr(self, name)
             if value is not None and not value >= 0:
                 raise ValueError(f"{name} must be zero or more, not {value:g}")
-        self.nominal.table_for(self.method)  # made now where it is needed, not when the first points wait for it
+        _ = self.nominal.table_for(self.method), self.nominal.grid_for(self.method)  # made now, not when the first points wait for them
         zone = self.zone
         limits = (float(self.tip_radius_mm), float(zone.lower_mm), float(zone.upper_mm), float(zone.guard_mm))
         object.__setattr__(self, "judgement", (self.nominal.outward, *limits))

@@ -58,7 +58,7 @@ SETTINGS: Mapping[str, Mapping[str, str]] = {
     },
 }
 
-METHODS = ("circle", "chord", "pcp", "veaw", "inversion")
+METHODS = ("circle", "chord", "pcp", "veaw", "hermite", "inversion")
 WAYS: Mapping[str, Mapping[str, Any]] = {
     "best fit": {"rule": "best-fit"},
     "minimum zone": {"registration": {"fit": "minimum-zone"}},

@@ -20,7 +20,7 @@ from tests.drivers.surface.ct_phantom import Defect, make_phantom, write_nominal
 from tests.integration.test_replay import FAULTS
 
 SCAN = ["--count", "1500", "--seed", "5", "--tip-radius-mm", "1", "--noise-mm", "0.01", "--form-error-mm", "0.02"]
-METHODS = ("exact", "circle", "chord", "pcp", "veaw", "inversion")
+METHODS = ("exact", "circle", "chord", "pcp", "veaw", "hermite", "inversion")
 FITS = ("best-fit", "minimum-zone", "none")
 PASSING_KEYS = {"run", "started", "finished", "records", "previous", "device", "address"}  # of this one run, not of what it found
 
@@ -39,7 +39,7 @@ for name in sorted({key.partition("/")[0] for key in inputs}):
     rng = np.random.default_rng(7)
     u = np.linspace(curve.knots[curve.degree], curve.knots[-curve.degree - 1], 1500, endpoint=not curve.closed)
     points = curve.point(u) + 0.02 * np.sin(40 * u)[:, None] + 0.003 * rng.standard_normal((len(u), 2))
-    for method in ("exact", "circle", "chord", "pcp", "veaw", "inversion"):
+    for method in ("exact", "circle", "chord", "pcp", "veaw", "hermite", "inversion"):
         d = deviations(points, nominal, method=method)
         for field in ("deviation_mm", "foot_mm", "parameter", "station_mm", "beyond_end"):
             out[f"{name} {method} {field}"] = getattr(d, field)

@@ -16,7 +16,7 @@ from tests.inspection import profiles
 from tests.inspection.oracle import Closest, closest_point
 from tests.inspection.profiles import Array, curve_of, moved_curve, nominal_of
 
-METHODS: tuple[Method, ...] = ("exact", "circle", "chord", "pcp", "veaw", "inversion")
+METHODS: tuple[Method, ...] = get_args(Method)
 POLE_METHODS: tuple[Method, ...] = ("pcp", "veaw")
 
 
@@ -239,7 +239,7 @@ def test_published_accuracy_on_airfoils(name: str) -> None:
     assert circle.max() <= 0.001
 
 
-@pytest.mark.parametrize(("method", "order"), [("pcp", 2), ("veaw", 2), ("chord", 2), ("circle", 3)])
+@pytest.mark.parametrize(("method", "order"), [("pcp", 2), ("veaw", 2), ("chord", 2), ("circle", 3), ("hermite", 4)])
 def test_orders_of_convergence(method: Method, order: int) -> None:
     for name in ("P2", "P3", "ellipse"):
         mean = [errors_um(name, method, samples, count=1500)[0].mean() for samples in (400, 800, 1600)]
@@ -439,7 +439,7 @@ def test_bad_points_are_one_clear_error(what: str) -> None:
 
 def test_an_unknown_method_is_refused_by_name() -> None:
     unknown: Any = "spline"
-    with pytest.raises(ValueError, match="method must be one of exact, circle, chord, pcp, veaw, inversion, not 'spline'"):
+    with pytest.raises(ValueError, match="method must be one of exact, circle, chord, pcp, veaw, hermite, inversion, not 'spline'"):
         deviations(np.zeros((1, 2)), nominal_of("P1", 10_000), unknown)
 
 

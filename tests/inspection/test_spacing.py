@@ -9,7 +9,7 @@ from tests.inspection import profiles
 from tests.inspection.profiles import curve_of, nominal_of
 
 
-@pytest.mark.parametrize("method", ["circle", "chord", "pcp", "veaw"])
+@pytest.mark.parametrize("method", ["circle", "chord", "pcp", "veaw", "hermite"])
 @pytest.mark.parametrize("name", ["P1", "P2", "P3", "ellipse"])
 def test_spacing_by_accuracy_keeps_every_error_below_it_and_wastes_no_samples(name: str, method: Method) -> None:
     curve, rng = curve_of(name), np.random.default_rng(31)

@@ -59,7 +59,7 @@ def test_codes_stay_as_they_are_written_in_records() -> None:
 def test_a_method_on_samples_has_the_code_of_its_place() -> None:
     codes = {"circle": layout.CIRCLE, "chord": layout.CHORD, "pcp": layout.PCP, "veaw": layout.VEAW}
     assert {method: SAMPLE_METHODS.index(method) for method in SAMPLE_METHODS} == codes
-    assert set(get_args(Method)) - set(SAMPLE_METHODS) == {"exact", "inversion"}
+    assert set(get_args(Method)) - set(SAMPLE_METHODS) == {"exact", "hermite", "inversion"}
 
 
 @pytest.mark.parametrize("name", ["P1", "P3", "square", "NACA 4412 blunt"])
