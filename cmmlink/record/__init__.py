@@ -5,10 +5,11 @@ TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer 
 if TYPE_CHECKING:
     from cmmlink.record.against import disagreements, read_result
     from cmmlink.record.anchors import Head, Told, anchor_ends, anchors_of, heads_in
-    from cmmlink.record.backup import Copied, back_up, merge, restore
+    from cmmlink.record.backup import Copied, back_up, merge, open_archive, restore
     from cmmlink.record.bodies import unpack_judged
     from cmmlink.record.chain import Draft, Record
-    from cmmlink.record.derived import Change, derived_of
+    from cmmlink.record.changed_plan import with_changes
+    from cmmlink.record.derived import Change, Derived, Judgement, derived_of, judged_by_means, keep_judgements, means_of
     from cmmlink.record.evidence import Evidence, is_evidence, open_evidence
     from cmmlink.record.export import export_run
     from cmmlink.record.handover import handover_words, handovers_of, rotate_key
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
         describe,
         earlier_run,
         end_missing,
+        entries_of,
         find_run,
         find_stack,
         last_serial_number,
@@ -35,8 +37,9 @@ if TYPE_CHECKING:
         recorded_run,
     )
     from cmmlink.record.recorded_inputs import is_of_surface, recorded_plan, recorded_surface_plan
+    from cmmlink.record.recorded_nominal import Nominals, recorded_profile
     from cmmlink.record.recorder import QUEUE_BYTES, Recorder, RecordReference
-    from cmmlink.record.replay import Replay, keep_judgement, recorded_profile, replay_run
+    from cmmlink.record.replay import Replay, judgement_of, keep_judgement, replay_run
     from cmmlink.record.run_inputs import RunInputs, software
     from cmmlink.record.seal import KEY_FILE, PUBLIC_FILE, Seal, seal_of
     from cmmlink.record.search import RunSearch, VerdictSought
@@ -50,10 +53,11 @@ else:
     _PLACES = {
         "cmmlink.record.against": ("disagreements", "read_result"),
         "cmmlink.record.anchors": ("Head", "Told", "anchor_ends", "anchors_of", "heads_in"),
-        "cmmlink.record.backup": ("Copied", "back_up", "merge", "restore"),
+        "cmmlink.record.backup": ("Copied", "back_up", "merge", "open_archive", "restore"),
         "cmmlink.record.bodies": ("unpack_judged",),
         "cmmlink.record.chain": ("Draft", "Record"),
-        "cmmlink.record.derived": ("Change", "derived_of"),
+        "cmmlink.record.changed_plan": ("with_changes",),
+        "cmmlink.record.derived": ("Change", "Derived", "Judgement", "derived_of", "judged_by_means", "keep_judgements", "means_of"),
         "cmmlink.record.evidence": ("Evidence", "is_evidence", "open_evidence"),
         "cmmlink.record.export": ("export_run",),
         "cmmlink.record.handover": ("handover_words", "handovers_of", "rotate_key"),
@@ -68,7 +72,7 @@ else:
             "describe",
             "end_missing",
             "earlier_run",
-            "earlier_run",
+            "entries_of",
             "find_run",
             "find_stack",
             "last_serial_number",
@@ -83,7 +87,8 @@ else:
         ),
         "cmmlink.record.recorded_inputs": ("is_of_surface", "recorded_plan", "recorded_surface_plan"),
         "cmmlink.record.recorder": ("QUEUE_BYTES", "Recorder", "RecordReference"),
-        "cmmlink.record.replay": ("Replay", "keep_judgement", "recorded_profile", "replay_run"),
+        "cmmlink.record.recorded_nominal": ("Nominals", "recorded_profile"),
+        "cmmlink.record.replay": ("Replay", "judgement_of", "keep_judgement", "replay_run"),
         "cmmlink.record.run_inputs": ("RunInputs", "software"),
         "cmmlink.record.seal": ("KEY_FILE", "PUBLIC_FILE", "Seal", "seal_of"),
         "cmmlink.record.search": ("RunSearch", "VerdictSought"),
@@ -104,9 +109,12 @@ __all__ = [
     "QUEUE_BYTES",
     "Change",
     "Copied",
+    "Derived",
     "Draft",
     "Evidence",
     "Head",
+    "Judgement",
+    "Nominals",
     "Record",
     "RecordReference",
     "RecordedRun",
@@ -132,6 +140,7 @@ __all__ = [
     "disagreements",
     "earlier_run",
     "end_missing",
+    "entries_of",
     "export_run",
     "find_run",
     "find_stack",
@@ -141,13 +150,18 @@ __all__ = [
     "heads_in",
     "is_evidence",
     "is_of_surface",
+    "judged_by_means",
+    "judgement_of",
     "keep_answer",
     "keep_judgement",
+    "keep_judgements",
     "key_id_of",
     "last_serial_number",
     "list_runs",
     "make_key",
+    "means_of",
     "merge",
+    "open_archive",
     "open_evidence",
     "open_to_read",
     "open_to_record",
@@ -170,4 +184,5 @@ __all__ = [
     "software",
     "trust_in",
     "unpack_judged",
+    "with_changes",
 ]
