@@ -7,7 +7,7 @@ from typing import Literal
 
 from cmmlink.errors import PlanError
 from cmmlink.line_sample import check_existing, line_decoder
-from cmmlink.plan import Device, DmeDevice, FileDevice, LinesDevice, ModbusDevice, Plan, SerialDevice, map_of
+from cmmlink.plan import Device, DmeDevice, FileDevice, LinesDevice, ModbusDevice, Plan, SerialDevice, SurfacePlan, map_of
 from cmmlink.scratch import Scratch, scratch_in
 from drivers import DME_UNSEEN, Decoder, PointFileSource, RegisterDecoder, RegisterSurvey, ScanSource, decoder, unseen_in
 from drivers.links.axis import Beam, ConstantFeed, FollowedAxis
@@ -35,7 +35,7 @@ Connect = Callable[[Plan], AbstractContextManager[Connected]]
 
 
 @contextmanager
-def connect(plan: Plan, scratch: Scratch | None = None) -> Iterator[Connected]:
+def connect(plan: Plan | SurfacePlan, scratch: Scratch | None = None) -> Iterator[Connected]:
     """Make the real device of a plan ready for one scan. Raises PlanError where the plan describes none.
 
     scratch : gives the points of a long file their room; None takes it in the folder of the plan's records
@@ -79,7 +79,7 @@ def words_of(device: Device) -> str:
     return f"{device.type} {device.address}"
 
 
-def source_of(plan: Plan, scratch: Scratch | None = None) -> ScanSource:
+def source_of(plan: Plan | SurfacePlan, scratch: Scratch | None = None) -> ScanSource:
     """The source of a plan's device; a file of points is read here. Raises PlanError, PointFileError, or StoreError for want of room."""
     device = plan.device
     if isinstance(device, FileDevice):
@@ -93,7 +93,7 @@ def source_of(plan: Plan, scratch: Scratch | None = None) -> ScanSource:
         raise PlanError(f"device: {error}") from None
 
 
-def decoder_of(plan: Plan) -> Decoder | None:
+def decoder_of(plan: Plan | SurfacePlan) -> Decoder | None:
     """The decoder of what the device of a plan sends. None where the points themselves are recorded.
 
     That is so for files and for devices on an axis, and for machines: what their answers mean depends on what they were asked.
@@ -128,7 +128,7 @@ def _source_with_axis(device: SerialDevice | ModbusDevice) -> ScanSource:
     return ConstantFeed(source, beam, axis.feed_mm_s)
 
 
-def _machine_tool(plan: Plan, device: LinesDevice) -> ScanSource:
+def _machine_tool(plan: Plan | SurfacePlan, device: LinesDevice) -> ScanSource:
     """The source of a machine tool's lines. A port is opened with eight data bits where it has seven: its parity is checked with them."""
     from drivers.links.growing_file import GrowingFile  # noqa: PLC0415 - for those who have one
     from drivers.links.listener import Listener  # noqa: PLC0415 - likewise
@@ -144,14 +144,14 @@ def _machine_tool(plan: Plan, device: LinesDevice) -> ScanSource:
     return SerialScanner(Listener(device.address) if device.listen else device.address, made, settings)
 
 
-def _machine(plan: Plan, device: DmeDevice) -> ScanSource:
+def _machine(plan: Plan | SurfacePlan, device: DmeDevice) -> ScanSource:
     from cmmlink.dme_job import job_of  # noqa: PLC0415 - it loads what reads a nominal
     from drivers.links.dme_machine import DmeMachine  # noqa: PLC0415 - for those who have one
 
     return DmeMachine(device.address, job_of(plan, device), device.silence_s)
 
 
-def _trial(plan: Plan, device: DmeDevice) -> ScanSource:
+def _trial(plan: Plan | SurfacePlan, device: DmeDevice) -> ScanSource:
     from cmmlink.dme_job import questions_of  # noqa: PLC0415 - likewise
     from drivers.links.dme_machine import DmeMachine  # noqa: PLC0415 - likewise
 

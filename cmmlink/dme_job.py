@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmmlink.characteristics import pose_of
+from cmmlink.errors import PlanError
 from cmmlink.from_plan import nominal_of, plane_of, with_section
-from cmmlink.plan import CircleScan, CurveScan, DmeDevice, LineScan, Plan, PointsScan
+from cmmlink.plan import CircleScan, CurveScan, DmeDevice, LineScan, Plan, PointsScan, SurfacePlan
 from drivers import DmeJob, PointCheck, curve_density, point_measurement, scan_on_circle, scan_on_line, scan_unknown, scans_on_curve
 from inspection import NurbsCurve
 
@@ -19,7 +20,7 @@ _LOOKED_AT = 20_001
 _SURFACE_DEG = {"outside": 0.0, "inside": 180.0, "plane": 90.0}
 
 
-def job_of(plan: Plan, device: DmeDevice) -> DmeJob:
+def job_of(plan: Plan | SurfacePlan, device: DmeDevice) -> DmeJob:
     """What the machine of a plan is asked to do. Raises NominalError and PlanError where the nominal gives no course."""
     scan = device.scan
     block = "PtMeasPar" if isinstance(scan, PointsScan) else "ScanPar"
@@ -37,19 +38,17 @@ def job_of(plan: Plan, device: DmeDevice) -> DmeJob:
     )
 
 
-def questions_of(plan: Plan, device: DmeDevice) -> DmeJob:
+def questions_of(plan: Plan | SurfacePlan, device: DmeDevice) -> DmeJob:
     """What the machine can be asked without anything moving."""
     return DmeJob(PointCheck(plan.probe.tip_radius_mm, device.radius_tolerance_mm, device.quality_max), ())
 
 
-def _scans(plan: Plan, device: DmeDevice) -> tuple[str, ...]:
+def _scans(plan: Plan | SurfacePlan, device: DmeDevice) -> tuple[str, ...]:
     scan = device.scan
-    if isinstance(scan, CurveScan):
-        path, closed = course_along_nominal(plan, scan.chord_error_mm, _LONGEST_STEP_MM)
-        return scans_on_curve(path, closed=closed)
-    if isinstance(scan, PointsScan):
-        path, _ = course_along_nominal(plan, scan.chord_error_mm, scan.step_mm)
-        return tuple(point_measurement((x, y, z), (i, j, k)) for x, y, z, i, j, k in path.tolist())
+    if isinstance(scan, CurveScan | PointsScan):
+        if isinstance(plan, SurfacePlan):
+            raise PlanError("device.scan: a surface has no curve that a machine could follow; expected a circle, a line or unknown")
+        return _along_nominal(plan, scan)
     if isinstance(scan, CircleScan):
         surface_deg = _SURFACE_DEG[scan.surface]
         return (scan_on_circle(scan.centre_mm, scan.start_mm, scan.axis, scan.sweep_deg, surface_deg, scan.step_deg),)
@@ -69,6 +68,14 @@ def _scans(plan: Plan, device: DmeDevice) -> tuple[str, ...]:
             scan.dialect,
         ),
     )
+
+
+def _along_nominal(plan: Plan, scan: CurveScan | PointsScan) -> tuple[str, ...]:
+    longest_mm = _LONGEST_STEP_MM if isinstance(scan, CurveScan) else scan.step_mm
+    path, closed = course_along_nominal(plan, scan.chord_error_mm, longest_mm)
+    if isinstance(scan, CurveScan):
+        return scans_on_curve(path, closed=closed)
+    return tuple(point_measurement((x, y, z), (i, j, k)) for x, y, z, i, j, k in path.tolist())
 
 
 def course_along_nominal(plan: Plan, chord_error_mm: float, longest_step_mm: float) -> tuple[NDArray[np.float64], bool]:

@@ -16,6 +16,7 @@ from drivers import Arrival
 
 if TYPE_CHECKING:
     from inspection import CharacteristicResult, InspectionResult, LiveUpdate, ProfileUncertainty, Verdict
+    from inspection.surface import SurfaceResult, SurfaceUpdate
 
 Ending = Literal["complete", "aborted", "interrupted"]
 
@@ -90,7 +91,7 @@ class Judged:
 
     time_s: float
     age_s: float
-    update: "LiveUpdate"
+    update: "LiveUpdate | SurfaceUpdate"
     counts: Counts
 
 
@@ -119,7 +120,7 @@ class RunFinished:
     """The run is over. Without a result, `message` says why there is none; after a failure it says what failed."""
 
     ending: Ending
-    result: "InspectionResult | None"
+    result: "InspectionResult | SurfaceResult | None"
     counts: Counts
     message: str
 

@@ -17,7 +17,7 @@ from cmmlink.events import RunStarted
 from cmmlink.last_qualification import qualification_here
 from cmmlink.line_sample import check_sample
 from cmmlink.nominal_files import NominalFile, load_nominal, material_side
-from cmmlink.plan import CtPlan, Discretisation, LinesDevice, Nominal, Plan, Section, place_of
+from cmmlink.plan import CtPlan, Discretisation, LinesDevice, Nominal, Plan, Section, SurfacePlan, place_of
 from drivers import PointFileError, read_bytes
 from inspection import (
     Characteristic,
@@ -304,9 +304,9 @@ def _fitting(plan: Plan) -> _Fitting:
     }
 
 
-def run_started(plan: Plan | CtPlan, device: str, simulated: bool, notes: tuple[str, ...] = ()) -> RunStarted:
+def run_started(plan: Plan | SurfacePlan | CtPlan, device: str, simulated: bool, notes: tuple[str, ...] = ()) -> RunStarted:
     """The event that begins a run of a plan. What is to be warned of about the qualification of the installation stands in its notes."""
-    operator = plan.operator if isinstance(plan, Plan) else None
+    operator = None if isinstance(plan, CtPlan) else plan.operator
     qualification, warning = qualification_here()
     told = tuple(dict.fromkeys([*notes, warning])) if warning else notes
     return RunStarted(plan.part.name, plan.part.serial_number or "", operator or "", device, simulated, told, qualification)

@@ -8,10 +8,11 @@ import threading
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Generic, Literal, Protocol, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cmmlink.buffer import Buffer
 from cmmlink.errors import StoreError
@@ -19,7 +20,21 @@ from cmmlink.events import Arrived, Counts, Ending, Evaluated, Event, Judged, Pr
 from cmmlink.live_characteristics import LiveCharacteristics
 from cmmlink.live_proof import LiveProof
 from drivers import HARMLESS_REASONS, Arrival, Damaged, DeviceError, Lost, PointBatch, Rejected, ScanClosed, ScanOpened, ScanSource
-from inspection import InspectionError, InspectionResult, LiveInspection, Missing, Reason, Rejection, Verdict, doubt_part, reasons_of_abort
+from inspection import (
+    InspectionError,
+    InspectionResult,
+    LiveInspection,
+    LiveUpdate,
+    Missing,
+    Reason,
+    Rejection,
+    Verdict,
+    doubt_part,
+    reasons_of_abort,
+)
+
+if TYPE_CHECKING:
+    from inspection.surface import SurfaceResult, SurfaceUpdate
 
 CutShort = Literal["never", "when failed", "as recorded"]
 """Whether a scan is ended once it is proven that the part can no longer pass; that of a record was, where it has no end."""
@@ -32,12 +47,39 @@ _LOOK_S = 0.05  # how often the run looks whether it was asked to stop
 _MOST_AT_ONCE = 4096  # points judged at once when many wait; more would keep the sinks waiting for news
 
 
+Result = TypeVar("Result", "InspectionResult", "SurfaceResult")
+_Found_co = TypeVar("_Found_co", "InspectionResult", "SurfaceResult", covariant=True)
+_BEYOND = (Rejection.BEYOND_END.words, Rejection.BEYOND_EDGE.words)  # what is said of points only where their pose is known
+
+
+class Live(Protocol[_Found_co]):
+    """What points are given to while a scan runs, whatever they are held against: one section, or a whole surface."""
+
+    @property
+    def received(self) -> int:
+        """Points taken in so far."""
+
+    @property
+    def judged(self) -> int:
+        """Points that have a verdict at this moment."""
+
+    @property
+    def rejected_by_reason(self) -> dict[str, int]:
+        """Points rejected so far, by reason."""
+
+    def add(self, points_mm: ArrayLike, /) -> "LiveUpdate | SurfaceUpdate":
+        """Take in points, in scan order."""
+
+    def finish(self, complete: bool = True, missing: Missing | None = None) -> _Found_co:
+        """Judge all points together, and say the verdict on the part."""
+
+
 @dataclass(frozen=True, slots=True)
-class RunOutcome:
+class Outcome(Generic[Result]):
     """How a run ended. `failure` is the device's error, or why there was no room for more; `refusal` why no result could be given."""
 
     ending: Ending
-    result: InspectionResult | None
+    result: Result | None
     counts: Counts
     failure: DeviceError | StoreError | None
     refusal: InspectionError | None
@@ -46,6 +88,9 @@ class RunOutcome:
     def measured(self) -> bool:
         """Whether anything came of the run: of a device that never opened, or never gave a point, nothing is kept as a result."""
         return self.counts.received > 0
+
+
+RunOutcome = Outcome[InspectionResult]
 
 
 @dataclass(slots=True)
@@ -109,7 +154,7 @@ class _Tally:
 
 def run_inspection(
     source: ScanSource,
-    live: LiveInspection,
+    live: Live[Result],
     sinks: Sequence[Sink],
     started: RunStarted,
     *,
@@ -121,7 +166,7 @@ def run_inspection(
     no_room: Refusal = lambda received, announced: "",
     shown: bool = False,
     cut_short: CutShort = "never",
-) -> RunOutcome:
+) -> Outcome[Result]:
     """Carry out one run to its end and publish every event to every sink. Setting `stop` aborts the run.
 
     watch : called every twentieth of a second, also while no points arrive; what it raises ends the run as an error of a sink does
@@ -135,7 +180,7 @@ def run_inspection(
     acquired = threading.Event()
     reader = threading.Thread(target=_acquire, args=(source, buffer, failures, acquired, clock), name="acquisition", daemon=True)
     tally = _Tally()
-    with _Lookers(live, shown) as lookers:
+    with _Lookers(live if isinstance(live, LiveInspection) else None, shown) as lookers:
         try:
             _publish(sinks, started)
             _start(reader, failures, acquired)
@@ -153,21 +198,25 @@ def run_inspection(
         judged, reasons = (result.judged, result.rejected_by_reason) if result else (0, _reasons_without_pose(live))
         counts = tally.counts(judged, reasons, buffer)
         _publish(sinks, RunFinished(ending, result, counts, str(failure or refusal or "")))
-    return RunOutcome(ending, result, counts, failure, refusal)
+    return Outcome(ending, result, counts, failure, refusal)
 
 
 class _Lookers:
-    """Who looks at a run from beside, while it is entered: for the proof that the part fails and, where shown, at its characteristics."""
+    """Who looks at a run from beside, while it is entered: for the proof that the part fails and, where shown, at its characteristics.
 
-    def __init__(self, live: LiveInspection, shown: bool) -> None:
-        self._live, self._proof, self._is_told = live, LiveProof(live), False
-        self._characteristics = LiveCharacteristics(live) if shown else None
+    There is neither of a surface, for which `live` is None.
+    """
+
+    def __init__(self, live: LiveInspection | None, shown: bool) -> None:
+        self._live, self._is_told = live, False
+        self._proof = None if live is None else LiveProof(live)
+        self._characteristics = LiveCharacteristics(live) if shown and live is not None else None
         self._stack = ExitStack()
 
     def __enter__(self) -> "_Lookers":
-        self._stack.enter_context(self._proof)
-        if self._characteristics is not None:
-            self._stack.enter_context(self._characteristics)
+        for looker in (self._proof, self._characteristics):
+            if looker is not None:
+                self._stack.enter_context(looker)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -175,23 +224,23 @@ class _Lookers:
 
     def end_soon(self) -> None:
         """Have them end, without waiting until they have: the result does not wait for them."""
-        self._proof.end_soon()
-        if self._characteristics is not None:
-            self._characteristics.end_soon()
+        for looker in (self._proof, self._characteristics):
+            if looker is not None:
+                looker.end_soon()
 
     def offer(self) -> None:
         """Hand them the points so far."""
-        self._proof.offer()
-        if self._characteristics is not None:
-            self._characteristics.offer()
+        for looker in (self._proof, self._characteristics):
+            if looker is not None:
+                looker.offer()
 
     def news(self, clock: Callable[[], float]) -> Iterator[Event]:
         """What they found since they were last asked."""
-        if not self._is_told and self._proof.refuted is not None:
+        if not self._is_told and self._proof is not None and self._proof.refuted is not None:
             self._is_told = True
             yield ProvenOut(clock(), self._proof.refuted)
         found = self._characteristics.news() if self._characteristics is not None else None
-        if found is not None:
+        if found is not None and self._live is not None:
             yield Evaluated(clock(), found, self._live.uncertainty)
 
 
@@ -225,7 +274,7 @@ def _acquire(
 
 def _judge_all(
     source: ScanSource,
-    live: LiveInspection,
+    live: Live[Result],
     lookers: _Lookers,
     sinks: Sequence[Sink],
     buffer: "Buffer[tuple[float, Arrival]]",
@@ -272,7 +321,7 @@ def _judge_all(
 
 
 def _judge(
-    live: LiveInspection,
+    live: Live[Result],
     sinks: Sequence[Sink],
     buffer: "Buffer[tuple[float, Arrival]]",
     tally: _Tally,
@@ -287,16 +336,16 @@ def _judge(
     return update.state == "settled" and bool((update.verdicts == Verdict.NONCONFORM).any())
 
 
-def _reasons_without_pose(live: LiveInspection) -> dict[str, int]:
-    """Reasons when no registration was found. Without a pose BEYOND_END means nothing, so those points count as "not registered"."""
-    reasons = {reason: count for reason, count in live.rejected_by_reason.items() if reason != Rejection.BEYOND_END.words}
+def _reasons_without_pose(live: Live[Result]) -> dict[str, int]:
+    """Reasons when no registration was found. Without a pose to lie beyond an end means nothing: those points are "not registered"."""
+    reasons = {reason: count for reason, count in live.rejected_by_reason.items() if reason not in _BEYOND}
     left = live.received - sum(reasons.values())
     return reasons | ({"not registered": left} if left else {})
 
 
 def _finish(
-    live: LiveInspection, ending: Ending, missing: Missing, doubt: Reason | None, complete: bool
-) -> tuple[InspectionResult | None, InspectionError | None]:
+    live: Live[Result], ending: Ending, missing: Missing, doubt: Reason | None, complete: bool
+) -> tuple[Result | None, InspectionError | None]:
     """The result of a run. What the operator aborted has no verdict, whatever was out by then: the part may have slipped.
 
     Whether the part was proven out is asked of all points, not of the proof in mid-scan: when that comes depends on how busy the
@@ -307,10 +356,17 @@ def _finish(
     except InspectionError as error:
         return None, error
     if doubt is not None:
-        result = doubt_part(result, (doubt,))
+        result = _doubted(result, (doubt,))
     if ending != "aborted":
         return result, None
-    return doubt_part(result, reasons_of_abort(proven_out=result.verdict == Verdict.NONCONFORM)), None
+    return _doubted(result, reasons_of_abort(proven_out=result.verdict == Verdict.NONCONFORM)), None
+
+
+def _doubted(result: Result, reasons: tuple[Reason, ...]) -> Result:
+    """The result where nothing of the part is proven, whatever was found, for reasons that stand before all others."""
+    if isinstance(result, InspectionResult):
+        return doubt_part(result, reasons)
+    return replace(result, verdict=Verdict.UNCERTAIN, reasons=(*reasons, *result.reasons))
 
 
 def _publish(sinks: Sequence[Sink], event: Event) -> None:

@@ -1,38 +1,26 @@
 """One run of a plan, from a device made ready to a finished run with its record: the same for command line, page and files.
 
-The walk: compile what the inspection needs, open the record, hand the device's source to the pipeline, keep what ties the
-result to the record, tell the machine that asked for the verdict. Nothing else is printed, shown or written; whoever wants to follow the
-run gives sinks.
+The walk: compile what the inspection needs, and conduct the run (`conduct`). Nothing else is printed, shown or written; whoever wants to
+follow the run gives sinks.
 """
 
 import logging
 import threading
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 from cmmlink.answer import MachineAnswer
 from cmmlink.characteristics import notes_on_zone
+from cmmlink.conduct import conduct
 from cmmlink.devices import Connected
 from cmmlink.events import Answered, Event, RunStarted, Sink
-from cmmlink.from_plan import inspection_of, notes_on_datum, notes_on_nominal, notes_on_temperature, run_started, with_section, zone_of
-from cmmlink.pipeline import RunOutcome, run_inspection
+from cmmlink.from_plan import inspection_of, notes_on_datum, notes_on_nominal, notes_on_temperature, with_section, zone_of
+from cmmlink.pipeline import RunOutcome
 from cmmlink.plan import FileDevice, LinesDevice, Plan
-from cmmlink.record import (
-    PATIENCE_S,
-    QUEUE_BYTES,
-    Recorder,
-    RecordReference,
-    RunInputs,
-    anchor_ends,
-    answer_document,
-    keep_answer,
-    open_to_record,
-    seal_of,
-)
+from cmmlink.record import PATIENCE_S, RecordReference, answer_document
 from cmmlink.result_folder import folder_of
 from cmmlink.result_json import density_notes, density_of, result_json, run_document, stations_of
 from cmmlink.run_log import log_event
@@ -40,7 +28,6 @@ from cmmlink.scratch import scratch_in, words_of_room
 from cmmlink.words import utc_words
 from inspection import CharacteristicResult, InspectionError, NominalProfile, Verdict, rehearse
 
-_FILE_POINTS, _FILE_BYTES = 1 << 15, 4 << 20  # a file can wait: no more of it is held than keeps judging and recording busy
 _log = logging.getLogger(__name__)
 
 
@@ -149,42 +136,23 @@ def carry_out(
     live = inspection_of(plan, profile, scratch, provisional=followed)
     notes = (*assumed, *notes_on_zone(plan), *_notes_on_end(plan), *device.notes)
     on_ready()
-    with ExitStack() as stack:
-        recorder: Recorder | None = None
-        if records is not None:
-            store = stack.enter_context(open_to_record(records, now, patience_s))
-            queue_bytes = QUEUE_BYTES if followed else _FILE_BYTES
-            seal = seal_of(store, station=plan.records.station, key=plan.records.key)
-            recorder = stack.enter_context(Recorder(store, RunInputs.of(plan), clock=clock, now=now, queue_bytes=queue_bytes, seal=seal))
-            notes = (*notes, *seal.notes)
-        started = run_started(plan, device.device, device.simulated, notes)
-        began = recorder.began if recorder else now()
-        answer = _answer_of(plan, [*sinks, log_event], now)
-        listeners: list[Sink] = [*([recorder] if recorder else []), *sinks, log_event, *([answer] if answer else [])]
-        outcome = run_inspection(
-            device.source,
-            live,
-            listeners,
-            started,
-            buffer_points=plan.buffer_points if followed else min(plan.buffer_points, _FILE_POINTS),
-            clock=clock,
-            stop=stop,
-            watch=recorder.check if recorder else lambda: None,
-            no_room=scratch.refusal,
-            shown=shown,
-            cut_short="when failed" if plan.stop_when_failed else "never",
-        )
-        evidence = recorder.evidence if recorder else None
-        answered: Answered | None = None
-        if answer is not None:  # a machine waits: before all others
-            run = evidence.run if evidence else ""
-            answered = answer.deliver(outcome, run, lambda given: keep_answer(store, seal, run, given))
-        if evidence is not None:
-            told = anchor_ends(store, seal, plan.records.places, utc_words(now()), [evidence])
-            evidence = replace(evidence, anchors=[asdict(one) for one in told])
-    if evidence is not None:
-        _log.info("recorded in %s as run %s, chain %s, plan %s", records, evidence.run, evidence.chain_sha256, evidence.plan_sha256)
-    return FinishedRun(plan, profile, started, outcome, evidence, began, answered)
+    conducted = conduct(
+        plan,
+        live,
+        device,
+        notes,
+        records=records,
+        clock=clock,
+        now=now,
+        stop=stop,
+        sinks=sinks,
+        answer=_answer_of(plan, [*sinks, log_event], now),
+        patience_s=patience_s,
+        no_room=scratch.refusal,
+        shown=shown,
+        cut_short="when failed" if plan.stop_when_failed else "never",
+    )
+    return FinishedRun(plan, profile, conducted.started, conducted.outcome, conducted.evidence, conducted.began, conducted.answer)
 
 
 def _answer_of(plan: Plan, followers: Sequence[Sink], now: Callable[[], datetime]) -> MachineAnswer | None:

@@ -25,7 +25,7 @@ from cmmlink.result_json import density_notes, density_of, number, result_json
 from cmmlink.run_state import AnswerState, LinkPhase, Phase, RegistrationState, RunKind, RunState, VerdictState, WorstPoint, ZoneLimits
 from cmmlink.words import LOOKS_OUT, NOT_MEASURED, VERDICT_NAMES, VERDICT_WORDS, Headline, headline_of, local_words
 from drivers import Heartbeat, LinkDown, LinkUp, PointBatch, Rejected, ScanClosed, ScanOpened
-from inspection import LiveUpdate, NominalProfile, ToleranceZone, Verdict, coverage
+from inspection import InspectionResult, LiveUpdate, NominalProfile, ToleranceZone, Verdict, coverage
 
 _COUNTED = ("received", "judged", "rejected", "lost", "damaged_bytes", "rejected_by_reason")
 _ALIVE_S = 1.0
@@ -115,8 +115,9 @@ class RunView:
         elif isinstance(event, Answered):
             self._take_answer(event)
         else:
-            blocks = event.result.blocks if event.result is not None else None
-            self._end(Ended(event.ending, event.message, result_json(event.result, event.counts), blocks), event.counts)
+            result = event.result if isinstance(event.result, InspectionResult) else None
+            blocks = result.blocks if result is not None else None
+            self._end(Ended(event.ending, event.message, result_json(result, event.counts), blocks), event.counts)
 
     def recall(self, started: RunStarted, ended: Ended) -> None:
         """Show a run as the records hold it."""
@@ -240,7 +241,7 @@ class RunView:
             self._catching_up.release()
 
     def _show_verdicts(self, events: Sequence[Judged], at: datetime) -> None:
-        updates, newest = [event.update for event in events], events[-1]
+        updates, newest = [event.update for event in events if isinstance(event.update, LiveUpdate)], events[-1]
         anew = updates[0].first == 0
         extremes = self._empty_extremes() if anew else self._extremes
         columns = ("station_mm", "deviation_mm", "foot_mm", "actual_mm", "verdicts")
@@ -253,7 +254,7 @@ class RunView:
             covered, covered_s = coverage(extremes.stations_mm, self.context.profile), newest.time_s
         with self._lock:
             self._extremes, self._out, self._coverage, self._coverage_s = extremes, out, covered, covered_s
-            self._update, self._counts, self._latency_s = newest.update, newest.counts, newest.age_s
+            self._update, self._counts, self._latency_s = updates[-1], newest.counts, newest.age_s
             if newest.counts.judged:
                 self._verdict_at = at
             self._publish()

@@ -18,7 +18,7 @@ from typing import Any
 from cmmlink.events import Arrived, Counts, RunFinished, RunStarted
 from cmmlink.from_plan import inspection_of
 from cmmlink.outline import Outline, place_of
-from cmmlink.pipeline import RunOutcome, run_inspection
+from cmmlink.pipeline import Outcome, RunOutcome, run_inspection
 from cmmlink.plan import NO_RESULTS, CtPlan, FileDevice, Plan, Section
 from cmmlink.record import Recorder, RecordReference, RunInputs, Seal, Store, Told, anchor_ends
 from cmmlink.words import VERDICT_WORDS, utc_words
@@ -226,4 +226,4 @@ def refuse_section(count: int, refusal: RegistrationError, started: RunStarted, 
             recorder(Arrived(now_s, Rejected(count, _REFUSED)))
         recorder(Arrived(now_s, ScanClosed(count)))
         recorder(RunFinished("complete", None, counts, str(refusal)))
-    return RunOutcome("complete", None, counts, None, refusal)
+    return Outcome("complete", None, counts, None, refusal)

@@ -32,6 +32,7 @@ from cmmlink.commands.report import report
 from cmmlink.commands.setup import doctor, list_ports, nominal, prepare, simulate
 from cmmlink.commands.surfaces import ManyHeights, ct
 from cmmlink.commands.verify import verify
+from cmmlink.commands.whole_surfaces import surface
 from cmmlink.errors import PlanError, RunError, StoreError
 from cmmlink.log import keep_log, log_command, log_folder
 from cmmlink.version import __version__
@@ -50,6 +51,7 @@ app.command()(demo)
 app.command()(run)
 app.command()(inspect)
 app.command(cls=ManyHeights)(ct)
+app.command(short_help="Inspect a scan of a whole surface against CAD, a mesh or a cloud.")(surface)
 app.command()(nominal)
 app.command(short_help="Write files to try every command on.")(example)
 app.add_typer(plan, name="plan")

@@ -6,19 +6,27 @@ decision must not. It is what was decided of the part, of every characteristic a
 
 import hashlib
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cmmlink.record.bodies import pack_document, unpack_judged
 from cmmlink.record.derived import Change
+from cmmlink.record.kept_result import judged_bodies
 from cmmlink.record.reader import RecordedRun
-from cmmlink.record.recorder import judged_bodies, result_sha256
+from cmmlink.record.recorder import result_sha256
 from cmmlink.record.store import Store
+from cmmlink.record.surface_bodies import unpack_surface
+from cmmlink.surface_rows import SurfaceRows
 from inspection import InspectionResult, JudgedRows
+
+if TYPE_CHECKING:
+    from inspection.surface import SurfaceResult
+
+Unpack = Callable[[bytes], JudgedRows | SurfaceRows]
 
 LAST_BITS = 1e-9  # mm; degrees for angles: numbers that lie no farther apart are the same but for how they were computed
 _DECIDED = ("verdict", "received", "judged", "rejected", "lost", "damaged_bytes", "rejected_by_reason", "out_of_tolerance", "complete")
@@ -59,11 +67,14 @@ class Agreement:
         return f"{told}; {far}"
 
 
-def compare(store: Store, recorded: RecordedRun, replayed: Mapping[str, Any], result: InspectionResult | None) -> Agreement:
+def compare(
+    store: Store, recorded: RecordedRun, replayed: Mapping[str, Any], result: "InspectionResult | SurfaceResult | None"
+) -> Agreement:
     """Hold a replay against the recorded run. What a later version of cmmlink tells as well is no difference."""
     differs = tuple(differences_of(recorded.result, replayed)) if recorded.result is not None else ()
     same = replayed if differs or recorded.result is None else recorded.result
-    decided = _Decided()
+    unpack: Unpack = unpack_surface if recorded.is_of_surface else unpack_judged
+    decided = _Decided(unpack)
     sha256 = result_sha256(same, decided.noting(body for _, body in judged_bodies(result)))
     decision = decided.sha256(decision_of(same))
     if recorded.end is None or not recorded.end["result_sha256"]:
@@ -75,8 +86,8 @@ def compare(store: Store, recorded: RecordedRun, replayed: Mapping[str, Any], re
     if recorded.result is None:
         return Agreement(False, differs, sha256, False, decision, None)
     known = decision_of(recorded.result)
-    rows, kept = _Decided(), (record.body for record in store.records(recorded.run, "deviations"))
-    apart = _farthest(rows.noting(kept), (body for _, body in judged_bodies(result)))
+    rows, kept = _Decided(unpack), (record.body for record in store.records(recorded.run, "deviations"))
+    apart = _farthest(unpack, rows.noting(kept), (body for _, body in judged_bodies(result)))
     there = {key: value for key, value in decision_of(replayed).items() if key in known}
     alike = rows.sha256(known) == decided.sha256(there)
     return Agreement(False, differs, sha256, alike, decision, max(apart, _values_apart(recorded.result, replayed)))
@@ -92,12 +103,13 @@ def decision_of(result: Mapping[str, Any]) -> dict[str, Any]:
 class _Decided:
     """Hashes what was decided of every point, while rows pass by."""
 
-    def __init__(self) -> None:
+    def __init__(self, unpack: Unpack) -> None:
+        self._unpack = unpack
         self._verdicts, self._rejections = hashlib.sha256(), hashlib.sha256()
 
     def noting(self, bodies: Iterable[bytes]) -> Iterator[bytes]:
         for body in bodies:
-            rows = unpack_judged(body)
+            rows = self._unpack(body)
             self._verdicts.update(rows.verdicts.tobytes())
             self._rejections.update(rows.rejection.tobytes())
             yield body
@@ -106,15 +118,15 @@ class _Decided:
         return hashlib.sha256(pack_document(decision) + self._verdicts.digest() + self._rejections.digest()).hexdigest()
 
 
-def _farthest(recorded: Iterable[bytes], replayed: Iterable[bytes]) -> float:
+def _farthest(unpack: Unpack, recorded: Iterable[bytes], replayed: Iterable[bytes]) -> float:
     """The largest difference of a point's deviations, in mm; infinity where one of them has no such point, or no deviation of it."""
     farthest = 0.0
-    for before, now in zip_longest(map(unpack_judged, recorded), map(unpack_judged, replayed)):
+    for before, now in zip_longest(map(unpack, recorded), map(unpack, replayed)):
         farthest = max(farthest, _rows_apart(before, now))
     return farthest
 
 
-def _rows_apart(before: JudgedRows | None, now: JudgedRows | None) -> float:
+def _rows_apart(before: JudgedRows | SurfaceRows | None, now: JudgedRows | SurfaceRows | None) -> float:
     if before is None or now is None or before.received != now.received:
         return np.inf
     known = np.isfinite(before.deviation_mm)

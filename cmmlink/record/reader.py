@@ -54,6 +54,11 @@ class RecordedRun:
         """The run's id."""
         return str(self.header["run"])
 
+    @property
+    def is_of_surface(self) -> bool:
+        """Whether it is a run of a whole surface, and not of a section: its plan says so."""
+        return any(line.startswith("surface:") for line in self.plan.splitlines())
+
 
 def default_folder() -> Path:
     """Folder of the records when neither command nor plan says otherwise: in the user's data folder."""
@@ -100,14 +105,9 @@ def list_runs(folder: Path, now: Callable[[], datetime], deciding: bool = False,
     if not has_records(folder):
         return []
     with open_to_read(folder, now) as store:
-        entries = entries_of(store, search)
+        all_entries = (_entry(store, begin, end) for begin, end in store.begins_and_ends())
+        entries = [entry for entry in all_entries if search is None or search.finds(entry)]
         return [entry | {"decided_by": _decider(store, entry) if deciding else ""} for entry in entries]
-
-
-def entries_of(store: Store, search: RunSearch | None = None) -> list[dict[str, Any]]:
-    """A line for every run that is looked for, as `list_runs` gives it."""
-    all_entries = (_entry(store, begin, end) for begin, end in store.begins_and_ends())
-    return [entry for entry in all_entries if search is None or search.finds(entry)]
 
 
 def earlier_run(folder: Path, part: str, serial_number: str, now: Callable[[], datetime]) -> str | None:

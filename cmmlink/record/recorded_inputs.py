@@ -6,16 +6,11 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from cmmlink.errors import RunError, StoreError, YamlError
-from cmmlink.plan import Plan, SurfacePlan, kind_of, read_model
+from cmmlink.plan import Plan, SurfacePlan, read_model
 from cmmlink.record.changed_plan import AnyPlan
 from cmmlink.record.reader import RecordedRun
 from cmmlink.record.shapes import plain_name
 from drivers import Decoder
-
-
-def is_of_surface(recorded: RecordedRun) -> bool:
-    """Whether a run is one of a whole surface, and not of a section."""
-    return kind_of(recorded.plan) is SurfacePlan
 
 
 def recorded_plan(recorded: RecordedRun) -> Plan:
@@ -23,7 +18,7 @@ def recorded_plan(recorded: RecordedRun) -> Plan:
 
     Raises RunError where it is one of a whole surface, StoreError when this version cannot read it.
     """
-    if is_of_surface(recorded):
+    if recorded.is_of_surface:
         raise RunError(f"run {recorded.run} is one of a whole surface, of which there is none of this: it is made of runs of sections")
     return _plan_of(recorded, Plan)
 

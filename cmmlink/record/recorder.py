@@ -8,7 +8,7 @@ without a verdict.
 
 import hashlib
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from datetime import datetime
 from itertools import islice
@@ -17,18 +17,21 @@ from typing import TYPE_CHECKING, Any
 from cmmlink.buffer import Buffer
 from cmmlink.errors import StoreError
 from cmmlink.events import Arrived, Event, Judged, RunFinished, RunStarted
-from cmmlink.record.bodies import JUDGED_ROWS, PlacedArrival, pack_arrivals, pack_document, pack_judged, pack_points, pack_reads
+from cmmlink.record.bodies import PlacedArrival, pack_arrivals, pack_document, pack_points, pack_reads
 from cmmlink.record.chain import Draft, Kind, Record
+from cmmlink.record.kept_result import DocumentOf, document_of_section, judged_bodies
 from cmmlink.record.run_inputs import RunInputs
 from cmmlink.record.seal import Seal
 from cmmlink.record.signature import signature_in
 from cmmlink.record.store import Store
-from cmmlink.result_json import number, result_json
+from cmmlink.result_json import number
 from cmmlink.words import utc_words
 from drivers import LinkDown, PointBatch, Rejected, WireBytes
+from inspection import LiveUpdate
 
 if TYPE_CHECKING:
     from inspection import InspectionResult
+    from inspection.surface import SurfaceRegistration, SurfaceResult
 
 COMMIT_S = 0.1
 CHUNK_POINTS = 1000
@@ -79,11 +82,6 @@ def result_sha256(document: Mapping[str, Any], bodies: Iterable[bytes]) -> str:
     return digest.hexdigest()
 
 
-def judged_bodies(result: "InspectionResult | None") -> Iterator[tuple[int, bytes]]:
-    """The rows of a result as the record holds them, one body after the other, each with its number of rows."""
-    return pack_judged(result.blocks(JUDGED_ROWS) if result is not None else ())
-
-
 class Recorder:
     """Records one run in an open store.
 
@@ -101,10 +99,12 @@ class Recorder:
         queue_bytes: int = QUEUE_BYTES,
         acknowledge: Callable[[Acknowledged], None] = lambda _: None,
         seal: Seal | None = None,
+        document_of: DocumentOf = document_of_section,
     ) -> None:
         """`clock` is the run's; `now` gives date and time of day; the writer's thread calls `acknowledge` after every commit.
 
         seal : names the station and signs the end of the run; None: the run tells no station and is not signed
+        document_of : what is told of the result
         """
         self.run = ""
         self.evidence: RecordReference | None = None
@@ -112,6 +112,7 @@ class Recorder:
         self.began = now()
         self._store, self._inputs, self._clock, self._now = store, inputs, clock, now
         self._commit_s, self._acknowledge, self._seal = commit_s, acknowledge, seal
+        self._document_of = document_of
         self._queue: Buffer[Arrived | _Pose] = Buffer(queue_bytes)
         self._pack = _Packing()
         self._last_pose: tuple[str, float] = ("", float("-inf"))
@@ -197,24 +198,14 @@ class Recorder:
         if update.registration is None or (update.state == state and event.time_s < noted_s + _POSE_S):
             return
         self._last_pose = update.state, event.time_s
-        pose = update.registration.nominal_from_section
-        document = {
-            "time_s": event.time_s,
-            "points": update.stop,
-            "state": update.state,
-            "rotation_rad": pose.rotation_rad,
-            "translation_mm": pose.translation_mm.tolist(),
-            "rms_mm": number(update.registration.rms_mm),
-            "can_move_mm": number(update.can_move_mm),
-            "iterations": update.registration.iterations,
-            "converged": update.registration.converged,
-        }
-        self._hand(_Pose(document), _SMALL_BYTES)
+        moment = {"time_s": event.time_s, "points": update.stop, "state": update.state}
+        found = _pose_of(update) if isinstance(update, LiveUpdate) else _pose_in_space(update.registration)
+        self._hand(_Pose(moment | found), _SMALL_BYTES)
 
     def _end(self, finished: RunFinished) -> None:
         self._stop_writing()
         self.check()
-        result = result_json(finished.result, finished.counts)
+        result = self._document_of(finished.result, finished.counts)
         try:
             sha256 = self._keep_judged(result, finished.result)
             drafts = [self._draft("result", pack_document(result))] if finished.result is not None else []
@@ -232,7 +223,7 @@ class Recorder:
         """The signature of the run, which is committed together with its end: no run that was signed is ever found without it."""
         return [] if self._seal is None else self._seal.sign(end)
 
-    def _keep_judged(self, document: Mapping[str, Any], result: "InspectionResult | None") -> str:
+    def _keep_judged(self, document: Mapping[str, Any], result: "InspectionResult | SurfaceResult | None") -> str:
         """Write the judged rows, some megabytes at a time, and return the hash of the result. They count once the result follows."""
         digest = hashlib.sha256(pack_document(document))
         bodies = judged_bodies(result)
@@ -324,6 +315,34 @@ class _Packing:
     def counts(self) -> dict[str, int]:
         """What is on record: a batch that the full disk refused is not, though the end of its run may still have found room."""
         return {"received": self.kept}
+
+
+def _pose_of(update: LiveUpdate) -> dict[str, Any]:
+    """The pose of a section, as its history tells it."""
+    registration = update.registration
+    assert registration is not None
+    pose = registration.nominal_from_section
+    return {
+        "rotation_rad": pose.rotation_rad,
+        "translation_mm": pose.translation_mm.tolist(),
+        "rms_mm": number(registration.rms_mm),
+        "can_move_mm": number(update.can_move_mm),
+        "iterations": registration.iterations,
+        "converged": registration.converged,
+    }
+
+
+def _pose_in_space(registration: "SurfaceRegistration | None") -> dict[str, Any]:
+    """The pose of a surface, likewise."""
+    assert registration is not None
+    pose = registration.nominal_from_scan
+    return {
+        "rotation": pose.rotation.tolist(),
+        "translation_mm": pose.translation_mm.tolist(),
+        "rms_mm": number(registration.rms_mm),
+        "steps": registration.steps,
+        "converged": registration.converged,
+    }
 
 
 def end_draft(run: str, state: str, message: str, now: datetime, result: Mapping[str, Any], sha256: str = "") -> Draft:

@@ -11,7 +11,7 @@ from cmmlink.errors import PlanError
 from cmmlink.version import __version__
 
 if TYPE_CHECKING:
-    from cmmlink.plan import Plan
+    from cmmlink.plan import Plan, SurfacePlan
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class RunInputs:
     plan_file: str = ""
 
     @classmethod
-    def of(cls, plan: "Plan", stack: Mapping[str, Any] | None = None) -> "RunInputs":
+    def of(cls, plan: "Plan | SurfacePlan", stack: Mapping[str, Any] | None = None) -> "RunInputs":
         """The inputs of a plan as they are at this moment. The user's own register maps become part of the plan. Raises PlanError.
 
         A map is kept as it was understood, with every default filled in, because a later version may read the same file differently.
@@ -43,10 +43,10 @@ class RunInputs:
             raise PlanError(f"device: {error}") from None
         plan = plan.model_copy(update={"device": device})
         try:
-            nominal = plan.nominal.file.read_bytes()
+            nominal = plan.nominal_file.read_bytes()
         except OSError as error:
-            raise PlanError(f"{plan.nominal.file}: cannot be read: {error.strerror or error}") from error
-        return cls(plan.effective_yaml(), plan.nominal.file.name, nominal, software(), stack, plan.file_name)
+            raise PlanError(f"{plan.nominal_file}: cannot be read: {error.strerror or error}") from error
+        return cls(plan.effective_yaml(), plan.nominal_file.name, nominal, software(), stack, plan.file_name)
 
 
 def software() -> dict[str, str]:

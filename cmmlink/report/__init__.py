@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from cmmlink.report.section_pictures import SectionPictures
     from cmmlink.report.stack_folder import write_stack
     from cmmlink.report.stack_pdf import write_stack_report
+    from cmmlink.report.surface_folder import write_surface
+    from cmmlink.report.surface_terminal import print_surface_summary
     from cmmlink.report.terminal import STYLE_OF, STYLES, print_characteristics, print_summary
 else:
     from cmmlink.front_door import load_on_use
@@ -47,6 +49,8 @@ else:
         "cmmlink.report.section_pictures": ("SectionPictures",),
         "cmmlink.report.stack_folder": ("write_stack",),
         "cmmlink.report.stack_pdf": ("write_stack_report",),
+        "cmmlink.report.surface_folder": ("write_surface",),
+        "cmmlink.report.surface_terminal": ("print_surface_summary",),
         "cmmlink.report.terminal": ("STYLE_OF", "STYLES", "print_characteristics", "print_summary"),
     }
 
@@ -69,6 +73,7 @@ __all__ = [
     "prepare",
     "print_characteristics",
     "print_summary",
+    "print_surface_summary",
     "regions_in",
     "scan_of",
     "scan_on_record",
@@ -84,5 +89,6 @@ __all__ = [
     "write_run",
     "write_stack",
     "write_stack_report",
+    "write_surface",
     "zone_in",
 ]

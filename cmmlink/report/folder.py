@@ -36,7 +36,7 @@ def prepare(pattern: Path | None) -> None:
     if pattern is None:
         return
     folder = fixed_part(pattern)
-    with _or_refuse(folder):
+    with or_refuse(folder):
         if folder == pattern:
             folder.mkdir(parents=True, exist_ok=True)
         there = next(above for above in (folder, *folder.parents) if above.exists())
@@ -68,7 +68,7 @@ def write_results(
     What an earlier run left there is moved aside, into a folder of its own; the new files take its place together.
     """
     pictures, drawn = pictures or Pictures(), result is not None and result.judged > 0
-    with _or_refuse(folder), new_files(folder, make_room) as files:
+    with or_refuse(folder), new_files(folder, make_room) as files:
         files("result.json").write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
         content = None
         if result is not None and drawn:
@@ -122,7 +122,7 @@ def write_run(folder: Path, run: FinishedRun, pictures: Pictures | None = None) 
 
 
 @contextmanager
-def _or_refuse(folder: Path) -> Iterator[None]:
+def or_refuse(folder: Path) -> Iterator[None]:
     """Turn an error of the file system into one that says what to do."""
     try:
         yield

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from inspection.surface.surface_result import Defect, SurfaceResult, Unmeasured
     from inspection.surface.surface_terms import SurfaceTerms
     from inspection.surface.triangles import TriangleSurface
-    from inspection.surface.trimmed_surface import TrimmedFace, TrimmedSurface
     from inspection.surface.weakness import Weakness
 else:
     from inspection.front_door import load_on_use
@@ -34,7 +33,6 @@ else:
         "inspection.surface.rigid_motion": ("RigidMotion",),
         "inspection.surface.spline_face": ("SplineFace",),
         "inspection.surface.triangles": ("TriangleSurface",),
-        "inspection.surface.trimmed_surface": ("TrimmedFace", "TrimmedSurface"),
         "inspection.surface.weakness": ("Weakness",),
     }
 
@@ -57,8 +55,6 @@ __all__ = [
     "SurfaceTerms",
     "SurfaceUpdate",
     "TriangleSurface",
-    "TrimmedFace",
-    "TrimmedSurface",
     "Unmeasured",
     "Weakness",
     "judge_surface",

@@ -9,8 +9,8 @@ import pytest
 
 from cmmlink.record import agreement
 from cmmlink.record.bodies import pack_judged, unpack_judged
+from cmmlink.record.kept_result import judged_bodies
 from cmmlink.record.reader import open_to_read, recorded_run
-from cmmlink.record.recorder import judged_bodies
 from cmmlink.record.replay import replay_run
 from tests.cmmlink.command import cmmlink
 from tests.cmmlink.oval_part import oval_points, write_nominal, write_points

@@ -227,7 +227,7 @@ def test_a_result_that_cannot_be_recorded_is_not_given(tmp_path: Path) -> None:
 
 
 def test_a_run_killed_between_its_judged_rows_and_its_result_was_interrupted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cmmlink.record.recorder.JUDGED_ROWS", 100)
+    monkeypatch.setattr("cmmlink.record.kept_result.JUDGED_ROWS", 100)
     monkeypatch.setattr("cmmlink.record.recorder._JUDGED_BODIES", 2)
     whole, recorder = record(tmp_path / "whole", Script(*scan_arrivals()))
     assert whole.result is not None
