@@ -1,4 +1,4 @@
-"""Nominal surfaces from files: faces of STEP and IGES, exact where all are whole; triangles of STL, OBJ and PLY; clouds of points."""
+"""Nominal surfaces from files: faces of STEP and IGES, exact inside their loops; triangles of STL, OBJ and PLY; clouds of points."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from drivers import CadError, MeshError, PointFileError, read_points
 from drivers.cad import CadFace, CadFaces, Kind, read_cad_faces
 from drivers.surface import Open3DMissing, Open3DProcess, SurfaceMesh, read_obj, read_stl
 from inspection import NominalError
-from inspection.surface import CloudSurface, NominalSurface, PatchSurface, SplineFace, TriangleSurface
+from inspection.surface import CloudSurface, NominalSurface, PatchSurface, SplineFace, TriangleSurface, TrimmedFace, TrimmedSurface
 
 Array = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ def load_surface(
 
     scale            : mm that one unit of a mesh or a cloud is; CAD files state their own unit
     nominal_error_mm : the chord tolerance with which a mesh was exported from CAD; None takes the mesh for the nominal itself
-    chord_mm         : how far triangles may lie off trimmed faces
+    chord_mm         : how far triangles may lie off faces that are trimmed, or no exact splines
     """
     kind = path.suffix.lower()
     if kind in _CAD:
@@ -107,23 +107,35 @@ def _rounding_mm(triangles: Array, scale: float) -> float:
 def _of_cad(path: Path, kind: Kind, chord_mm: float, read_faces: Callable[[Path, Kind, float], CadFaces]) -> SurfaceFile:
     try:
         found = read_faces(path, kind, chord_mm)
-        whole = [_spline_face(face, number) for number, face in enumerate(found.faces, 1) if face is not None]
-        if len(whole) == len(found.faces):
+        faces = [None if face is None else _trimmed_face(face, number) for number, face in enumerate(found.faces, 1)]
+        whole = [face.spline for face in faces if face is not None and face.loop is None]
+        if len(whole) == len(faces):
             patches = PatchSurface(whole)
             return SurfaceFile(patches, kind, len(whole), patches.notes)
-        trimmed = len(found.faces) - len(whole)
-        triangles = TriangleSurface(found.triangles_mm, found.error_mm, found.face)
+        if faces.count(None) == len(faces):
+            triangles = TriangleSurface(found.triangles_mm, found.error_mm, found.face)
+            return SurfaceFile(triangles, kind, len(faces), (_words_on_triangles(found), *triangles.notes))
+        trimmed = TrimmedSurface(faces, found.triangles_mm, found.face, found.error_mm)
     except (CadError, NominalError) as error:
         raise NominalError(f"{path}: {error}") from None
-    words = (
-        f"{trimmed} of {len(found.faces)} faces are trimmed: the part is taken as {len(triangles)} triangles, which lie up to "
-        f"{found.error_mm:.2g} mm off the faces; that counts against every verdict as U does"
+    return SurfaceFile(trimmed, kind, len(faces), (_words_on_triangles(found), *trimmed.notes))
+
+
+def _words_on_triangles(found: CadFaces) -> str:
+    """What is exact in a part with trimmed faces, and what is not."""
+    count, unknown = len(found.faces), found.faces.count(None)
+    cut = sum(face is not None and face.loop is not None for face in found.faces)
+    said = [f"{cut} of {count} faces are trimmed: feet are exact inside their loops"] if cut else []
+    said += [f"{unknown} of {count} faces are no exact splines"] if unknown else []
+    return (
+        f"{'; '.join(said)}; what lies {'elsewhere' if cut else 'there'}, beside edges above all, is judged by {len(found.triangles_mm)} "
+        f"triangles up to {found.error_mm:.2g} mm off the faces, which counts against the verdict there as U does"
     )
-    return SurfaceFile(triangles, kind, len(found.faces), (words, *triangles.notes))
 
 
-def _spline_face(face: CadFace, number: int) -> SplineFace:
+def _trimmed_face(face: CadFace, number: int) -> TrimmedFace:
     weights = face.poles[:, :, 3]
     rational = None if (weights == weights.flat[0]).all() else np.ascontiguousarray(weights)
     points = np.ascontiguousarray(face.poles[:, :, :3] / weights[:, :, None])
-    return SplineFace(face.degree, points, face.knots_u, face.knots_v, rational, face.reversed, str(number))
+    spline = SplineFace(face.degree, points, face.knots_u, face.knots_v, rational, face.reversed, str(number))
+    return TrimmedFace(spline, face.loop, face.loop_off_mm)

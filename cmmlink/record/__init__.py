@@ -5,10 +5,11 @@ TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer 
 if TYPE_CHECKING:
     from cmmlink.record.against import disagreements, read_result
     from cmmlink.record.anchors import Head, Told, anchor_ends, anchors_of, heads_in
-    from cmmlink.record.backup import Copied, back_up, merge, restore
+    from cmmlink.record.backup import Copied, back_up, merge, open_archive, restore
     from cmmlink.record.bodies import unpack_judged
     from cmmlink.record.chain import Draft, Record
-    from cmmlink.record.derived import Change, derived_of
+    from cmmlink.record.changed_plan import with_changes
+    from cmmlink.record.derived import Change, Derived, Judgement, derived_of, judged_by_means, keep_judgements, means_of
     from cmmlink.record.evidence import Evidence, is_evidence, open_evidence
     from cmmlink.record.export import export_run
     from cmmlink.record.handover import handover_words, handovers_of, rotate_key
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
         describe,
         earlier_run,
         end_missing,
+        entries_of,
         find_run,
         find_stack,
         last_serial_number,
@@ -36,8 +38,9 @@ if TYPE_CHECKING:
         recorded_run,
     )
     from cmmlink.record.recorded_inputs import recorded_plan, recorded_surface_plan
+    from cmmlink.record.recorded_nominal import Nominals, recorded_profile
     from cmmlink.record.recorder import QUEUE_BYTES, Recorder, RecordReference
-    from cmmlink.record.replay import Replay, keep_judgement, recorded_profile, replay_run
+    from cmmlink.record.replay import Replay, judgement_of, keep_judgement, replay_run
     from cmmlink.record.run_inputs import RunInputs, software
     from cmmlink.record.seal import KEY_FILE, PUBLIC_FILE, Seal, seal_of
     from cmmlink.record.search import RunSearch, VerdictSought
@@ -52,10 +55,11 @@ else:
     _PLACES = {
         "cmmlink.record.against": ("disagreements", "read_result"),
         "cmmlink.record.anchors": ("Head", "Told", "anchor_ends", "anchors_of", "heads_in"),
-        "cmmlink.record.backup": ("Copied", "back_up", "merge", "restore"),
+        "cmmlink.record.backup": ("Copied", "back_up", "merge", "open_archive", "restore"),
         "cmmlink.record.bodies": ("unpack_judged",),
         "cmmlink.record.chain": ("Draft", "Record"),
-        "cmmlink.record.derived": ("Change", "derived_of"),
+        "cmmlink.record.changed_plan": ("with_changes",),
+        "cmmlink.record.derived": ("Change", "Derived", "Judgement", "derived_of", "judged_by_means", "keep_judgements", "means_of"),
         "cmmlink.record.evidence": ("Evidence", "is_evidence", "open_evidence"),
         "cmmlink.record.export": ("export_run",),
         "cmmlink.record.handover": ("handover_words", "handovers_of", "rotate_key"),
@@ -71,7 +75,7 @@ else:
             "describe",
             "end_missing",
             "earlier_run",
-            "earlier_run",
+            "entries_of",
             "find_run",
             "find_stack",
             "last_serial_number",
@@ -86,7 +90,8 @@ else:
         ),
         "cmmlink.record.recorded_inputs": ("recorded_plan", "recorded_surface_plan"),
         "cmmlink.record.recorder": ("QUEUE_BYTES", "Recorder", "RecordReference"),
-        "cmmlink.record.replay": ("Replay", "keep_judgement", "recorded_profile", "replay_run"),
+        "cmmlink.record.recorded_nominal": ("Nominals", "recorded_profile"),
+        "cmmlink.record.replay": ("Replay", "judgement_of", "keep_judgement", "replay_run"),
         "cmmlink.record.run_inputs": ("RunInputs", "software"),
         "cmmlink.record.seal": ("KEY_FILE", "PUBLIC_FILE", "Seal", "seal_of"),
         "cmmlink.record.search": ("RunSearch", "VerdictSought"),
@@ -108,10 +113,13 @@ __all__ = [
     "QUEUE_BYTES",
     "Change",
     "Copied",
+    "Derived",
     "DocumentOf",
     "Draft",
     "Evidence",
     "Head",
+    "Judgement",
+    "Nominals",
     "Record",
     "RecordReference",
     "RecordedRun",
@@ -138,6 +146,7 @@ __all__ = [
     "document_of_section",
     "earlier_run",
     "end_missing",
+    "entries_of",
     "export_run",
     "find_run",
     "find_stack",
@@ -146,13 +155,18 @@ __all__ = [
     "has_records",
     "heads_in",
     "is_evidence",
+    "judged_by_means",
+    "judgement_of",
     "keep_answer",
     "keep_judgement",
+    "keep_judgements",
     "key_id_of",
     "last_serial_number",
     "list_runs",
     "make_key",
+    "means_of",
     "merge",
+    "open_archive",
     "open_evidence",
     "open_to_read",
     "open_to_record",
@@ -176,4 +190,5 @@ __all__ = [
     "trust_in",
     "unpack_judged",
     "unpack_surface",
+    "with_changes",
 ]

@@ -18,7 +18,7 @@ from cmmlink.errors import PlanError, RunError, StoreError
 from cmmlink.record.chain import BEHIND_THE_END, GENESIS, Record
 from cmmlink.record.evidence import is_evidence, open_evidence
 from cmmlink.record.origin import Origin, origin_of
-from cmmlink.record.reader import open_to_record
+from cmmlink.record.reader import open_to_read, open_to_record
 from cmmlink.record.station_lock import StationLock
 from cmmlink.record.store import FILE_NAME, Store, has_records
 from cmmlink.words import utc_words
@@ -217,6 +217,13 @@ def _runs_given(file: Path, now: Now) -> Iterator[Store]:
     else:
         with _open_given(file, now) as store:
             yield store
+
+
+@contextmanager
+def open_archive(place: Path, now: Now) -> Iterator[Store]:
+    """The records of a folder, of a backup or of an export, to be read. Raises PlanError where there are none."""
+    with open_to_read(place, now) if has_records(place) else _runs_given(place, now) as store:
+        yield store
 
 
 def _require_another(given: Store, folder: Path) -> None:

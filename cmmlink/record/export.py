@@ -15,7 +15,7 @@ from cmmlink.record.bodies import unpack_judged
 from cmmlink.record.evidence import write_chain
 from cmmlink.record.reader import arrivals_of, describe, event_document, points_of, reads_of, recorded_run
 from cmmlink.record.recorded_inputs import recorded_plan
-from cmmlink.record.replay import recorded_profile
+from cmmlink.record.recorded_nominal import recorded_profile
 from cmmlink.record.shapes import plain_name
 from cmmlink.record.signature import signature_of
 from cmmlink.record.store import Store

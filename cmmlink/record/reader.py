@@ -105,9 +105,14 @@ def list_runs(folder: Path, now: Callable[[], datetime], deciding: bool = False,
     if not has_records(folder):
         return []
     with open_to_read(folder, now) as store:
-        all_entries = (_entry(store, begin, end) for begin, end in store.begins_and_ends())
-        entries = [entry for entry in all_entries if search is None or search.finds(entry)]
+        entries = entries_of(store, search)
         return [entry | {"decided_by": _decider(store, entry) if deciding else ""} for entry in entries]
+
+
+def entries_of(store: Store, search: RunSearch | None = None) -> list[dict[str, Any]]:
+    """A line for every run that is looked for, as `list_runs` gives it."""
+    all_entries = (_entry(store, begin, end) for begin, end in store.begins_and_ends())
+    return [entry for entry in all_entries if search is None or search.finds(entry)]
 
 
 def earlier_run(folder: Path, part: str, serial_number: str, now: Callable[[], datetime]) -> str | None:

@@ -14,16 +14,17 @@ from typing import Any
 from cmmlink.characteristics import notes_on_zone
 from cmmlink.errors import StoreError
 from cmmlink.events import RunStarted, Sink
-from cmmlink.from_plan import inspection_of, notes_on_datum, notes_on_nominal, notes_on_temperature, profile_of
+from cmmlink.from_plan import inspection_of, notes_on_datum, notes_on_nominal, notes_on_temperature
 from cmmlink.pipeline import RunOutcome, run_inspection
 from cmmlink.plan import Plan
 from cmmlink.record.agreement import Agreement, compare, differences_of
 from cmmlink.record.changed_plan import with_changes
-from cmmlink.record.derived import Change, derived_draft
+from cmmlink.record.derived import Change, Judgement, keep_judgements
 from cmmlink.record.kept_result import judged_bodies
 from cmmlink.record.reader import RecordedRun
 from cmmlink.record.recorded_arrivals import Reading, arrivals_in, failure_of
 from cmmlink.record.recorded_inputs import recorded_decoder, recorded_plan, with_recorded_file
+from cmmlink.record.recorded_nominal import recorded_profile
 from cmmlink.record.recorder import result_sha256
 from cmmlink.record.run_inputs import software
 from cmmlink.record.seal import Seal
@@ -121,6 +122,20 @@ def replay_run(
     return Replay(changed, outcome, profile, replayed, changes, compare(store, recorded, replayed, outcome.result), notes)
 
 
+def judgement_of(recorded: RecordedRun, again: Replay) -> Judgement:
+    """What a replay with changes found, as the records keep it."""
+    return Judgement(
+        recorded.run,
+        recorded.chain_sha256,
+        changed=tuple(change for change in again.changed if not change.key.startswith("software.")),
+        plan=again.plan.effective_yaml(),
+        software=software(),
+        result=again.result_json,
+        result_sha256=result_sha256(again.result_json, (body for _, body in judged_bodies(again.outcome.result))),
+        key=again.plan.records.key,
+    )
+
+
 def keep_judgement(
     store: Store, recorded: RecordedRun, again: Replay, *, who: str, why: str, now: datetime, seal: Seal | None = None
 ) -> dict[str, Any]:
@@ -128,26 +143,8 @@ def keep_judgement(
 
     Raises StoreError where it cannot be kept.
     """
-    draft = derived_draft(
-        recorded.run,
-        recorded.chain_sha256,
-        when=utc_words(now),
-        who=who,
-        why=why,
-        changed=[change for change in again.changed if not change.key.startswith("software.")],
-        plan=again.plan.effective_yaml(),
-        software=software(),
-        result=again.result_json,
-        result_sha256=result_sha256(again.result_json, (body for _, body in judged_bodies(again.outcome.result))),
-    )
-    kept = store.append([draft], *([seal.countersign] if seal else []))[0]
+    (kept,) = keep_judgements(store, [judgement_of(recorded, again)], who=who, why=why, when=utc_words(now), seal=seal)
     return {"when": utc_words(now), "who": who, "why": why, "record": kept.number, "chain_sha256": kept.sha256.hex()}
-
-
-def recorded_profile(plan: Plan, recorded: RecordedRun) -> NominalProfile:
-    """Discretise the nominal from its recorded file; the one that the plan names may have changed since, or be gone."""
-    with with_recorded_file(plan, recorded) as at_hand:
-        return profile_of(at_hand)
 
 
 def _notes_on(changed: Plan, plan: Plan, noted: Sequence[str], recorded: RecordedRun) -> Iterator[str]:

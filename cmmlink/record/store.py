@@ -114,12 +114,26 @@ class Store:
         records = chain_records(drafts, self._head, time_s)
         if records:
             records += chain_records(behind(records[-1]), (records[-1].number, records[-1].sha256), time_s)
+        self._insert(records)
+        return records
+
+    def append_each(self, drafts: Sequence[Draft], behind: Callable[[Record], Sequence[Draft]]) -> list[Record]:
+        """The same, with what follows from a record behind each of them. Returns the records of the drafts."""
+        time_s, head = self._epoch_s(), self._head
+        added, records = list[Record](), list[Record]()
+        for draft in drafts:
+            added += chain_records([draft], head, time_s)
+            records += [added[-1], *chain_records(behind(added[-1]), (added[-1].number, added[-1].sha256), time_s)]
+            head = records[-1].number, records[-1].sha256
+        self._insert(records)
+        return added
+
+    def _insert(self, records: Sequence[Record]) -> None:
         rows = [(r.number, r.run, r.kind, r.time_s, r.count, r.body, r.crc32, r.sha256) for r in records]
         with translate_errors(self.path), _transaction(self._connection):
             self._connection.executemany(f"INSERT INTO record ({_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?, ?)", rows)
         if records:
             self._head = records[-1].number, records[-1].sha256
-        return records
 
     def adopt(self, records: Iterable[Record]) -> None:
         """Add records of another file with the moments at which they were written, in one transaction, each with its place in this chain.

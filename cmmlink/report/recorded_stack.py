@@ -15,7 +15,7 @@ from cmmlink.errors import StoreError, YamlError
 from cmmlink.events import Counts
 from cmmlink.pipeline import Outcome
 from cmmlink.plan import CtPlan, read_model
-from cmmlink.record import RecordedRun, Store, end_missing, recorded_plan, recorded_profile, recorded_run, replay_run, unpack_judged
+from cmmlink.record import Nominals, RecordedRun, Store, end_missing, recorded_plan, recorded_run, replay_run, unpack_judged
 from cmmlink.report.judged_scan import JudgedScan, scan_on_record
 from cmmlink.report.picture_content import PictureContent, content_of
 from cmmlink.report.recorded_report import zone_in
@@ -24,9 +24,8 @@ from cmmlink.report.stack_input import MAP_COLUMNS, MapRow, SectionSheet, StackI
 from cmmlink.result_json import result_json
 from cmmlink.stack_characteristics import JudgedSection, StackQuestions, stack_characteristic_json
 from cmmlink.words import utc_words
-from inspection import JudgedRows, NominalProfile, RegistrationError, Verdict
+from inspection import JudgedRows, RegistrationError, Verdict
 
-_DRAWINGS = (".step", ".stp", ".igs", ".iges", ".dxf")  # a solid, or a curve in space, is another nominal at every height
 _VERDICTS = {verdict.word: verdict for verdict in Verdict}
 
 
@@ -39,7 +38,7 @@ def stack_on_record(store: Store, runs: Sequence[str]) -> StackInput:
         altered, _, _ = store.first_alteration(run)
         if altered is not None:
             raise StoreError(f"{store.path}: {altered}; of what was altered there is no report")
-    recorded, profiles = [recorded_run(store, run) for run in runs], _Profiles()
+    recorded, profiles = [recorded_run(store, run) for run in runs], Nominals()
     place: Mapping[str, Any] = recorded[0].header["stack"]
     plan = _plan_of(recorded[0], place)
     shared = [note for note in recorded[0].header.get("notes", ()) if all(note in one.header.get("notes", ()) for one in recorded)]
@@ -68,24 +67,9 @@ def _plan_of(section: RecordedRun, place: Mapping[str, Any]) -> CtPlan:
         raise StoreError(f"the plan of the stack of run {section.run} cannot be read by this version of cmmlink: {error}") from None
 
 
-class _Profiles:
-    """The nominal of each section; sections of one nominal share it."""
-
-    def __init__(self) -> None:
-        self._known: dict[tuple[str, str, str], NominalProfile] = {}
-
-    def of(self, recorded: RecordedRun) -> NominalProfile:
-        plan = recorded_plan(recorded)
-        own = plan.section.model_dump_json() if plan.nominal.file.suffix.lower() in _DRAWINGS else ""
-        key = (recorded.header["nominal_sha256"], plan.nominal.model_dump_json() + plan.discretisation.model_dump_json(), own)
-        if key not in self._known:
-            self._known[key] = recorded_profile(plan, recorded)
-        return self._known[key]
-
-
-def _sheet_of(store: Store, recorded: RecordedRun, profiles: _Profiles, shared: Sequence[str]) -> SectionSheet:
+def _sheet_of(store: Store, recorded: RecordedRun, profiles: Nominals, shared: Sequence[str]) -> SectionSheet:
     header, end = recorded.header, recorded.end or end_missing(store, recorded.run)
-    place, profile = header["stack"], profiles.of(recorded)
+    place, profile = header["stack"], profiles.of(recorded_plan(recorded), recorded)
     received = end["received"] or 0
     found = recorded.result or result_json(None, Counts(received=received, rejected=received))
     own = [note for note in header.get("notes", ()) if note not in shared] + ([end["message"]] if end["message"] else [])
@@ -111,7 +95,7 @@ def _blocks(store: Store, run: str) -> Iterator[JudgedRows]:
 
 
 def _characteristics(
-    store: Store, plan: CtPlan, recorded: Sequence[RecordedRun], profiles: _Profiles, asked: int
+    store: Store, plan: CtPlan, recorded: Sequence[RecordedRun], profiles: Nominals, asked: int
 ) -> tuple[tuple[Mapping[str, Any], ...], list[str]]:
     """The characteristics of the stack, and a note where its sections do not come out today as they are on record."""
     if not plan.stack_characteristics:
@@ -122,7 +106,8 @@ def _characteristics(
         if one.result is None:
             outcome = Outcome("complete", None, Counts(), None, RegistrationError(end["message"] or "nothing of it was judged"))
         else:
-            again = replay_run(store, one, decoder_of, profile=profiles.of(one), numbers=questions.numbers(profiles.of(one)))
+            profile = profiles.of(recorded_plan(one), one)
+            again = replay_run(store, one, decoder_of, profile=profile, numbers=questions.numbers(profile))
             outcome = again.outcome
             differs += [one.run] if again.identical is False else []
         judged.append(JudgedSection(place["asked_height_mm"], place["height_mm"], outcome))

@@ -1,20 +1,23 @@
-"""What the child of occt_process.py finds of faces: whole ones as exact splines, all of them as triangles where one is trimmed.
+"""What the child of occt_process.py finds of faces: exact splines, with loops where they are trimmed, and then triangles as well.
 
 A face is whole where its loop runs along the border of a rectangle of its parameters. Planes, cylinders and the like become rational
-splines. The triangles come with a bound of how far they lie off the faces, found at their middles and those of their sides.
+splines. The triangles come with a bound of how far they lie off the faces, found at their middles, at those of their sides and
+along the edges.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.cad.occt_loops import loop_of
 from drivers.errors import CadError
 
 Array = NDArray[np.float64]
 
 _PLACES = 9  # along an edge at which its course is looked at
+_STRAY = 0.1  # of the chord: how far segments may leave a loop
 _TURN_RAD = 0.2  # between neighbouring triangles
 _SAFETY = 1.5  # times the largest distance found
 _ON_BORDER_MM = 1e-6
@@ -22,26 +25,47 @@ _ROUND_OFF = 1e-9  # of a period
 
 
 def faces_of(faces: Sequence[Any], shape: Any, chord_mm: float) -> tuple[dict[str, Any], list[NDArray[Any]]]:
-    """The answer on faces: degrees, directions and whether each is trimmed, with poles (a, b, 4) and knots of those that are whole.
+    """The answer on faces: degrees and directions, with poles (a, b, 4) and knots of those that are exact splines.
 
-    Where one is trimmed all are given as triangles (t, 3, 3) as well, with the face of each (t,).
+    A trimmed one has the segments of its loops as well. Where there are such or faces without a spline, all are given as triangles
+    (t, 3, 3) too, with the face of each (t,).
     """
     if not faces:
         raise CadError("holds no face; a surface is needed")
     told: dict[str, Any] = {"faces": [], "error_mm": 0.0}
     arrays: list[NDArray[Any]] = []
     for face in faces:
-        spline = _whole(face)
-        reverse = _is_reversed(face)
-        if spline is None:
-            told["faces"].append({"trimmed": True, "reversed": reverse})
-            continue
-        told["faces"].append({"trimmed": False, "reversed": reverse, "degree": [spline.UDegree(), spline.VDegree()]})
-        arrays += [_poles(spline), *_knots(spline)]
+        each, found = _face(face, _STRAY * chord_mm)
+        told["faces"].append(each)
+        arrays += found
     if any(each["trimmed"] for each in told["faces"]):
         triangles, owner, told["error_mm"] = _triangles(faces, shape, chord_mm)
         arrays += [triangles, owner]
     return told, arrays
+
+
+def _face(face: Any, stray_mm: float) -> tuple[dict[str, Any], list[NDArray[Any]]]:
+    """The answer on one face, and its arrays: none where it is no exact spline."""
+    from OCP.BRep import BRep_Tool
+    from OCP.BRepAdaptor import BRepAdaptor_Curve2d
+    from OCP.BRepTools import BRepTools
+
+    told: dict[str, Any] = {"trimmed": True, "reversed": _is_reversed(face)}
+    bounds, surface = BRepTools.UVBounds_s(face), BRep_Tool.Surface_s(face)
+    spline = _spline(face, surface, bounds)
+    if spline is None:
+        return told, []
+    loop: list[NDArray[Any]] = []
+    if _runs_along(face, surface, bounds):
+        told["trimmed"] = False
+    else:
+        edges = ((BRepAdaptor_Curve2d(edge, face), float(BRep_Tool.Tolerance_s(edge))) for edge in _edges(face))
+        found = loop_of(edges, surface, spline, stray_mm)
+        if found is None:
+            return told, []
+        loop, told["loop_off_mm"] = [found[0]], found[1]
+    told["degree"] = [spline.UDegree(), spline.VDegree()]
+    return told, [_poles(spline), *_knots(spline), *loop]
 
 
 def _is_reversed(face: Any) -> bool:
@@ -50,21 +74,30 @@ def _is_reversed(face: Any) -> bool:
     return bool(face.Orientation() == TopAbs_REVERSED)
 
 
-def _whole(face: Any) -> Any:
-    """The face as a spline over the rectangle that its loop runs along; None where it is trimmed, or no exact spline."""
-    from OCP.BRep import BRep_Tool
+def _edges(face: Any) -> Iterator[Any]:
+    from OCP.TopAbs import TopAbs_EDGE
+    from OCP.TopExp import TopExp_Explorer
+    from OCP.TopoDS import TopoDS
+
+    edges = TopExp_Explorer(face, TopAbs_EDGE)
+    cast = getattr(TopoDS, "Edge", None) or TopoDS.Edge_s  # without an underscore since OCCT 8
+    while edges.More():
+        yield cast(edges.Current())
+        edges.Next()
+
+
+def _spline(face: Any, surface: Any, bounds: Sequence[float]) -> Any:
+    """The surface of a face as a spline over the rectangle around its loops; None where it is no exact one."""
     from OCP.BRepAdaptor import BRepAdaptor_Surface
-    from OCP.BRepTools import BRepTools
     from OCP.GeomAbs import GeomAbs_OffsetSurface, GeomAbs_OtherSurface
     from OCP.GeomConvert import GeomConvert
 
     if BRepAdaptor_Surface(face).GetType() in (GeomAbs_OffsetSurface, GeomAbs_OtherSurface):
         return None
-    bounds = BRepTools.UVBounds_s(face)
-    surface = BRep_Tool.Surface_s(face)
-    if not _runs_along(face, surface, bounds):
+    try:
+        spline = GeomConvert.SurfaceToBSplineSurface_s(_restricted(surface, bounds))
+    except RuntimeError:  # what the kernel does not turn into a spline is known by its triangles
         return None
-    spline = GeomConvert.SurfaceToBSplineSurface_s(_restricted(surface, bounds))
     if spline.IsUPeriodic():
         spline.SetUNotPeriodic()
     if spline.IsVPeriodic():
@@ -76,7 +109,12 @@ def _restricted(surface: Any, bounds: Sequence[float]) -> Any:
     """A surface over a rectangle of its parameters. A whole turn is not cut: round-off in its bounds would leave a gap."""
     from OCP.Geom import Geom_RectangularTrimmedSurface
 
+    low_u, high_u, low_v, high_v = surface.Bounds()
     u0, u1, v0, v1 = bounds
+    if not surface.IsUPeriodic():
+        u0, u1 = max(u0, low_u), min(u1, high_u)
+    if not surface.IsVPeriodic():  # round-off beyond the pole of a sphere is no place on it
+        v0, v1 = max(v0, low_v), min(v1, high_v)
     whole_u = surface.IsUPeriodic() and abs(u1 - u0 - surface.UPeriod()) < _ROUND_OFF * surface.UPeriod()
     whole_v = surface.IsVPeriodic() and abs(v1 - v0 - surface.VPeriod()) < _ROUND_OFF * surface.VPeriod()
     if whole_u and whole_v:
@@ -90,16 +128,10 @@ def _runs_along(face: Any, surface: Any, bounds: Sequence[float]) -> bool:
     """Whether every edge of a face lies on one side of a rectangle of its parameters, to a nanometre in space."""
     from OCP.BRepAdaptor import BRepAdaptor_Curve2d
     from OCP.gp import gp_Pnt, gp_Vec
-    from OCP.TopAbs import TopAbs_EDGE
-    from OCP.TopExp import TopExp_Explorer
-    from OCP.TopoDS import TopoDS
 
-    edges = TopExp_Explorer(face, TopAbs_EDGE)
-    cast = getattr(TopoDS, "Edge", None) or TopoDS.Edge_s  # without an underscore since OCCT 8
     point, by_u, by_v = gp_Pnt(), gp_Vec(), gp_Vec()
-    while edges.More():
-        curve = BRepAdaptor_Curve2d(cast(edges.Current()), face)
-        edges.Next()
+    for edge in _edges(face):
+        curve = BRepAdaptor_Curve2d(edge, face)
         off = np.zeros(4)
         for t in np.linspace(curve.FirstParameter(), curve.LastParameter(), _PLACES):
             at = curve.Value(float(t))
@@ -138,7 +170,7 @@ def _triangles(faces: Sequence[Any], shape: Any, chord_mm: float) -> tuple[Array
     found, owners, far = [], [], 0.0
     for number, face in enumerate(faces):
         corners, uv = _mesh_of(face, number)
-        far = max(far, _farthest(face, corners, uv))
+        far = max(far, _farthest(face, corners, uv), _farthest_of_edges(face))
         found.append(corners[:, ::-1] if _is_reversed(face) else corners)
         owners.append(np.full(len(corners), number))
     return np.concatenate(found), np.concatenate(owners), _SAFETY * far
@@ -171,4 +203,24 @@ def _farthest(face: Any, corners: Array, uv: Array) -> float:
         places, at = np.einsum("k,tkd->td", weights, corners), np.einsum("k,tkd->td", weights, uv)
         exact = np.array([(p.X(), p.Y(), p.Z()) for p in (surface.Value(float(u), float(v)) for u, v in at)])
         far = max(far, float(np.linalg.norm(exact - places, axis=1).max()))
+    return far
+
+
+def _farthest_of_edges(face: Any) -> float:
+    """The farthest that the edges of a face lie from the sides of triangles along them, at the middles of their parameters."""
+    from OCP.BRep import BRep_Tool
+    from OCP.BRepAdaptor import BRepAdaptor_Curve
+    from OCP.TopLoc import TopLoc_Location
+
+    location, far = TopLoc_Location(), 0.0
+    mesh = BRep_Tool.Triangulation_s(face, location)
+    for edge in _edges(face):
+        line = BRep_Tool.PolygonOnTriangulation_s(edge, mesh, location)
+        if BRep_Tool.Degenerated_s(edge) or line is None or not line.HasParameters():
+            continue
+        curve = BRepAdaptor_Curve(edge)
+        t = np.array([line.Parameter(i) for i in range(1, line.NbNodes() + 1)])
+        at, middle = ([curve.Value(float(each)) for each in values] for values in (t, (t[1:] + t[:-1]) / 2))
+        places, exact = (np.array([(p.X(), p.Y(), p.Z()) for p in each]) for each in (at, middle))
+        far = max(far, float(np.linalg.norm((places[1:] + places[:-1]) / 2 - exact, axis=1).max(initial=0.0)))
     return far

@@ -4,7 +4,7 @@ It prints, holds a quarter of a gigabyte and crashes on bad files: see drivers/h
 """
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -57,9 +57,11 @@ class CadCurves:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CadFace:
-    """A whole face, exact: degrees, poles (a, b, 4) in homogeneous form as of a curve, clamped knots; its outside is S_u x S_v.
+    """A face, exact: degrees, poles (a, b, 4) in homogeneous form as of a curve, clamped knots; its outside is S_u x S_v.
 
-    reversed : the outside is the other side
+    reversed    : the outside is the other side
+    loop        : (s, 2, 5) segments along its loops, with u, v and x, y, z in mm at both ends; None where it is the whole rectangle
+    loop_off_mm : how far the loops may lie off those segments: by the tolerance of its edges, and by how far the segments stray
     """
 
     degree: tuple[int, int]
@@ -67,17 +69,20 @@ class CadFace:
     knots_u: Array
     knots_v: Array
     reversed: bool
+    loop: Array | None = None
+    loop_off_mm: float = 0.0
 
     def __post_init__(self) -> None:
-        for array in (self.poles, self.knots_u, self.knots_v):
-            array.setflags(write=False)
+        for array in (self.poles, self.knots_u, self.knots_v, self.loop):
+            if array is not None:
+                array.setflags(write=False)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CadFaces:
     """The faces of a CAD file.
 
-    faces        : a face for each that is whole, None for each that is trimmed
+    faces        : a face for each that is an exact spline, None for each that is not
     triangles_mm : (t, 3, 3) all faces as triangles, outsides out; none where every face is whole
     face         : (t,) the number of the face of each, from 0
     error_mm     : bound of how far the triangles lie off the faces
@@ -126,12 +131,7 @@ class OcctProcess:
         """
         answer, arrays = self._ask({"do": kind, "path": str(path.resolve()), "chord_mm": chord_mm})
         given = iter(arrays)
-        faces = tuple(
-            None
-            if each["trimmed"]
-            else CadFace((each["degree"][0], each["degree"][1]), next(given), next(given), next(given), each["reversed"])
-            for each in answer["faces"]
-        )
+        faces = tuple(_face(each, given) if "degree" in each else None for each in answer["faces"])
         rest = list(given)
         triangles, owner = rest or (np.empty((0, 3, 3)), np.empty(0, dtype=np.int64))
         return CadFaces(faces, triangles, owner, answer["error_mm"])
@@ -160,6 +160,12 @@ class OcctProcess:
         if "error" in hello:
             raise CadError(_how_to_install(hello))
         self._greeted = True
+
+
+def _face(told: dict[str, Any], given: Iterator[Array]) -> CadFace:
+    poles, knots_u, knots_v = next(given), next(given), next(given)
+    loop = next(given) if told["trimmed"] else None
+    return CadFace((told["degree"][0], told["degree"][1]), poles, knots_u, knots_v, told["reversed"], loop, told.get("loop_off_mm", 0.0))
 
 
 def read_cad(path: Path, kind: Kind, origin_mm: Sequence[float], normal: Sequence[float]) -> CadCurves:

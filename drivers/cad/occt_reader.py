@@ -25,6 +25,7 @@ _GOOD_MM = 1e-8
 _MOST_POINTS, _ROUNDS, _NEWTON_STEPS = 20_000, 12, 8
 _DEGREE = 5
 _ENDLESS_MM = 1e9
+_ADJOINS, _LEAST_GAP_MM = 1e-5, 1e-6  # of the size: borders of faces that are nearer to each other are one edge, as CAD systems promise it
 
 
 def serve() -> None:
@@ -46,7 +47,7 @@ def _answer(request: dict[str, Any], arrays: list[NDArray[Any]]) -> tuple[dict[s
     try:
         shape = _shape(request["path"], request["do"])
         if "chord_mm" in request:
-            return _faces(shape, request["chord_mm"])
+            return _faces(shape, request["chord_mm"], request["do"])
         return _curves(shape, np.array(request["origin_mm"]), np.array(request["normal"]))
     except CadError as error:
         return {"error": str(error)}, []
@@ -99,11 +100,25 @@ def _curves(shape: Any, origin: Array, normal: Array) -> tuple[dict[str, Any], l
     return told, arrays
 
 
-def _faces(shape: Any, chord_mm: float) -> tuple[dict[str, Any], list[NDArray[Any]]]:
-    """All faces of a shape."""
+def _faces(shape: Any, chord_mm: float, kind: Kind) -> tuple[dict[str, Any], list[NDArray[Any]]]:
+    """All faces of a shape. Those of IGES know nothing of each other: what adjoins is sewn together, or the mesh would gape there."""
     from OCP.TopAbs import TopAbs_FACE
 
-    return faces_of([_cast(face, "Face") for face in _parts(shape, TopAbs_FACE)], shape, chord_mm)
+    whole = _sewn(shape) if kind == "iges" else shape
+    return faces_of([_cast(face, "Face") for face in _parts(whole, TopAbs_FACE)], whole, chord_mm)
+
+
+def _sewn(shape: Any) -> Any:
+    from OCP.Bnd import Bnd_Box
+    from OCP.BRepBndLib import BRepBndLib
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_Sewing
+
+    box = Bnd_Box()
+    BRepBndLib.Add_s(shape, box)
+    sewing = BRepBuilderAPI_Sewing(max(_ADJOINS * float(box.SquareExtent()) ** 0.5, _LEAST_GAP_MM))
+    sewing.Add(shape)
+    sewing.Perform()
+    return sewing.SewedShape()
 
 
 def _parts(shape: Any, kind: Any, *but_in: Any) -> Iterator[Any]:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from inspection.surface.surface_result import Defect, SurfaceResult, Unmeasured
     from inspection.surface.surface_terms import SurfaceTerms
     from inspection.surface.triangles import TriangleSurface
+    from inspection.surface.trimmed_surface import TrimmedFace, TrimmedSurface
     from inspection.surface.weakness import Weakness
 else:
     from inspection.front_door import load_on_use
@@ -33,6 +34,7 @@ else:
         "inspection.surface.rigid_motion": ("RigidMotion",),
         "inspection.surface.spline_face": ("SplineFace",),
         "inspection.surface.triangles": ("TriangleSurface",),
+        "inspection.surface.trimmed_surface": ("TrimmedFace", "TrimmedSurface"),
         "inspection.surface.weakness": ("Weakness",),
     }
 
@@ -55,6 +57,8 @@ __all__ = [
     "SurfaceTerms",
     "SurfaceUpdate",
     "TriangleSurface",
+    "TrimmedFace",
+    "TrimmedSurface",
     "Unmeasured",
     "Weakness",
     "judge_surface",

@@ -75,6 +75,10 @@ class AdjoiningSides:
     at: Array
 
 
+_NONE = np.empty(0, dtype=np.int64)
+NO_ADJOINING = AdjoiningSides(_NONE, _NONE, _NONE, np.empty(0))
+
+
 def find_adjoining(pieces: PatchPieces, borders: PatchBorders, near_mm: float) -> AdjoiningSides:
     """Where the borders of faces, or the two ends of a closed face, lie within `near_mm` of each other."""
     count, steps = len(borders.piece), len(_AT)

@@ -10,7 +10,7 @@ from inspection.kernels.surfaces import PatchTables, project_on_patches
 from inspection.surface.feet import KILOMETRE_MM, SurfaceFeet, points_in_space, surface_feet
 from inspection.surface.item_tree import item_tree
 from inspection.surface.orientation import which_to_turn
-from inspection.surface.patch_borders import agreeing_faces, border_rows, find_adjoining, find_borders, vertex_rows
+from inspection.surface.patch_borders import NO_ADJOINING, agreeing_faces, border_rows, find_adjoining, find_borders, vertex_rows
 from inspection.surface.patch_pieces import PatchPieces, boxes_along_axes, cut_into_patches, piece_rows
 from inspection.surface.spline_face import SplineFace
 from inspection.surface.spread import shares_of, spread_within
@@ -27,6 +27,8 @@ class PatchSurface:
     """A surface of whole spline faces; `project` gives exact closest points. It satisfies `NominalSurface`.
 
     edge_tolerance_mm : borders of faces nearer to each other are one edge; None for a hundred-thousandth of the size
+    joined            : whether borders of faces adjoin at all; not where the faces of a part are cut out of them, so that their own borders
+                        are none of the part. Their outsides are then taken as they are given
     nominal_error_mm  : 0, for the faces are the nominal
 
     Raises NominalError where there is no face, or faces have no two sides.
@@ -34,7 +36,7 @@ class PatchSurface:
 
     __slots__ = ("_area", "_pieces", "_tables", "faces", "is_closed", "nominal_error_mm", "notes", "size_mm")
 
-    def __init__(self, faces: Sequence[SplineFace], edge_tolerance_mm: float | None = None) -> None:
+    def __init__(self, faces: Sequence[SplineFace], edge_tolerance_mm: float | None = None, joined: bool = True) -> None:
         if not faces:
             raise NominalError("there is no face")
         if not all((np.abs(face.control_points_mm) <= KILOMETRE_MM).all() for face in faces):
@@ -48,7 +50,7 @@ class PatchSurface:
         near_mm = _ADJOINS * self.size_mm if edge_tolerance_mm is None else edge_tolerance_mm
         outward, notes = np.where([face.reversed for face in faces], -1.0, 1.0), []
         borders = find_borders(pieces)
-        adjoining = find_adjoining(pieces, borders, near_mm)
+        adjoining = find_adjoining(pieces, borders, near_mm) if joined else NO_ADJOINING
         by_face = np.bincount(pieces.face, self._area).astype(np.float64)
         turned, hopeless = which_to_turn(by_face, *agreeing_faces(pieces, borders, adjoining, outward))
         if len(hopeless):
