@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from drivers.codecs.register_survey import KINDS, TABLES, WORD_ORDERS, RegisterSurvey, Table, WordOrder, registers_of, stored_number
     from drivers.errors import CadError, DeviceError, DeviceRefused, LinkError, MeshError, PointFileError, ProtocolError
     from drivers.files.column_choice import AxisName
+    from drivers.files.normals import read_normals
     from drivers.files.point_file import PointArraySource, PointFile, PointFileSource, convert_to_mm, points_in, points_of, read_points
     from drivers.files.row_reading import shorten
     from drivers.files.stated_units import UnitName, mm_per
@@ -67,6 +68,7 @@ else:
         ),
         "drivers.errors": ("CadError", "DeviceError", "DeviceRefused", "LinkError", "MeshError", "PointFileError", "ProtocolError"),
         "drivers.files.column_choice": ("AxisName",),
+        "drivers.files.normals": ("read_normals",),
         "drivers.files.point_file": (
             "PointArraySource",
             "PointFile",
@@ -163,6 +165,7 @@ __all__ = [
     "points_in",
     "points_of",
     "read_bytes",
+    "read_normals",
     "read_points",
     "read_text",
     "register_map",

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers import CadError, MeshError, PointFileError, read_points
+from drivers import CadError, MeshError, PointFileError, read_normals, read_points
 from drivers.cad import CadFace, CadFaces, Kind, read_cad_faces
-from drivers.surface import Open3DMissing, Open3DProcess, SurfaceMesh, read_obj, read_stl
+from drivers.surface import Open3DMissing, Open3DProcess, SurfaceMesh, is_ply_cloud, read_obj, read_ply_cloud, read_stl
 from inspection import NominalError
 from inspection.surface import CloudSurface, NominalSurface, PatchSurface, SplineFace, TriangleSurface, TrimmedFace, TrimmedSurface
 
@@ -61,7 +61,9 @@ def load_surface(
     if kind not in SURFACE_SUFFIXES:
         raise NominalError(f"{path}: not a format of surfaces; known are {', '.join(SURFACE_SUFFIXES)}")
     if kind in _CLOUDS:
-        return _of_cloud(path, scale)
+        return _of_points(path, scale)
+    if kind == ".ply" and _is_cloud(path):
+        return _of_vertices(path, scale)
     mesh = _read_mesh(path, kind, scale)
     triangles = np.concatenate([np.array(piece, dtype=np.float64) for piece in mesh.pieces()])
     rounding = _rounding_mm(triangles, scale) if mesh.kind == "binary STL" else 0.0
@@ -74,16 +76,36 @@ def load_surface(
     return SurfaceFile(surface, mesh.kind, len(surface), (*notes, *surface.notes))
 
 
-def _of_cloud(path: Path, scale: float) -> SurfaceFile:
+def _of_points(path: Path, scale: float) -> SurfaceFile:
     try:
         found = read_points(path, scale)
-        cloud = CloudSurface(found.points_mm)
+        return _of_cloud(path, found.points_mm, read_normals(path), "points", found.notes)
     except PointFileError as error:
         raise NominalError(str(error)) from None
+
+
+def _is_cloud(path: Path) -> bool:
+    try:
+        return is_ply_cloud(path)
+    except MeshError as error:
+        raise NominalError(str(error)) from None
+
+
+def _of_vertices(path: Path, scale: float) -> SurfaceFile:
+    try:
+        found = read_ply_cloud(path, scale)
+    except MeshError as error:
+        raise NominalError(str(error)) from None
+    return _of_cloud(path, found.points_mm, found.normals, "PLY points", ())
+
+
+def _of_cloud(path: Path, points_mm: Array, normals: Array | None, source_format: str, notes: tuple[str, ...]) -> SurfaceFile:
+    try:
+        cloud = CloudSurface(points_mm, normals)
     except NominalError as error:
         raise NominalError(f"{path}: {error}") from None
     words = f"the nominal is a cloud of points: by how its jets disagree it lies up to {cloud.nominal_error_mm:.2g} mm off (95 %)"
-    return SurfaceFile(cloud, "points", len(cloud), (*found.notes, *cloud.notes, words))
+    return SurfaceFile(cloud, source_format, len(cloud), (*notes, *cloud.notes, words))
 
 
 def _read_mesh(path: Path, kind: str, scale: float) -> SurfaceMesh:

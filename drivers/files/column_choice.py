@@ -87,7 +87,7 @@ def _first_ones(table: Columns, count: int) -> tuple[dict[AxisName, int], list[s
             f"the first column counts the rows ({counted} ...); expected x, y, z first, or a header line that names the columns x, y, z, "
             "or say which they are (columns x=2,y=3,z=4)"
         )
-    if (count == 6 and _are_directions(table.values)) or (count == 4 and _counts(values[:, 3])):
+    if (count == 6 and are_directions(table.values)) or (count == 4 and _counts(values[:, 3])):
         return first_three, [f"the first three of {count} columns taken as x, y, z"]
     raise PointFileError(
         f"{count} columns without names: which of them are x, y and z? Expected a header line that names them, "
@@ -121,7 +121,7 @@ def _with_numbers(values: Array) -> Array:
     return values[np.isfinite(values).all(axis=1)]
 
 
-def _are_directions(values: Array) -> bool:
+def are_directions(values: Array) -> bool:
     """Tell whether the last three of six columns are vectors that all have length 1, in rows whose numbers are all there."""
     count = 0
     for first in range(0, len(values), _BEGINNING):

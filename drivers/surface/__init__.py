@@ -7,6 +7,7 @@ from drivers.surface.contour_source import Contour, ContourSource, Gap, SurfaceS
 from drivers.surface.cut import Cutter, NumpyCutter, cut_surface, height_range_mm
 from drivers.surface.obj_file import read_obj
 from drivers.surface.open3d_process import Open3DMissing, Open3DProcess, Open3DStatus, mend_open3d, open3d_status
+from drivers.surface.ply_cloud import PlyCloud, is_ply_cloud, read_ply_cloud
 from drivers.surface.section_axes import SectionAxes, axes_of
 from drivers.surface.stl_file import SurfaceMesh, read_stl, surface_of
 
@@ -19,6 +20,7 @@ __all__ = [
     "Open3DMissing",
     "Open3DProcess",
     "Open3DStatus",
+    "PlyCloud",
     "SectionAxes",
     "SurfaceMesh",
     "SurfaceSection",
@@ -26,9 +28,11 @@ __all__ = [
     "axes_of",
     "cut_surface",
     "height_range_mm",
+    "is_ply_cloud",
     "mend_open3d",
     "open3d_status",
     "read_obj",
+    "read_ply_cloud",
     "read_stl",
     "surface_of",
 ]

@@ -4,6 +4,8 @@ Jets overlap, and the nearest one answers. Where neighbouring jets disagree, so 
 the error that is stated. Around the edge of a cloud there are no jets: a foot there is beyond an edge.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array
@@ -13,7 +15,7 @@ from scipy.spatial import cKDTree
 from inspection.errors import NominalError
 from inspection.kernels.surfaces import PatchTables, project_on_patches
 from inspection.kernels.surfaces.layout import BORDER_STEPS, INNER, LINKS, PLACE_WIDTH, SIDES, WIDTH_CUBIC
-from inspection.surface.feet import SurfaceFeet, points_in_space, surface_feet
+from inspection.surface.feet import FootKind, SurfaceFeet, points_in_space, surface_feet
 from inspection.surface.item_tree import item_tree
 from inspection.surface.patch_pieces import PatchPieces, boxes_along_axes, piece_rows
 from inspection.surface.spread import shares_of
@@ -26,31 +28,33 @@ _NEAR = 8  # that jets are compared with
 _REACH = 1.0  # half the side of a jet, in distances of its nearest neighbours
 _WIDEST_GAP = 0.6 * np.pi  # between the directions of neighbours: at the edge of a cloud it is wider
 _SURE = 0.95  # of the places that the stated error holds for
-_SAFETY = 1.25
+_SAFETY = 1.75  # times their disagreement: neighbours share most of their points, and err alike
 _MOST_POINTS = 500_000
 
 
 class CloudSurface:
     """A surface through points (n, 3); `project` gives closest points on its jets. It satisfies `NominalSurface`.
 
-    normals : (n, 3) outward, of any length, where the cloud has them; None lets them agree with each other, most of them away from the
-              middle of the points, and says so
+    normals     : (n, 3) outward, of any length, where the cloud has them; a point without one, zero or NaN, takes that of the nearest. None
+                  lets them agree with each other, and away from the middle of the points
+    sides_known : whether the outside is known: by normals, or because the cloud is closed. Else deviations may have the wrong sign
 
-    Raises NominalError for points that lie on no surface.
+    Points that are not finite are left out. Raises NominalError for points that lie on no surface.
     """
 
-    __slots__ = ("_places", "_tables", "area_mm2", "nominal_error_mm", "normals", "notes", "size_mm")
+    __slots__ = ("_places", "_tables", "area_mm2", "nominal_error_mm", "normals", "notes", "sides_known", "size_mm")
 
     def __init__(self, points_mm: ArrayLike, normals: ArrayLike | None = None) -> None:
-        points = points_in_space(points_mm)
-        points = np.unique(points[np.isfinite(points).all(axis=1)], axis=0) if normals is None else points
-        if not _NEIGHBOURS < len(points) <= _MOST_POINTS or not np.isfinite(points).all():
+        points, given = _usable(points_in_space(points_mm), normals)
+        if not _NEIGHBOURS < len(points) <= _MOST_POINTS:
             raise NominalError(f"a cloud needs more than {_NEIGHBOURS} and at most {_MOST_POINTS:,} finite points, got {len(points)}")
         self.size_mm = float(np.ptp(points, axis=0).max())
         near, around = _neighbours(points)
         frames = _frames(points, around)
-        self.notes = _turn_outward(frames, points, around, normals)
         is_edge = _is_at_edge(points, around, frames)
+        _turn_outward(frames, points, around, given)
+        self.sides_known = given is not None or not is_edge.any()
+        self.notes = _words_on_sides(given is not None, self.sides_known)
         spacing = near[:, 1 : _NEAR + 1].mean(axis=1)
         jets = _jets(points, around, frames)
         inner = np.flatnonzero(~is_edge)
@@ -67,8 +71,15 @@ class CloudSurface:
         return len(self._places)
 
     def project(self, points_mm: ArrayLike, threads: int | None = None) -> SurfaceFeet:
-        """Closest points of the jets to points (m, 3); see `NominalSurface`. The face of a foot is the number of its jet."""
-        return surface_feet(project_on_patches(points_in_space(points_mm), self._tables, threads), self.nominal_error_mm)
+        """Closest points of the jets to points (m, 3); see `NominalSurface`. The face of a foot is the number of its jet.
+
+        A place that no jet covers, in a hole of the cloud, is beyond an edge: from the side of a jet it is farther than from the surface.
+        """
+        points = points_in_space(points_mm)
+        feet = surface_feet(project_on_patches(points, self._tables, threads), self.nominal_error_mm)
+        along = np.abs(((points - feet.foot_mm) * self.normals[feet.face]).sum(axis=1))
+        in_hole = (feet.kind == FootKind.EDGE) & (np.abs(feet.distance_mm) - along > self.nominal_error_mm)
+        return replace(feet, kind=np.where(in_hole, np.uint8(FootKind.BORDER), feet.kind))
 
     def sample(self, count: int) -> tuple[Array, Array]:
         """The points that jets stand on, each as often as it takes to have `count` (n, 3), and the outward normals (n, 3) there."""
@@ -91,14 +102,40 @@ def _frames(points: Array, around: Index) -> Array:
     return frames
 
 
-def _turn_outward(frames: Array, points: Array, around: Index, normals: ArrayLike | None) -> tuple[str, ...]:
-    """Turn frames so that their normals point out of material; returns what was assumed."""
-    if normals is not None:
-        given = np.asarray(normals, dtype=np.float64)
-        if given.shape != points.shape:
-            raise NominalError(f"normals must have shape {points.shape}, got {given.shape}")
-        _turn_over(frames, (frames[:, 2] * given).sum(axis=1) < 0)
+def _usable(points: Array, normals: ArrayLike | None) -> tuple[Array, Array | None]:
+    """The finite points (n, 3) that differ, with their normals (n, 3); those without a normal take that of the nearest."""
+    if normals is None:
+        return np.unique(points[np.isfinite(points).all(axis=1)], axis=0), None
+    given = np.asarray(normals, dtype=np.float64)
+    if given.shape != points.shape:
+        raise NominalError(f"normals must have shape {points.shape}, got {given.shape}")
+    finite = np.isfinite(points).all(axis=1)
+    kept, first = np.unique(points[finite], axis=0, return_index=True)
+    given = given[finite][first]
+    has_one = np.isfinite(given).all(axis=1) & (given != 0).any(axis=1)
+    if not has_one.any():
+        return kept, None
+    if not has_one.all():
+        given[~has_one] = given[has_one][cKDTree(kept[has_one]).query(kept[~has_one])[1]]
+    return kept, given
+
+
+def _words_on_sides(has_normals: bool, sides_known: bool) -> tuple[str, ...]:
+    if has_normals:
         return ()
+    if sides_known:
+        return ("the cloud has no normals; it is closed, and its outside is away from the middle of its points",)
+    return (
+        "the cloud has no normals and is not closed: the side away from the middle of its points is taken for the outside, but it may be "
+        "the other one. Deviations have no sure sign, and only their size may be judged: bring the cloud with normals",
+    )
+
+
+def _turn_outward(frames: Array, points: Array, around: Index, normals: Array | None) -> None:
+    """Turn frames so that their normals point out of material, as far as that is known."""
+    if normals is not None:
+        _turn_over(frames, (frames[:, 2] * normals).sum(axis=1) < 0)
+        return
     n = len(points)
     rows = np.repeat(np.arange(n, dtype=np.int32), _NEAR)  # scipy before 1.16 walks graphs with 32-bit numbers only
     columns = around[:, 1 : _NEAR + 1].ravel().astype(np.int32)
@@ -114,7 +151,6 @@ def _turn_outward(frames: Array, points: Array, around: Index, normals: ArrayLik
     outward = ((points - points.mean(axis=0)) * frames[:, 2]).sum()
     if outward < 0:
         _turn_over(frames, np.ones(n, dtype=bool))
-    return ("the cloud has no normals: the side away from the middle of its points is taken for the outside",)
 
 
 def _turn_over(frames: Array, which: NDArray[np.bool_]) -> None:

@@ -75,6 +75,10 @@ class NominalSurface(Protocol):
         """Bound of how far this surface may lie off the one that it stands for, anywhere. `SurfaceFeet.error_mm` is that of each point."""
 
     @property
+    def sides_known(self) -> bool:
+        """Whether it is known which side of this surface is out of material; else only the size of a deviation may be judged."""
+
+    @property
     def area_mm2(self) -> float:
         """Area of the surface."""
 

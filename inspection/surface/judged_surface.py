@@ -54,7 +54,10 @@ def judge_points(
     """
     feet = nominal.project(pose.apply(points_mm))
     rejection = rejections(feet, farthest_mm, None if normals is None else pose.turn(normals))
-    verdicts = np.where(rejection == Rejection.NONE, zone.verdicts(feet.distance_mm, feet.error_mm), np.int8(NOT_JUDGED)).astype(np.int8)
+    judged = zone.verdicts(feet.distance_mm, feet.error_mm)
+    if not nominal.sides_known:  # what holds for one side only is not proven
+        judged = np.where(judged == zone.verdicts(-feet.distance_mm, feet.error_mm), judged, np.int8(Verdict.UNCERTAIN))
+    verdicts = np.where(rejection == Rejection.NONE, judged, np.int8(NOT_JUDGED)).astype(np.int8)
     return JudgedPoints(feet, verdicts, rejection)
 
 

@@ -34,7 +34,7 @@ class PatchSurface:
     Raises NominalError where there is no face, or faces have no two sides.
     """
 
-    __slots__ = ("_area", "_pieces", "_tables", "faces", "is_closed", "nominal_error_mm", "notes", "size_mm")
+    __slots__ = ("_area", "_pieces", "_tables", "faces", "is_closed", "nominal_error_mm", "notes", "sides_known", "size_mm")
 
     def __init__(self, faces: Sequence[SplineFace], edge_tolerance_mm: float | None = None, joined: bool = True) -> None:
         if not faces:
@@ -43,6 +43,7 @@ class PatchSurface:
             raise NominalError("a control point is farther than a kilometre from zero")
         every = np.concatenate([face.control_points_mm.reshape(-1, 3) for face in faces])
         self.faces = tuple(faces)
+        self.sides_known = True
         self.size_mm = float(np.ptp(every, axis=0).max())
         self.nominal_error_mm = 0.0
         pieces = self._pieces = cut_into_patches(faces, self.size_mm)

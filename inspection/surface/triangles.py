@@ -28,7 +28,7 @@ class TriangleSurface:
     Raises NominalError for triangles (n, 3, 3) of which no surface can be made.
     """
 
-    __slots__ = ("_corners_mm", "_face", "_tables", "area_mm2", "is_closed", "nominal_error_mm", "notes", "size_mm")
+    __slots__ = ("_corners_mm", "_face", "_tables", "area_mm2", "is_closed", "nominal_error_mm", "notes", "sides_known", "size_mm")
 
     def __init__(self, triangles_mm: ArrayLike, nominal_error_mm: float = 0.0, face: ArrayLike | None = None) -> None:
         loose = np.asarray(triangles_mm, dtype=np.float64)
@@ -43,6 +43,7 @@ class TriangleSurface:
         self.is_closed = not welded.is_open.any()
         self.nominal_error_mm = float(nominal_error_mm)
         self.notes = welded.notes
+        self.sides_known = True
         self.size_mm = float(np.ptp(welded.corners_mm, axis=0).max())
         given = welded.given
         self._face = (given if face is None else np.asarray(face)[given]).astype(np.int32)

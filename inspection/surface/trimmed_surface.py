@@ -49,12 +49,25 @@ class TrimmedSurface:
     Raises NominalError where no surface can be made of them.
     """
 
-    __slots__ = ("_hidden", "_mesh", "_numbers", "_parts", "_splines", "area_mm2", "is_closed", "nominal_error_mm", "notes", "size_mm")
+    __slots__ = (
+        "_hidden",
+        "_mesh",
+        "_numbers",
+        "_parts",
+        "_splines",
+        "area_mm2",
+        "is_closed",
+        "nominal_error_mm",
+        "notes",
+        "sides_known",
+        "size_mm",
+    )
 
     def __init__(self, faces: Sequence[TrimmedFace | None], triangles_mm: ArrayLike, owner: ArrayLike, error_mm: float) -> None:
         triangles, number = np.asarray(triangles_mm, dtype=np.float64), np.asarray(owner, dtype=np.int64)
         mesh = self._mesh = TriangleSurface(triangles, error_mm, number)
         self.area_mm2, self.is_closed, self.size_mm = mesh.area_mm2, mesh.is_closed, mesh.size_mm
+        self.sides_known = True
         self.nominal_error_mm, self.notes = mesh.nominal_error_mm, mesh.notes
         self._parts = [_part(i, face, triangles[number == i], mesh) for i, face in enumerate(faces) if (number == i).any()]
         known = [part for part in self._parts if part.spline is not None]

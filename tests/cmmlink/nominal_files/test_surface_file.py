@@ -111,6 +111,61 @@ def test_a_cloud_states_its_error(tmp_path: Path) -> None:
         load_surface(Path(write(tmp_path / "few.xyz", "1 2 3\n4 5 6\n")))
 
 
+@pytest.mark.parametrize("order", ["ascii", "binary_little_endian", "binary_big_endian"])
+def test_a_cloud_in_ply_brings_its_normals(tmp_path: Path, order: str) -> None:
+    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(30.0), np.arange(20.0)))
+    table = np.column_stack([x, y, 0.01 * x**2, *np.tile((0.0, 0.0, -1.0), (600, 1)).T, np.arange(600.0)])
+    names = ("x", "y", "z", "nx", "ny", "nz", "quality")
+    kinds = ["double"] * 3 + ["float"] * 4
+    properties = "".join(f"property {kind} {name}\n" for kind, name in zip(kinds, names, strict=True))
+    header = f"ply\nformat {order} 1.0\ncomment a scan\nelement vertex 600\n{properties}end_header\n".encode()
+    sign = ">" if "big" in order else "<"
+    rows = np.rec.fromarrays(
+        list(table.T), dtype=[(name, sign + ("f8" if kind == "double" else "f4")) for name, kind in zip(names, kinds, strict=True)]
+    )
+    body = rows.tobytes() if order != "ascii" else "".join(" ".join(f"{value:g}" for value in row) + "\n" for row in table).encode()
+    (tmp_path / "sheet.ply").write_bytes(header + body)
+    found = load_surface(tmp_path / "sheet.ply", scale=2.0)
+    assert isinstance(found.nominal, CloudSurface)
+    assert found.nominal.sides_known
+    assert found.source_format == "PLY points"
+    assert found.nominal.project([(30, 20, 4.5 + 0.1)]).distance_mm == pytest.approx([-0.1], abs=0.01)
+    (tmp_path / "sheet.ply").write_bytes((header + body)[:-40])
+    with pytest.raises(NominalError, match=r"sheet\.ply: truncated: it announces 600 vertices"):
+        load_surface(tmp_path / "sheet.ply")
+
+
+def test_a_table_of_points_brings_its_normals_by_name_or_as_six_columns(tmp_path: Path) -> None:
+    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(30.0), np.arange(20.0)))
+    table = np.column_stack([x, y, np.sin(x / 9), *np.tile((0.0, 0.0, -1.0), (600, 1)).T])
+    np.savetxt(tmp_path / "six.xyz", table, fmt="%.6f")
+    np.savetxt(tmp_path / "named.asc", table[:, [3, 4, 5, 0, 1, 2]], fmt="%.6f", header="nx ny nz x y z", comments="")
+    np.savetxt(tmp_path / "three.xyz", table[:, :3], fmt="%.6f")
+    for name, known in (("six.xyz", True), ("named.asc", True), ("three.xyz", False)):
+        found = load_surface(tmp_path / name)
+        assert isinstance(found.nominal, CloudSurface)
+        assert found.nominal.sides_known == known
+        assert any("may be judged" in note for note in found.notes) != known
+        if known:
+            assert found.nominal.normals[:, 2].max() < 0
+
+
+@pytest.mark.parametrize(
+    ("header", "words"),
+    [
+        ("format text 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n", "no format of PLY"),
+        ("format ascii 1.0\nelement edge 3\nproperty int a\n", "first element is not `vertex`"),
+        ("format ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n", "no x, y and z"),
+        ("format ascii 1.0\nelement vertex 3\nproperty list uchar int x\n", "is no number"),
+        ("format ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n", "vertex 2 is no 3 numbers"),
+    ],
+)
+def test_a_cloud_in_ply_that_cannot_be_read_is_refused_in_words(tmp_path: Path, header: str, words: str) -> None:
+    (tmp_path / "bad.ply").write_text(f"ply\n{header}end_header\n1 2 3\n4 five 6\n7 8 9\n", encoding="ascii")
+    with pytest.raises(NominalError, match=rf"bad\.ply: .*{words}"):
+        load_surface(tmp_path / "bad.ply")
+
+
 def test_what_is_no_surface_is_refused_with_the_file(cad_files: Path, occt_process: OcctProcess, tmp_path: Path) -> None:
     with pytest.raises(NominalError, match=r"wire-AP203-MM\.step: holds no face"):
         load_surface(cad_files / "wire-AP203-MM.step", read_faces=occt_process.read_faces)

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from inspection import NominalError, Rejection
-from inspection.surface import CloudSurface, PatchSurface, rejections
+from inspection import NominalError, Rejection, ToleranceZone, Verdict
+from inspection.surface import CloudSurface, PatchSurface, RigidMotion, rejections
+from inspection.surface.judged_surface import judge_points
 from tests.inspection.surface import faces
 
 Array = NDArray[np.float64]
@@ -28,12 +29,60 @@ def test_the_stated_error_covers_95_percent_of_the_points(noise_mm: float) -> No
     assert error.max() < 3 * cloud.nominal_error_mm
 
 
+@pytest.mark.parametrize(("noise_mm", "spacing_mm"), [(0.0, 0.8), (0.005, 0.8), (0.005, 1.6), (0.02, 1.6)])
+def test_the_stated_error_covers_points_that_lie_by_chance(noise_mm: float, spacing_mm: float) -> None:
+    """Samples as a scanner takes them, not on a grid, of a form whose foot is known: a bent tube, concave inside and convex outside."""
+    rng = np.random.default_rng(8)
+    ring, tube, count = 40.0, 12.0, int(4 * np.pi**2 * 40 * 12 / 6 / spacing_mm**2)
+
+    def places(m: int, off: Array) -> tuple[Array, Array]:
+        along, about = rng.uniform(0, np.pi / 3, m), rng.uniform(0, 2 * np.pi, m)
+        normal = np.column_stack([np.cos(about) * np.cos(along), np.cos(about) * np.sin(along), np.sin(about)])
+        middle = ring * np.column_stack([np.cos(along), np.sin(along), np.zeros(m)])
+        return middle + (tube + off)[:, None] * normal, normal
+
+    sampled, normals = places(count, rng.normal(0, noise_mm, count))
+    cloud = CloudSurface(sampled, normals)
+    off = rng.uniform(-0.5, 0.5, 2000)
+    points, _ = places(2000, off)
+    feet = cloud.project(points)
+    judged = rejections(feet, 5.0) == Rejection.NONE
+    assert judged.mean() > 0.95
+    error = np.abs(feet.distance_mm - off)[judged]
+    assert (error <= cloud.nominal_error_mm).mean() >= 0.95
+    assert error.max() < 4 * cloud.nominal_error_mm  # nor is one in a hole of the cloud far off
+
+
+def test_what_a_cloud_lacks_is_said_and_what_it_has_is_used() -> None:
+    """An open sheet without normals has no sure side; with normals it has, though some points lack theirs or stand twice."""
+    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.0, 30), np.arange(0.0, 20)))
+    sheet = np.column_stack([x, y, 0.01 * x**2])
+    blind = CloudSurface(sheet)
+    assert not blind.sides_known
+    assert "only their size may be judged" in blind.notes[0]
+    point = [(15, 10, 2.25 + 0.1)]
+    zone = ToleranceZone(-0.05, 0.3)
+    verdicts = [judge_points(np.array(point), None, each, RigidMotion.identity(), zone, 5.0).verdicts for each in (blind, _seen(sheet))]
+    assert [each.tolist() for each in verdicts] == [[Verdict.UNCERTAIN], [Verdict.CONFORM]]
+
+
+def _seen(sheet: Array) -> CloudSurface:
+    normals = np.tile((0.0, 0.0, 2.0), (len(sheet), 1))
+    normals[5:40] = np.nan
+    cloud = CloudSurface(np.concatenate([sheet, sheet[:9], [(np.nan, 0, 0)]]), np.concatenate([normals, normals[:9], [(0, 0, 1)]]))
+    assert cloud.sides_known
+    assert cloud.notes == ()
+    assert (cloud.normals[:, 2] > 0).all()
+    return cloud
+
+
 def test_a_round_cloud_without_normals_finds_its_outside_and_has_no_edge() -> None:
     golden, k = np.pi * (3 - 5**0.5), np.arange(3000) + 0.5
     z = 1 - 2 * k / 3000
     sphere = 20 * np.column_stack([np.sqrt(1 - z * z) * np.cos(golden * k), np.sqrt(1 - z * z) * np.sin(golden * k), z])
     cloud = CloudSurface(sphere)
-    assert "no normals" in cloud.notes[0]
+    assert "no normals; it is closed" in cloud.notes[0]
+    assert cloud.sides_known
     direction = np.random.default_rng(3).normal(size=(400, 3))
     direction /= np.linalg.norm(direction, axis=1)[:, None]
     radius = np.random.default_rng(4).uniform(18, 22, 400)
