@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inspection.errors import RegistrationError
-from inspection.surface.feet import FootKind, NominalSurface, points_in_space
+from inspection.surface.feet import NominalSurface, points_in_space
+from inspection.surface.pose_steps import FitProblem, SettledPose, linearise, settle_pose, step_of
 from inspection.surface.rigid_motion import RigidMotion
 from inspection.surface.weakness import Weakness, weakness_of
 
@@ -21,14 +22,12 @@ Truth = NDArray[np.bool_]
 SurfaceFreedom = Literal["x", "y", "z", "rx", "ry", "rz"]
 
 _FREEDOMS = get_args(SurfaceFreedom)
-_STEPS = 100
-_SETTLED = 1e-11  # of the size: a step at the rim of the points after which the pose is found
-_HELD = 1e-8  # part of the strongest direction's stiffness below which a direction has no minimum, and is held
 _CELL = 0.01  # of the size: points in one cell share its weight
 _FEWEST = 6
 _MADS = 6.0  # median absolute deviations beyond which a point is an outlier, as for profiles
+_MANY, _AHEAD = 1 << 17, 1 << 14  # points from which on a choice of so many goes ahead
 _ROUNDS = 20  # in which outliers are found anew
-_FEW = 500  # points that a pose is tried with
+_FEW, _TRIES = 500, 25  # points that a pose is tried with, and steps
 _PLACES = 4000  # of the nominal from which its axes are taken
 _WORST = 0.1  # of the points that are left out while a pose is tried
 _RIVAL = 1.1  # times the least rms: another pose that fits as well
@@ -42,8 +41,8 @@ class SurfaceRegistration:
 
     nominal_from_scan : the motion that brings points of the scan onto the nominal
     rms_mm            : root of the mean square of the deviations from the target, weighted by area, of the points that took part
-    steps             : of Gauss and Newton's method
-    converged         : whether the last one was below round-off
+    steps             : of Gauss and Newton's method, those of a choice of the points included
+    converged         : whether those to come are below round-off
     used              : (m,) points that took part: those with a foot inside the surface that are no outliers
     outlier           : (m,) points left out as outliers, by six median deviations; none unless that was asked for
     weakest           : the direction that the points determine least; directions that they do not determine at all were held
@@ -109,9 +108,9 @@ def register_surface(
     if start is None:
         start, others = _seek(given, weights, nominal, target_mm)
     free = np.array([name not in locked for name in _FREEDOMS])
-    limits = gross_mm, farthest_mm
-    found = _fit(given, weights, nominal, start, free, target_mm, limits)
-    rivals = tuple(_fit(given, weights, nominal, other, free, target_mm, limits).nominal_from_scan for other in others)
+    problem = FitProblem(given, weights, nominal, free, target_mm)
+    found = _fit(problem, start, gross_mm, farthest_mm)
+    rivals = tuple(_fit(problem, other, gross_mm, farthest_mm).nominal_from_scan for other in others)
     used, outlier = (np.zeros(len(points), dtype=bool) for _ in range(2))
     same = np.cumsum(is_new) - 1
     used[order], outlier[order] = found.used[same], found.outlier[same]
@@ -126,33 +125,22 @@ def _weights(points: Array, cell_mm: float) -> Array:
     return np.asarray(1.0 / count[number.ravel()])
 
 
-def _fit(
-    points: Array,
-    weights: Array,
-    nominal: NominalSurface,
-    start: RigidMotion,
-    free: Truth,
-    target_mm: float,
-    limits: tuple[float | None, float],
-) -> SurfaceRegistration:
-    """The pose of least squares from a start; what lies too far off, by the limits, is left out until that stays the same."""
-    outlier = np.zeros(len(points), dtype=bool)
-    found = _settle(points, weights, nominal, start, free, target_mm, outlier)
-    gross_mm, farthest_mm = limits
-    if gross_mm is None and farthest_mm == np.inf:
-        return found
+def _fit(problem: FitProblem, start: RigidMotion, gross_mm: float | None, farthest_mm: float) -> SurfaceRegistration:
+    """The pose of least squares from a start; what lies too far off is left out until that stays the same."""
+    outlier = np.zeros(len(problem.points), dtype=bool)
+    found = _settle_many(problem, start, outlier)
     for _ in range(_ROUNDS):
-        feet = nominal.project(found.nominal_from_scan.apply(points))
-        inside = feet.kind < FootKind.BORDER
-        now = inside & (np.abs(feet.distance_mm) > farthest_mm)
+        off = found.state.off_mm
+        now = np.abs(off) > farthest_mm  # never where there is no deviation
         if gross_mm is not None:
-            off = np.abs(feet.distance_mm - _median(feet.distance_mm[inside], weights[inside]))
-            now |= inside & (off > max(gross_mm, _MADS * _median(off[inside], weights[inside])))
-        if (now == outlier).all():
+            inside = ~np.isnan(off)
+            away = np.abs(off - _median(off[inside], problem.weights[inside]))
+            now |= away > max(gross_mm, _MADS * _median(away[inside], problem.weights[inside]))
+        if np.array_equal(now, outlier):
             break
         outlier = now
-        found = _settle(points, weights, nominal, found.nominal_from_scan, free, target_mm, outlier)
-    return found
+        found = _settle_many(problem, found.motion, outlier, found.bend)
+    return _registration(problem, found, outlier)
 
 
 def _median(values: Array, weights: Array) -> float:
@@ -162,77 +150,24 @@ def _median(values: Array, weights: Array) -> float:
     return float(values[order][np.searchsorted(sums, sums[-1] / 2)])
 
 
-def _settle(
-    points: Array, weights: Array, nominal: NominalSurface, start: RigidMotion, free: Truth, target_mm: float, outlier: Truth
-) -> SurfaceRegistration:
-    """Gauss and Newton's method: rows [n, (x - c) x n] of the deviations' change by shift and turn about the middle c of the points.
+def _settle_many(problem: FitProblem, start: RigidMotion, left_out: Truth, bend: Array | None = None) -> SettledPose:
+    """The same of any number of points: from many a choice goes ahead, so that all of them are looked at a few times only."""
+    m, steps = len(problem.points), 0
+    if m > _MANY and bend is None:
+        some = np.unique(np.linspace(0, m - 1, _AHEAD).astype(np.int64))
+        ahead = settle_pose(problem.some(some), start, left_out[some])
+        start, bend, steps = ahead.motion, ahead.bend, ahead.steps
+    found = settle_pose(problem, start, left_out, bend)
+    return replace(found, steps=steps + found.steps)
 
-    A step after which the deviations grow is taken back and damped.
-    """
-    motion, damping, steps, converged = start, 0.0, 0, False
-    state = _linearise(points, weights, nominal, motion, target_mm, outlier)
-    while steps < _STEPS and not converged:
-        change = _step(state, free, damping)
-        steps += 1
-        following = RigidMotion.about(state.centre, change[3:], change[:3]).after(motion)
-        there = _linearise(points, weights, nominal, following, target_mm, outlier)
-        rim = float(np.linalg.norm(change[:3]) + np.linalg.norm(change[3:]) * state.radius)
-        converged = rim <= _SETTLED * nominal.size_mm
-        if there.mean_square > state.mean_square * (1 + 1e-6) and not converged:
-            damping = max(10 * damping, 1e-3)
-            continue
-        motion, state, damping = following, there, damping / 10 if damping > 1e-6 else 0.0
-    places, normals = nominal.sample(_PLACES)
+
+def _registration(problem: FitProblem, found: SettledPose, outlier: Truth) -> SurfaceRegistration:
+    """The record of a pose."""
+    state, rms = found.state, float(np.sqrt(found.state.mean_square))
+    places, normals = problem.nominal.sample(_PLACES)
     whole = np.column_stack([normals, np.cross(places - state.centre, normals)])
-    weakest = weakness_of(state.rows, state.weights, state.arms, free, float(np.sqrt(state.mean_square)), whole)
-    return SurfaceRegistration(motion, float(np.sqrt(state.mean_square)), steps, converged, state.used, outlier, weakest, state.centre)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _State:
-    """What a step needs of a pose: rows (k, 6), residuals, weights and arms from the centre of the k points that take part."""
-
-    rows: Array
-    residual: Array
-    weights: Array
-    arms: Array
-    centre: Array
-    radius: float
-    mean_square: float
-    used: Truth
-
-
-def _linearise(points: Array, weights: Array, nominal: NominalSurface, motion: RigidMotion, target_mm: float, outlier: Truth) -> _State:
-    moved = motion.apply(points)
-    feet = nominal.project(moved)
-    used = (feet.kind < FootKind.BORDER) & ~outlier
-    if np.count_nonzero(used) < _FEWEST:
-        raise RegistrationError(
-            f"only {np.count_nonzero(used)} of {len(points)} points lie on the surface, at least {_FEWEST} are needed: is it "
-            "the right part, and the right unit?"
-        )
-    x, n, w = moved[used], feet.normal[used], weights[used]
-    centre = (x * w[:, None]).sum(axis=0) / w.sum()
-    arms = x - centre
-    residual = feet.distance_mm[used] - target_mm
-    radius = float(np.sqrt((arms**2).sum(axis=1).max()))
-    return _State(
-        np.column_stack([n, np.cross(arms, n)]), residual, w, arms, centre, radius, float((w * residual**2).sum() / w.sum()), used
-    )
-
-
-def _step(state: _State, free: Truth, damping: float) -> Array:
-    """The shift and turn (6,) that bring the linearised deviations to the least squares. What has no minimum is held."""
-    scale = np.array([1.0] * 3 + [1.0 / state.radius] * 3)  # turns by the way that the rim goes
-    rows = (state.rows * scale)[:, free]
-    normal = np.einsum("mi,mj,m->ij", rows, rows, state.weights)
-    values, vectors = np.linalg.eigh(normal)
-    slope = vectors.T @ np.einsum("mi,m,m->i", rows, state.weights, state.residual)
-    strong = values > _HELD * values[-1]
-    moved = vectors @ np.where(strong, -slope / np.where(strong, values + damping * values[-1], 1.0), 0.0)
-    change = np.zeros(6)
-    change[free] = moved
-    return np.asarray(change * scale)
+    weakest = weakness_of(state.rows, state.weights, state.arms, problem.free, rms, whole)
+    return SurfaceRegistration(found.motion, rms, found.steps, found.converged, state.used, outlier, weakest, state.centre)
 
 
 def _seek(points: Array, weights: Array, nominal: NominalSurface, target_mm: float) -> tuple[RigidMotion, list[RigidMotion]]:
@@ -289,9 +224,9 @@ def _proper_turns() -> list[Array]:
 
 def _trimmed(few: Array, nominal: NominalSurface, motion: RigidMotion, target_mm: float) -> tuple[float, RigidMotion]:
     """A pose refined with few points, the worst tenth of them left out in each step: its rms, infinite where it leaves the surface."""
-    free = np.ones(6, dtype=bool)
+    problem = FitProblem(few, np.ones(len(few)), nominal, np.ones(6, dtype=bool), target_mm)
     rms, kept = np.inf, len(few) - int(_WORST * len(few))
-    for _ in range(_STEPS // 4):
+    for _ in range(_TRIES):
         feet = nominal.project(motion.apply(few))
         off = np.abs(feet.distance_mm - target_mm)  # from borders as well, or a pose with all points beyond one would fit
         worst = np.argsort(off, kind="stable")[kept:]
@@ -302,9 +237,9 @@ def _trimmed(few: Array, nominal: NominalSurface, motion: RigidMotion, target_mm
         outlier = np.zeros(len(few), dtype=bool)
         outlier[worst] = True
         try:
-            state = _linearise(few, np.ones(len(few)), nominal, motion, target_mm, outlier)
+            state = linearise(problem, motion, outlier)
         except RegistrationError:
             return np.inf, motion
-        change = _step(state, free, 1e-6)
+        change = step_of(state, problem.free, 1e-6)
         motion = RigidMotion.about(state.centre, change[3:], change[:3]).after(motion)
     return rms, motion

@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 
 from inspection import RegistrationError
-from inspection.surface import PatchSurface, RigidMotion, TriangleSurface, register_surface
+from inspection.surface import PatchSurface, RigidMotion, TriangleSurface, register_surface, surface_fit
 from tests.inspection.surface import faces, meshes
 
 Array = NDArray[np.float64]
@@ -21,15 +21,35 @@ def apart(one: RigidMotion, other: RigidMotion, points: Array) -> float:
     return float(np.abs(one.apply(points) - other.apply(points)).max())
 
 
-def test_a_known_motion_is_found_in_few_steps() -> None:
+@pytest.mark.parametrize(("form_mm", "noise_mm"), [(0.0, 0.0), (0.02, 0.005)])
+def test_a_motion_of_one_degree_and_one_millimetre_is_found_in_six_steps(form_mm: float, noise_mm: float) -> None:
+    """Against the motion itself where there is no form error, else against where the squares have no slope left."""
     surface = PatchSurface([faces.blade(40, 5)])
-    motion = RigidMotion.about((0, 0, 70), np.radians([0.6, -0.5, 0.6]), (0.5, -0.6, 0.6))
-    points = scan_of(surface, 1200, motion)
-    found = register_surface(points, surface, RigidMotion.identity())
+    places, normals = surface.sample(1200)
+    rng = np.random.default_rng(7)
+    form = form_mm * np.sqrt(2) * np.sin(places @ np.array([0.11, 0.07, 0.05])) + noise_mm * rng.normal(size=len(places))
+    for turn, shift in (((0.6, -0.5, 0.6), (0.5, -0.6, 0.6)), ((-0.2, 0.9, 0.38), (-0.7, 0.1, 0.7))):
+        motion = RigidMotion.about((0, 0, 70), np.radians(turn), shift)
+        points = motion.inverse().apply(places + form[:, None] * normals)
+        found = register_surface(points, surface, RigidMotion.identity())
+        assert found.converged
+        assert found.steps <= 6
+        again = register_surface(points, surface, found.nominal_from_scan) if form_mm else found
+        exact = again.nominal_from_scan if form_mm else motion
+        assert apart(found.nominal_from_scan, exact, points) < 1e-9 * (1 if form_mm else 10)  # feet to 1e-11, a weak direction of 80
+        assert found.rms_mm < 1e-10 or form_mm
+
+
+def test_many_points_are_found_by_a_choice_that_goes_ahead(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(8)
+    motion = RigidMotion.about((2, 1, 1), (0.02, -0.01, 0.03), (0.1, 0.05, -0.1))
+    points = scan_of(NOTCHED, 6000, motion) + rng.normal(0, 0.01, (6000, 3))
+    at_once = register_surface(points, NOTCHED, RigidMotion.identity())
+    monkeypatch.setattr(surface_fit, "_MANY", 5000)
+    monkeypatch.setattr(surface_fit, "_AHEAD", 500)
+    found = register_surface(points, NOTCHED, RigidMotion.identity())
     assert found.converged
-    assert found.steps <= 7
-    assert apart(found.nominal_from_scan, motion, points) < 1e-9
-    assert found.rms_mm < 1e-10
+    assert apart(found.nominal_from_scan, at_once.nominal_from_scan, points) < 1e-9
 
 
 def test_random_poses_of_a_whole_part_are_all_found() -> None:
