@@ -42,7 +42,7 @@ class CloudSurface:
     Points that are not finite are left out. Raises NominalError for points that lie on no surface.
     """
 
-    __slots__ = ("_places", "_tables", "area_mm2", "nominal_error_mm", "normals", "notes", "sides_known", "size_mm")
+    __slots__ = ("_frames", "_jets", "_places", "_tables", "area_mm2", "nominal_error_mm", "normals", "notes", "sides_known", "size_mm")
 
     def __init__(self, points_mm: ArrayLike, normals: ArrayLike | None = None) -> None:
         points, given = _usable(points_in_space(points_mm), normals)
@@ -63,7 +63,8 @@ class CloudSurface:
         self.nominal_error_mm = _disagreement(points, around, frames, jets, inner)
         pieces = _pieces(points, frames, jets, spacing, inner)
         beside_edge = np.asarray(is_edge[around[inner, 1 : _NEAR + 1]].any(axis=1))
-        self._places, self.normals = points[inner], frames[inner, 2]
+        self._places, self._frames, self._jets = points[inner], frames[inner], jets[inner]
+        self.normals = self._frames[:, 2]
         self._tables = _tables_of(pieces, self.normals, beside_edge, self.size_mm)
         self.area_mm2 = float((near[inner, _NEAR] ** 2).sum() * np.pi / (_NEAR + 0.5))
 
@@ -77,9 +78,18 @@ class CloudSurface:
         """
         points = points_in_space(points_mm)
         feet = surface_feet(project_on_patches(points, self._tables, threads), self.nominal_error_mm)
-        along = np.abs(((points - feet.foot_mm) * self.normals[feet.face]).sum(axis=1))
-        in_hole = (feet.kind == FootKind.EDGE) & (np.abs(feet.distance_mm) - along > self.nominal_error_mm)
-        return replace(feet, kind=np.where(in_hole, np.uint8(FootKind.BORDER), feet.kind))
+        rows = np.flatnonzero(feet.kind == FootKind.EDGE)
+        along = np.abs(((points[rows] - feet.foot_mm[rows]) * self._normals_at(feet.face[rows], feet.parameter[rows])).sum(axis=1))
+        kind = feet.kind.copy()
+        kind[rows[np.abs(feet.distance_mm[rows]) - along > self.nominal_error_mm]] = FootKind.BORDER
+        return replace(feet, kind=kind)
+
+    def _normals_at(self, jet: NDArray[np.int32], place: Array) -> Array:
+        """Unit normals (m, 3) of jets (m,) at places (m, 2) over their tangents."""
+        a, (x, y) = self._jets[jet].T, place.T
+        up = np.stack([-a[1] - 2 * a[3] * x - a[4] * y, -a[2] - a[4] * x - 2 * a[5] * y, np.ones(len(x))], axis=1)
+        normal = np.einsum("ma,mad->md", up, self._frames[jet])
+        return np.asarray(normal / np.linalg.norm(normal, axis=1)[:, None])
 
     def sample(self, count: int) -> tuple[Array, Array]:
         """The points that jets stand on, each as often as it takes to have `count` (n, 3), and the outward normals (n, 3) there."""
