@@ -17,6 +17,7 @@ from cmmlink import extremes, words
 from cmmlink.console import protocol
 from cmmlink.console.form_answers import PlanSaved, Understood
 from cmmlink.console.register_words import MapSaved
+from cmmlink.console.trend_words import TrendChoices, TrendShown
 from inspection import Verdict
 
 _HEAD = "// Written by `python -m cmmlink.console.declarations`; change cmmlink/console/protocol.py, not this file.\n\n"
@@ -35,7 +36,7 @@ def declarations_ts() -> str:
     for union in (protocol.Message, protocol.Command):
         for message in get_args(union):
             _collect(message, seen)
-    for answer in (protocol.Device, Understood, PlanSaved, MapSaved):
+    for answer in (protocol.Device, Understood, PlanSaved, MapSaved, TrendChoices, TrendShown):
         _collect(answer, seen)
     lines += [_interface(record) for record in seen]
     lines += [f"\nexport type {name} = {_type(union)};\n" for name, union in _unions().items()]

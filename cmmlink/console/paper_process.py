@@ -3,7 +3,7 @@
 import json
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -29,6 +29,11 @@ def make_report(records: Path, run: str, file: Path, settings: Mapping[str, str]
 def make_comparison(records: Path, first: str, second: str, file: Path) -> None:
     """Draw the comparison of two runs, which are given by their ids, as `cmmlink compare` does. Raises like `make_report`."""
     _make(["compare", first, second], records, file, [])
+
+
+def make_trend(records: Path, part: str, file: Path, options: Sequence[str]) -> None:
+    """Write the trend of a part, as a drawing or a workbook, as `cmmlink plant trends` does. Raises like `make_report`."""
+    _make(["plant", "trends", *options], records, file, ["--", part])
 
 
 def _make(command: list[str], records: Path, file: Path, options: list[str]) -> None:

@@ -15,6 +15,7 @@ from typing import Any, Literal
 from cmmlink.characteristic_rows import CharacteristicRow
 from cmmlink.console.form_answers import PlanSaved, Understood
 from cmmlink.console.register_words import KeepMap, LookAtRegisters, MapSaved, RegisterTable
+from cmmlink.console.trend_words import TrendChoices, TrendShown
 from cmmlink.run_state import RunState
 from cmmlink.words import VERDICT_NAMES, VERDICT_WORDS, Shape, VerdictName
 
@@ -122,6 +123,7 @@ class StationState:
     keeps_records: bool
     can_make_plans: bool
     can_run_demo: bool
+    has_trends: bool
     type: Literal["station"] = "station"
 
 
@@ -363,7 +365,7 @@ Message = (
 Command = Choose | Enter | Acknowledge | OfRun | Search | OpenSection | ImportSurface | LookAtRegisters | KeepMap | Plain
 
 
-def json_of(message: Message | Understood | PlanSaved | MapSaved) -> str:
+def json_of(message: Message | Understood | PlanSaved | MapSaved | TrendChoices | TrendShown) -> str:
     """The message as it is sent."""
     return json.dumps(message, default=_values_by_name, separators=(",", ":"))
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from cmmlink.errors import PlanError, RunError, StoreError
+from cmmlink.errors import PlanError, PlantError, RunError, StoreError
 from drivers import PointFileError
 from inspection import InspectionError
 
@@ -23,7 +23,7 @@ def answer_errors() -> Iterator[None]:
     """Turn what cannot be read or used into an answer to the operator."""
     try:
         yield
-    except (StoreError, RunError, PlanError, InspectionError, PointFileError, OSError) as error:
+    except (StoreError, RunError, PlanError, PlantError, InspectionError, PointFileError, OSError) as error:
         raise Refused(without_folders(str(error))) from None
 
 

@@ -12,10 +12,12 @@ from starlette.types import Receive, Scope, Send
 
 from cmmlink.console.refused import Refused, words_of
 from cmmlink.console.station import Station
+from cmmlink.console.trend_look import AskedTrend, trends_of
 from cmmlink.plan import LanguageName, PaperName
 
 EXPORT_S = 3600.0
 _MOST = 4  # at a time
+_MEDIA = {".pdf": "application/pdf", ".xlsx": "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet"}
 _LOOKS = {"language": get_args(LanguageName), "paper": get_args(PaperName)}  # of a report, as far as a page chooses them
 
 
@@ -36,6 +38,14 @@ class RunFiles:
         run, asked = request.path_params["run"], request.query_params
         settings = {name: asked[name] for name, allowed in _LOOKS.items() if asked.get(name) in allowed}
         return await self._answer(lambda folder: self._station.report_run(run, folder, settings), "application/pdf")
+
+    async def trend(self, request: Request) -> Response:
+        """The trend of a part as a drawing, or as a workbook."""
+        asked = request.query_params
+        suffix = ".xlsx" if asked.get("as") == "xlsx" else ".pdf"
+        language = asked["language"] if asked.get("language") in _LOOKS["language"] else "en"
+        look = self._station.trends
+        return await self._answer(lambda folder: trends_of(look).write(AskedTrend.of(asked), folder, suffix, language), _MEDIA[suffix])
 
     async def compare(self, request: Request) -> Response:
         """Two runs on one drawing."""

@@ -57,6 +57,7 @@ from cmmlink.console.protocol import (
 from cmmlink.console.refused import Refused, without_folders, words_of
 from cmmlink.console.run_file import EXPORT_S, RunFiles
 from cmmlink.console.station import Station
+from cmmlink.console.trend_answers import LOOK_S, TrendAnswers
 from cmmlink.console.unseen import Onlooker
 from cmmlink.run_state import RunState
 
@@ -174,13 +175,16 @@ class ConsoleServer:
 
     def _application(self) -> ASGIApp:
         files = {path.name: (path.read_bytes(), _MEDIA[path.name.rpartition(".")[2]]) for path in _static_files()}
-        runs, posts = RunFiles(self.station), Posts(self.station, self._let_control)
+        runs, posts, trends = RunFiles(self.station), Posts(self.station, self._let_control), TrendAnswers(self.station)
         app = Starlette(
             routes=[
                 Route("/", lambda _: _file_response(files["index.html"])),
                 Route("/export/{run}", self._with_token(runs.export, EXPORT_S)),
                 Route("/report/{run}", self._with_token(runs.report, EXPORT_S)),
                 Route("/compare/{first}/{second}", self._with_token(runs.compare, EXPORT_S)),
+                Route("/trends", self._with_token(trends.choices, LOOK_S)),
+                Route("/trend", self._with_token(trends.trend, LOOK_S)),
+                Route("/trend-file", self._with_token(runs.trend, EXPORT_S)),
                 Route("/nominal", self._with_token(posts.understand_nominal, POST_S), methods=["POST"]),
                 Route("/plan", self._with_token(posts.save_plan, POST_S), methods=["POST"]),
                 Route("/{name}", lambda request: _file_response(files.get(request.path_params["name"]))),

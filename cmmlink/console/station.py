@@ -47,7 +47,7 @@ class Station:
     def __init__(self, setup: StationSetup) -> None:
         self._setup = setup
         self.alarms = Alarms(setup.now)
-        self.ct = CtImport(setup.clock)
+        self.ct, self.trends = CtImport(setup.clock), setup.trends
         self.registers = RegisterLook(setup.clock)
         self._lock = threading.RLock()
         self._entry = Entry()
@@ -404,4 +404,5 @@ class Station:
             keeps_records=self._setup.records is not None,
             can_make_plans=self._shelf.can_make_plans,
             can_run_demo=self._shelf.can_run_demo,
+            has_trends=self._setup.trends is not None,
         )

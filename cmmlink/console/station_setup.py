@@ -10,6 +10,7 @@ from typing import Protocol
 from cmmlink.console.ct_import import InspectSurface
 from cmmlink.console.past_runs import OpenedRun
 from cmmlink.console.protocol import RunRow
+from cmmlink.console.trend_look import TrendLook
 from cmmlink.devices import Connect
 from cmmlink.events import Sink
 from cmmlink.plan import Plan
@@ -61,6 +62,7 @@ class StationSetup:
     ct_plans, inspect_surface : plans of CT surfaces, and what inspects one; None where that is not possible
     write   : writes the results of a run where its plan wants them
     folder  : of the plans, where new ones are saved; None where the page makes none
+    trends  : looks into the results of the plant; None where the station has no results database
     demo    : the plan of the demonstration, whose simulated device `connect` opens as well; None where there is none
     """
 
@@ -75,3 +77,4 @@ class StationSetup:
     write: Callable[[Plan, FinishedRun], None] = lambda *_: None
     folder: Path | None = None
     demo: Path | None = None
+    trends: TrendLook | None = None

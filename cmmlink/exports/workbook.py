@@ -4,8 +4,10 @@ It is written row by row, so its size needs no memory; the same run gives the sa
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from datetime import datetime
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,21 +32,41 @@ def write_xlsx(parts: Sequence[MeasuredPart], files: NewFiles, stem: str, most_r
 
     most_rows : of a sheet, its head included; points beyond it go on in a sheet of their own
     """
+    with _new_book(files(f"{stem}.xlsx"), parts[0].text("measured_at"), _hashes(parts)) as book:
+        _write_table(book, "runs", RUN_COLUMNS, run_rows(parts))
+        _write_table(book, "characteristics", CHARACTERISTIC_COLUMNS, characteristic_rows(parts))
+        _write_points(book, parts, most_rows)
+        _write_meanings(book, _SHEETS)
+
+
+def write_sheets(sheets: Sequence[tuple[str, Mapping[str, str], Iterable[Mapping[str, Cell]]]], path: Path, created: str) -> None:
+    """Write a workbook of tables: the name of each, what its columns mean, and its rows. Raises OSError where it cannot be written.
+
+    created : the moment that stands in its properties (ISO 8601): the same tables give the same bytes
+    """
+    with _new_book(path, created, "") as book:
+        for name, columns, rows in sheets:
+            _write_table(book, name, columns, rows)
+        _write_meanings(book, [(name, columns) for name, columns, _ in sheets])
+
+
+@contextmanager
+def _new_book(path: Path, created: str, comments: str) -> "Iterator[Workbook]":
     from xlsxwriter import Workbook  # noqa: PLC0415 - loaded when it serves
     from xlsxwriter.exceptions import FileCreateError  # noqa: PLC0415
 
-    path = files(f"{stem}.xlsx")
     options = {"constant_memory": True, "strings_to_formulas": False, "strings_to_urls": False, "use_zip64": True, "tmpdir": path.parent}
     try:
         with Workbook(str(path), options) as book:
-            book.set_properties({"created": datetime.fromisoformat(parts[0].text("measured_at")), "comments": _hashes(parts)})
-            _write_table(book, "runs", RUN_COLUMNS, run_rows(parts))
-            _write_table(book, "characteristics", CHARACTERISTIC_COLUMNS, characteristic_rows(parts))
-            _write_points(book, parts, most_rows)
-            meanings = ({"sheet": sheet, "column": name, "meaning": said} for sheet, columns in _SHEETS for name, said in columns.items())
-            _write_table(book, "columns", ("sheet", "column", "meaning"), meanings)
+            book.set_properties({"created": datetime.fromisoformat(created), "comments": comments})
+            yield book
     except FileCreateError as error:
         raise error.args[0] from None  # the OSError that it wraps
+
+
+def _write_meanings(book: "Workbook", sheets: Iterable[tuple[str, Mapping[str, str]]]) -> None:
+    meanings = ({"sheet": sheet, "column": name, "meaning": said} for sheet, columns in sheets for name, said in columns.items())
+    _write_table(book, "columns", ("sheet", "column", "meaning"), meanings)
 
 
 def _hashes(parts: Sequence[MeasuredPart]) -> str:

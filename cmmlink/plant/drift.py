@@ -24,7 +24,7 @@ LEVEL = 0.05
 class DriftingStretch:
     """A stretch of the profile whose places all drift the same way.
 
-    from_share, to_share : where it lies, from 0 to 1 of the nominal's length; of a stretch over the seam the first is the larger one
+    from_share, to_share : where it lies, from 0 to 1 of the nominal's length
     steepest             : the slope at its steepest place, in the unit of the values a run
     change               : that slope over all runs that were looked at
     at_share             : the middle of the steepest place
@@ -58,11 +58,8 @@ class Drift:
         self.level.setflags(write=False)
 
 
-def drift_of(values: ArrayLike, *, closed: bool = False) -> Drift:
-    """The drift of the values (n, p) of n runs, the oldest first, at p places; nan where a run was not measured at a place.
-
-    closed : whether the last place lies beside the first
-    """
+def drift_of(values: ArrayLike) -> Drift:
+    """The drift of the values (n, p) of n runs, the oldest first, at p places; nan where a run was not measured at a place."""
     rows = np.array(values, dtype=np.float64)
     if rows.ndim != 2 or not rows.shape[1]:
         raise ValueError(f"a drift is found from values of runs at places, (n, p), and got {rows.shape}")
@@ -73,7 +70,7 @@ def drift_of(values: ArrayLike, *, closed: bool = False) -> Drift:
             slope[place], chance[place] = _course(at, column[at])
     level = _corrected(chance)
     unmeasured = int(np.isnan(slope).sum())
-    return Drift(slope, level, _stretches(slope, level, len(rows), closed), unmeasured, _notes(len(rows), unmeasured))
+    return Drift(slope, level, _stretches(slope, level, len(rows)), unmeasured, _notes(len(rows), unmeasured))
 
 
 def _course(at: NDArray[np.intp], values: Array) -> tuple[float, float]:
@@ -97,16 +94,12 @@ def _corrected(chance: Array) -> Array:
     return level
 
 
-def _stretches(slope: Array, level: Array, runs: int, closed: bool) -> tuple[DriftingStretch, ...]:
+def _stretches(slope: Array, level: Array, runs: int) -> tuple[DriftingStretch, ...]:
     """Places beside one another that drift the same way, as stretches."""
-    places = len(slope)
     with np.errstate(invalid="ignore"):
         way = np.where(level < LEVEL, np.sign(slope), 0.0)
-    ends = [0, *(np.flatnonzero(way[1:] != way[:-1]) + 1).tolist(), places]
+    ends = [0, *(np.flatnonzero(way[1:] != way[:-1]) + 1).tolist(), len(slope)]
     pieces = [np.arange(start, end) for start, end in pairwise(ends) if way[start]]
-    over_seam = closed and len(pieces) > 1 and pieces[0][0] == 0 and pieces[-1][-1] == places - 1
-    if over_seam and way[0] == way[-1]:
-        pieces = [np.concatenate([pieces[-1], pieces[0]]), *pieces[1:-1]]
     found = [_stretch(piece, slope, runs) for piece in pieces]
     return tuple(sorted(found, key=lambda stretch: -abs(stretch.steepest)))
 

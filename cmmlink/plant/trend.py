@@ -107,7 +107,7 @@ def alarm_words(values: ArrayLike) -> tuple[str, ...]:
     charts = _charts_of(measured, 1, len(measured) - 1)
     if charts is None or not charts.within_sigma:
         return ()
-    told = tuple(f"{one.words}, {'above' if one.above else 'below'}" for one in new_violations(charts.location))
+    told = tuple(f"{one.words}, {'upwards' if one.above else 'downwards'}" for one in new_violations(charts.location))
     return told or (_LEAP,) * bool(new_violations(charts.spread))
 
 

@@ -22,11 +22,13 @@ if TYPE_CHECKING:
     from cmmlink.report.recorded_stack import stack_on_record
     from cmmlink.report.report_input import ReportInput, places_in, regions_in, with_settings
     from cmmlink.report.section_pictures import SectionPictures
+    from cmmlink.report.speech import Speech
     from cmmlink.report.stack_folder import write_stack
     from cmmlink.report.stack_pdf import write_stack_report
     from cmmlink.report.surface_folder import write_surface
     from cmmlink.report.surface_terminal import print_surface_summary
     from cmmlink.report.terminal import STYLE_OF, STYLES, print_characteristics, print_summary
+    from cmmlink.report.trend_picture import write_trend_picture
 else:
     from cmmlink.front_door import load_on_use
 
@@ -49,9 +51,11 @@ else:
         "cmmlink.report.section_pictures": ("SectionPictures",),
         "cmmlink.report.stack_folder": ("write_stack",),
         "cmmlink.report.stack_pdf": ("write_stack_report",),
+        "cmmlink.report.speech": ("Speech",),
         "cmmlink.report.surface_folder": ("write_surface",),
         "cmmlink.report.surface_terminal": ("print_surface_summary",),
         "cmmlink.report.terminal": ("STYLE_OF", "STYLES", "print_characteristics", "print_summary"),
+        "cmmlink.report.trend_picture": ("write_trend_picture",),
     }
 
     __getattr__ = load_on_use(__name__, _PLACES)
@@ -66,6 +70,7 @@ __all__ = [
     "ProfilePictures",
     "ReportInput",
     "SectionPictures",
+    "Speech",
     "content_of",
     "input_of_replay",
     "input_on_record",
@@ -90,5 +95,6 @@ __all__ = [
     "write_stack",
     "write_stack_report",
     "write_surface",
+    "write_trend_picture",
     "zone_in",
 ]

@@ -6,7 +6,7 @@ import { gettext } from "./words.js";
 /** @import { Answer, Command, Message } from "./protocol.js" */
 /** @typedef {"connecting" | "live" | "stale" | "away" | "refused"} LinkState */
 /** @typedef {Pick<Answer, "ok" | "message">} Outcome of a command */
-/** @typedef {{ ok: true, given: unknown } | { ok: false, message: string }} Posted what came of a post */
+/** @typedef {{ ok: true, given: unknown } | { ok: false, message: string }} Posted what came of a post, or of what was asked for */
 /**
  * @typedef {object} Handlers
  * @property {(message: Message) => void} onMessage
@@ -107,6 +107,22 @@ export class Link {
       this.waiting.set(number, resolve);
       this.socket.send(JSON.stringify({ number, ...command }));
     });
+  }
+
+  /**
+   * Ask for something that the station looks up.
+   * @param {string} path
+   * @param {Record<string, string>} asked
+   * @returns {Promise<Posted>}
+   */
+  async get(path, asked) {
+    const headers = { Authorization: `Bearer ${this.token}` };
+    try {
+      const answer = await fetch(`${path}?${new URLSearchParams(asked)}`, { headers });
+      return answer.ok ? { ok: true, given: await answer.json() } : { ok: false, message: await answer.text() };
+    } catch {
+      return { ok: false, message: OUT_OF_REACH };
+    }
   }
 
   /**

@@ -19,16 +19,17 @@ import { Question } from "./question.js";
 import { RegistersView } from "./registers.js";
 import { Strip } from "./strip.js";
 import { Timing } from "./timing.js";
+import { TrendsView } from "./trends.js";
 import { gettext, translate, translateElements } from "./words.js";
 
-/** @import { AlarmRow, CharacteristicList, Command, Hello, Message, PlanSaved, ShownRun } from "./protocol.js" */
+/** @import { AlarmRow, CharacteristicList, Command, Hello, History as RunHistory, Message, PlanSaved, ShownRun } from "./protocol.js" */
 /** @import { Cursor } from "./drawing.js" */
 /** @import { LinkState, Outcome } from "./link.js" */
 /** @import { Heard } from "./card.js" */
 
 translateElements(document.documentElement);
 
-const VIEWS = ["live", "part", "history", "ct", "registers", "wall"];
+const VIEWS = ["live", "part", "history", "ct", "trends", "registers", "wall"];
 const MOST_MAGNIFICATION = 5000;
 const SLIDER_STEPS = 1000;
 const SAID_MS = 8000; // so long the answer to a command stays
@@ -73,6 +74,7 @@ const characteristics = new Characteristics(showChosen);
 let told = { rows: [], more: 0, uncertainty: [], final: false, type: "characteristics" };
 const ctView = new CtView((plan) => ask({ do: "import", plan }), (section) => askToSee({ do: "section", section }));
 
+const trendsView = new TrendsView((path, asked) => link.get(path, asked), (address, name) => downloads.download(address, name));
 const registersView = new RegistersView(ask);
 
 // What the station says.
@@ -85,7 +87,7 @@ function onMessage(message) {
   else if (message.type === "station") heard.station = message;
   else if (message.type === "control") heard.control = message;
   else if (message.type === "alarms") [alarms, heard.hasFault] = [message.alarms, message.fault];
-  else if (message.type === "history") history.show(message.runs);
+  else if (message.type === "history") takeHistory(message);
   else if (message.type === "found") history.showFound(message);
   else if (message.type === "ct") ctView.show((heard.surface = message));
   else if (message.type === "registers") registersView.show(message);
@@ -119,6 +121,12 @@ function takeRun({ run, recorded }) {
   heard.isRecorded = recorded;
   if (isNew && heard.view !== "wall") go("live");
   redraw();
+}
+
+/** @param {RunHistory} message */
+function takeHistory({ runs }) {
+  history.show(runs);
+  trendsView.renew();
 }
 
 /** @param {CharacteristicList} message */
@@ -205,6 +213,7 @@ function paintWords() {
   if (heard.station) {
     partView.show(heard.station);
     history.choosePlan(heard.station.choice?.name ?? "");
+    byId("tab-trends").hidden = !heard.station.has_trends;
     byId("new-device").hidden = !heard.station.can_make_plans;
     ctView.showPlans(heard.station.ct_plans, heard.station.running);
   }
@@ -274,6 +283,7 @@ function reportShown() {
 function go(view) {
   if (!VIEWS.includes(view)) return;
   document.body.dataset.view = heard.view = view;
+  trendsView.turn(view === "trends");
   for (const button of viewButtons()) button.toggleAttribute("aria-current", button.dataset.go === view);
   redraw();
   rewrite();
@@ -339,7 +349,7 @@ const pressIn = (view, id) => () => {
 
 /** What keys do, some of them according to the view. @type {Readonly<Record<string, (() => void)[]>>} */
 const KEYS = {
-  1: [() => go("live")], 2: [() => go("part")], 3: [() => go("history")], 4: [press("tab-ct")],
+  1: [() => go("live")], 2: [() => go("part")], 3: [() => go("history")], 4: [press("tab-ct")], 5: [press("tab-trends")],
   s: [press("start")], e: [press("end")], n: [press("next")], a: [press("acknowledge")], l: [press("alarm-list-button")],
   t: [press("test")], o: [pressIn("history", "open-run"), pressIn("ct", "open-section")], r: [pressIn("history", "replay-run")],
   x: [pressIn("history", "export-run")], p: [reportShown], c: [pressIn("history", "compare-run")], i: [pressIn("ct", "import-ct")],

@@ -90,6 +90,7 @@ export interface StationState {
   readonly keeps_records: boolean;
   readonly can_make_plans: boolean;
   readonly can_run_demo: boolean;
+  readonly has_trends: boolean;
   readonly type: "station";
 }
 
@@ -458,6 +459,83 @@ export interface MapSaved {
   readonly name: string;
   readonly problem: string;
   readonly taken: boolean;
+}
+
+/** A part with results, and the names of its characteristics. */
+export interface TrendPart {
+  readonly name: string;
+  readonly characteristics: readonly string[];
+}
+
+/** What trends there are. */
+export interface TrendChoices {
+  readonly parts: readonly TrendPart[];
+  readonly stations: readonly string[];
+}
+
+/** One run: when it began, at this place; value and limits are null where there is none. */
+export interface TrendRun {
+  readonly run: string;
+  readonly station: string;
+  readonly serial_number: string;
+  readonly began: string;
+  readonly value: number | null;
+  readonly lower: number | null;
+  readonly upper: number | null;
+  readonly verdict: string;
+}
+
+/** A rule of Western Electric that is broken at a plotted value. */
+export interface BrokenRule {
+  readonly at: number;
+  readonly words: string;
+  readonly above: boolean;
+}
+
+/** One line of a control chart; what is plotted is null where there is nothing. */
+export interface TrendChart {
+  readonly centre: number;
+  readonly lower: number;
+  readonly upper: number;
+  readonly plotted: readonly (number | null)[];
+  readonly broken: readonly BrokenRule[];
+}
+
+/** An index of capability with its limits of confidence; null where one is not stated, and why. */
+export interface TrendIndex {
+  readonly name: string;
+  readonly value: number | null;
+  readonly lower: number | null;
+  readonly upper: number | null;
+  readonly reason: string;
+}
+
+/** The heat strip: a row a run, oldest first, and in each a value for every even part of the profile. names : serial number, or run, of each row worst_mm : the worst deviation, null where nothing was measured levels : from -3 to 3, out of tolerance at both ends; null has no colour slope_um : the drift of each part, micrometres a run stretches : from and to, mm, where the drift is significant */
+export interface TrendStrip {
+  readonly length_mm: number;
+  readonly names: readonly string[];
+  readonly worst_mm: readonly (readonly (number | null)[])[];
+  readonly levels: readonly (readonly (number | null)[])[];
+  readonly slope_um: readonly (number | null)[];
+  readonly stretches: readonly (readonly [number, number])[];
+}
+
+/** The trend of one characteristic over the newest runs, oldest first. rows : of each plotted value the run that it ends with basis : mean, standard deviation and distribution of the indices, in words; empty without any drifts : where the profile drifts, in words */
+export interface TrendShown {
+  readonly part: string;
+  readonly characteristic: string;
+  readonly unit: string;
+  readonly is_form: boolean;
+  readonly subgroup: number;
+  readonly runs: readonly TrendRun[];
+  readonly rows: readonly number[];
+  readonly location: TrendChart | null;
+  readonly spread: TrendChart | null;
+  readonly indices: readonly TrendIndex[];
+  readonly basis: string;
+  readonly strip: TrendStrip | null;
+  readonly drifts: readonly string[];
+  readonly notes: readonly string[];
 }
 
 export type Message = Admitted | Hello | Alive | Answer | Control | StationState | AlarmList | ShownRun | CharacteristicList | History | FoundRuns | SurfaceState | RegisterTable;

@@ -10,7 +10,8 @@ const LAYERS = ["ground", "marks", "cursor"];
 /** What the style sheets call --draw-NAME. */
 const INKS = /** @type {const} */ ([
   "text", "soft", "faint", "line", "band", "limit", "ground", "label", "in", "near", "not-proven", "over", "under", "gap", "region",
-  "chosen", "region-ground", "uncertain-ground",
+  "chosen", "region-ground", "uncertain-ground", "heat-under-3", "heat-under-2", "heat-under-1", "heat-0", "heat-over-1", "heat-over-2",
+  "heat-over-3", "heat-mark", "heat-none",
 ]);
 
 /** The colours of drawings, as the style sheets have them. @type {Record<typeof INKS[number], string>} */

@@ -61,12 +61,15 @@ def test_places_that_were_not_measured_are_counted_and_never_named() -> None:
     assert "1 places" in drift.notes[0]
 
 
-def test_a_stretch_runs_over_the_seam_of_a_closed_profile_alone() -> None:
-    slopes = np.array([0.01, 0, 0, -0.02, 0, 0.03])
-    values = np.outer(np.arange(12.0), slopes)
-    closed = [(round(one.from_share, 9), round(one.to_share, 9)) for one in drift_of(values, closed=True).stretches]
-    assert closed == [(round(5 / 6, 9), round(1 / 6, 9)), (0.5, round(4 / 6, 9))]
-    assert len(drift_of(values).stretches) == 3
+def test_places_side_by_side_are_a_stretch_and_the_steepest_stands_first() -> None:
+    slopes = np.array([0.01, 0.005, 0, -0.02, -0.04, 0, 0.03, -0.03])
+    found = drift_of(np.outer(np.arange(16.0), slopes)).stretches
+    assert [(one.from_share * 8, one.to_share * 8, round(one.steepest, 9)) for one in found] == [
+        (3, 5, -0.04),
+        (6, 7, 0.03),
+        (7, 8, -0.03),
+        (0, 2, 0.01),
+    ]
 
 
 def test_few_runs_say_nothing() -> None:

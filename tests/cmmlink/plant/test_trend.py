@@ -75,8 +75,8 @@ def test_a_rule_that_stays_broken_is_new_once() -> None:
 
 
 def test_an_alarm_says_which_side_and_needs_twenty_values_before() -> None:
-    assert alarm_words([*STEADY, 0.04]) == ("one value beyond three standard deviations, above",)
-    assert alarm_words([*STEADY, 0.0]) == ("one value beyond three standard deviations, below",)
+    assert alarm_words([*STEADY, 0.04]) == ("one value beyond three standard deviations, upwards",)
+    assert alarm_words([*STEADY, 0.0]) == ("one value beyond three standard deviations, downwards",)
     assert alarm_words([*STEADY[:-1], 0.0235, 0.017]) == ("the step from the run before is larger than chance allows",)
     assert alarm_words([*STEADY[:19], 0.04]) == ()
     assert alarm_words([*STEADY, np.nan]) == ()
@@ -86,7 +86,7 @@ def test_an_alarm_says_which_side_and_needs_twenty_values_before() -> None:
 def test_the_newest_value_does_not_widen_the_limits_it_is_held_against() -> None:
     sigma = individuals_charts(STEADY).within_sigma
     just_beyond = STEADY.mean() + 3.001 * sigma
-    assert any("three standard deviations, above" in words for words in alarm_words([*STEADY, just_beyond]))
+    assert any("three standard deviations, upwards" in words for words in alarm_words([*STEADY, just_beyond]))
 
 
 def test_new_violations_of_a_chart_are_those_of_its_newest_value() -> None:
