@@ -5,20 +5,22 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cmmlink.errors import PlanError
+from cmmlink.events import Counts
 from cmmlink.from_plan import Problems
 from cmmlink.nominal_files.surface_file import SurfaceFile, load_surface, states_its_unit
 from cmmlink.plan import SurfacePlan
-from cmmlink.surface_json import NominalWords
+from cmmlink.surface_json import NominalWords, surface_json
 from drivers import PointFileError, read_bytes
+from inspection import InspectionResult
 
 if TYPE_CHECKING:
-    from inspection.surface import LiveSurface, NominalSurface, SurfaceTerms
+    from inspection.surface import LiveSurface, NominalSurface, SurfaceResult, SurfaceTerms
 
 
 def check_surface_plan(plan: SurfacePlan, plan_file: Path) -> SurfaceFile:
@@ -142,3 +144,14 @@ def words_of_nominal(file: SurfaceFile) -> NominalWords:
 def notes_on_surface(plan: SurfacePlan, file: SurfaceFile) -> tuple[str, ...]:
     """What was assumed when the nominal was read."""
     return tuple(f"{plan.surface.file.name}: {note}" for note in file.notes)
+
+
+def notes_of_result(result: "SurfaceResult | None", file: SurfaceFile) -> list[str]:
+    """What was assumed when the points were judged, without what is said of the nominal's file already."""
+    return [note for note in (result.notes if result is not None else ()) if note not in file.notes]
+
+
+def document_of_surface(file: SurfaceFile, result: "InspectionResult | SurfaceResult | None", counts: Counts) -> dict[str, Any]:
+    """What is told of a result of a nominal, as the record takes it."""
+    assert not isinstance(result, InspectionResult)
+    return surface_json(result, counts, words_of_nominal(file))

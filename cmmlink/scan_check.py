@@ -2,13 +2,17 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cmmlink.devices import connect
 from cmmlink.errors import PlanError
 from cmmlink.from_plan import Problems, find_problems, notes_on_nominal, notes_on_temperature
-from cmmlink.plan import CtPlan, Plan, PlanMistake, find_mistakes, kind_of, load_ct_plan, load_plan
+from cmmlink.plan import CtPlan, Plan, PlanMistake, SurfacePlan, find_mistakes, kind_of, load_ct_plan, load_plan, load_surface_plan
 from drivers import read_text
 from inspection import NominalProfile
+
+if TYPE_CHECKING:
+    from cmmlink.nominal_files.surface_file import SurfaceFile
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,17 +30,45 @@ class ScanCheck:
 def check_scan(plan: Plan, plan_file: Path) -> ScanCheck:
     """Build the nominal of a plan, and its device short of opening it, and hold both against the plan. No device is contacted."""
     profile, problems = find_problems(plan, plan_file)
-
-    def notes_on_device() -> tuple[str, ...]:
-        with connect(plan) as device:
-            return device.notes
-
-    of_device = Problems(plan_file)
-    notes = of_device.attempt("device", notes_on_device) or ()
-    problems = (*problems, *of_device.problems)
+    notes, of_device = _notes_on_device(plan, plan_file)
+    problems = (*problems, *of_device)
     if problems or profile is None:
         return ScanCheck(None, (), problems)
     return ScanCheck(profile, (*notes_on_nominal(plan), *notes_on_temperature(plan), *notes), ())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SurfaceCheck:
+    """The same of the plan of a whole surface.
+
+    file : the nominal; None where something is wrong with the plan
+    """
+
+    file: "SurfaceFile | None"
+    notes: tuple[str, ...]
+    problems: tuple[PlanError, ...]
+
+
+def check_surface(plan: SurfacePlan, plan_file: Path) -> SurfaceCheck:
+    """Read the nominal surface of a plan, and build its device short of opening it. No device is contacted."""
+    from cmmlink.from_surface_plan import find_surface_problems, notes_on_surface  # noqa: PLC0415 - it loads what reads surfaces
+
+    file, problems = find_surface_problems(plan, plan_file)
+    notes, of_device = _notes_on_device(plan, plan_file)
+    if problems or of_device or file is None:
+        return SurfaceCheck(None, (), (*problems, *of_device))
+    return SurfaceCheck(file, (*notes_on_surface(plan, file), *notes), ())
+
+
+def _notes_on_device(plan: Plan | SurfacePlan, plan_file: Path) -> tuple[tuple[str, ...], tuple[PlanError, ...]]:
+    """What is assumed of the device of a plan, and what is wrong with it."""
+
+    def connected() -> tuple[str, ...]:
+        with connect(plan) as device:
+            return device.notes
+
+    found = Problems(plan_file)
+    return found.attempt("device", connected) or (), tuple(found.problems)
 
 
 def mistakes_of(plan_file: Path) -> tuple[PlanMistake, ...]:
@@ -47,7 +79,10 @@ def mistakes_of(plan_file: Path) -> tuple[PlanMistake, ...]:
     mistakes = find_mistakes(plan_file)
     if mistakes:
         return mistakes
-    if kind_of(read_text(plan_file)) is CtPlan:
+    kind = kind_of(read_text(plan_file))
+    if kind is SurfacePlan:
+        return as_mistakes(plan_file, check_surface(load_surface_plan(plan_file), plan_file).problems)
+    if kind is CtPlan:
         from cmmlink.stack_check import check_stack  # noqa: PLC0415 - it loads what cuts surfaces, and the check of a scan needs none of it
 
         return as_mistakes(plan_file, check_stack(load_ct_plan(plan_file), plan_file).problems)

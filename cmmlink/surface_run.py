@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING, Any
 
 from cmmlink.conduct import conduct
 from cmmlink.devices import Connected
-from cmmlink.events import Counts, RunStarted, Sink
-from cmmlink.from_surface_plan import live_surface_of, notes_on_surface, words_of_nominal
+from cmmlink.events import RunStarted, Sink
+from cmmlink.from_surface_plan import document_of_surface, live_surface_of, notes_of_result, notes_on_surface, words_of_nominal
 from cmmlink.nominal_files.surface_file import SurfaceFile
 from cmmlink.pipeline import Outcome
 from cmmlink.plan import FileDevice, SurfacePlan
-from cmmlink.record import PATIENCE_S, DocumentOf, RecordReference
+from cmmlink.record import PATIENCE_S, RecordReference
 from cmmlink.result_folder import folder_of
 from cmmlink.result_json import run_document
 from cmmlink.surface_json import surface_json
 from cmmlink.words import utc_words
-from inspection import InspectionError, InspectionResult, Verdict
+from inspection import InspectionError, Verdict
 
 if TYPE_CHECKING:
     from inspection.surface import SurfaceResult
@@ -71,7 +71,7 @@ class FinishedSurface:
 
     def result_json(self) -> dict[str, Any]:
         """The run as `--json` and result.json hold it."""
-        found = document_of_surface(self.file)(self.outcome.result, self.outcome.counts)
+        found = surface_json(self.outcome.result, self.outcome.counts, words_of_nominal(self.file))
         evidence = asdict(self.evidence) if self.evidence else {}
         return run_document(found, self.started, self.notes, self.outcome.ending, utc_words(self.began), evidence)
 
@@ -79,21 +79,6 @@ class FinishedSurface:
         """The folder of this run's results, its placeholders filled in; without a record the run is named by when it began."""
         run = self.evidence.run if self.evidence else f"{self.began:%Y%m%d-%H%M%S}"
         return folder_of(pattern, part=self.started.part, serial_number=self.started.serial_number, run=run)
-
-
-def notes_of_result(result: "SurfaceResult | None", file: SurfaceFile) -> list[str]:
-    """What was assumed when the points were judged, without what is said of the nominal's file already."""
-    return [note for note in (result.notes if result is not None else ()) if note not in file.notes]
-
-
-def document_of_surface(file: SurfaceFile) -> DocumentOf:
-    """Say what is told of the results of a nominal."""
-    return partial(_document, file)
-
-
-def _document(file: SurfaceFile, result: "InspectionResult | SurfaceResult | None", counts: Counts) -> dict[str, Any]:
-    assert not isinstance(result, InspectionResult)
-    return surface_json(result, counts, words_of_nominal(file))
 
 
 def carry_out_surface(
@@ -129,6 +114,6 @@ def carry_out_surface(
         stop=stop,
         sinks=sinks,
         patience_s=patience_s,
-        document_of=document_of_surface(file),
+        document_of=partial(document_of_surface, file),
     )
     return FinishedSurface(plan, file, conducted.started, conducted.outcome, conducted.evidence, conducted.began)

@@ -10,16 +10,16 @@ from cmmlink.commands.exit_codes import UNUSABLE, fail
 from cmmlink.commands.options import PlanFile, records_folder
 
 if TYPE_CHECKING:
-    from cmmlink.plan import CtPlan, Plan, PlanMistake
+    from cmmlink.plan import CtPlan, Plan, PlanMistake, SurfacePlan
 
 
 def check(plan_file: PlanFile) -> int:
     """Check a plan of any kind, and the files that it names.
 
-    A plan is that of a scan or of a CT surface; a register map is checked as well. All mistakes are listed, each with its line and an
-    example of what may stand there. No device is contacted.
+    A plan is that of a scan, of a whole surface or of a CT surface; a register map is checked as well. All mistakes are listed, each with
+    its line and an example of what may stand there. No device is contacted.
     """
-    from cmmlink.plan import CtPlan, Plan, find_mistakes, kind_of, load_ct_plan, load_plan
+    from cmmlink.plan import CtPlan, Plan, SurfacePlan, find_mistakes, kind_of, load_ct_plan, load_plan, load_surface_plan
     from drivers import read_text
 
     mistakes = find_mistakes(plan_file)
@@ -28,6 +28,8 @@ def check(plan_file: PlanFile) -> int:
     kind = kind_of(read_text(plan_file))
     if kind is Plan:
         return _check_scan(load_plan(plan_file), plan_file)
+    if kind is SurfacePlan:
+        return _check_surface(load_surface_plan(plan_file), plan_file)
     return _check_stack(load_ct_plan(plan_file), plan_file) if kind is CtPlan else _check_map(plan_file)
 
 
@@ -60,6 +62,22 @@ def _check_scan(plan: "Plan", plan_file: Path) -> int:
     if plan.answer is not None:
         away = "" if plan.answer.file.parent.is_dir() else f", which is out of reach now: there is no folder {plan.answer.file.parent}"
         typer.echo(f"the machine is told the verdict in {plan.answer.file}{away}")
+    _print_notes(found.notes)
+    return 0
+
+
+def _check_surface(plan: "SurfacePlan", plan_file: Path) -> int:
+    from cmmlink.devices import words_of
+    from cmmlink.scan_check import as_mistakes, check_surface
+
+    found = check_surface(plan, plan_file)
+    file = found.file
+    if found.problems or file is None:
+        return _fail_with(plan_file, as_mistakes(plan_file, found.problems))
+    zone = plan.zone
+    typer.echo(f"{plan_file} can be run: {plan.part.name}, zone {zone.lower_mm:+g} .. {zone.upper_mm:+g} mm, {words_of(plan.device)}")
+    typer.echo(f"nominal {file.source_format}, {file.nominal.area_mm2:.6g} mm2, {file.nominal.size_mm:.6g} mm long")
+    typer.echo(f"decision rule: {zone.decision_rule}")
     _print_notes(found.notes)
     return 0
 

@@ -24,6 +24,7 @@ from cmmlink.commands.options import (
 )
 from cmmlink.commands.output import Output, now, report_outcome, stop_on_ctrl_c
 from cmmlink.commands.series import NextPart
+from cmmlink.commands.surface_outcome import run_surface
 from cmmlink.errors import PlanError
 
 if TYPE_CHECKING:
@@ -88,9 +89,11 @@ def run(
     from cmmlink.commands.console import run_on_page
     from cmmlink.devices import connect
     from cmmlink.from_plan import check_plan
-    from cmmlink.plan import load_plan
+    from cmmlink.plan import SurfacePlan, kind_of_plan, load_plan
     from cmmlink.report import prepare
 
+    if kind_of_plan(plan_file) is SurfacePlan:
+        return run_surface(plan_file, NextPart(serial, operator, count_up), Output(headless, as_json, out, records, no_browser))
     plan = load_plan(plan_file)
     profile = check_plan(plan, plan_file)
     output = Output(headless, as_json, out or plan.out.folder, records or plan.records.folder, no_browser)

@@ -20,7 +20,7 @@ from cmmlink.words import answer_words, headline_of, judgement_words, local_word
 from inspection import Method, Verdict
 
 if TYPE_CHECKING:
-    from cmmlink.record import Evidence, Replay, Store
+    from cmmlink.record import Evidence, RecordedRun, Replay, Store, SurfaceReplay
 
 VerdictSought = Literal["conform", "nonconform", "uncertain", "none"]
 SortKey = Literal["started", "part", "serial_number", "operator", "plan_file", "state", "verdict"]
@@ -159,7 +159,7 @@ def replay(
     here: `cmmlink merge FOLDER` adds it to them.
     """
     from cmmlink.devices import decoder_of
-    from cmmlink.record import keep_judgement, open_to_record, recorded_run, replay_run, seal_of
+    from cmmlink.record import keep_judgement, open_to_record, recorded_run, replay_run, replay_surface, seal_of
     from cmmlink.result_json import number
 
     changes = _settings_in(settings or ())
@@ -176,7 +176,8 @@ def replay(
         if reason is not None and recorded.end is None:
             raise PlanError(f"run {recorded.run} has no end yet: it can be judged again when it has")
         with progress(f"judging run {recorded.run} again"):
-            again = replay_run(store, recorded, decoder_of, tolerance=tolerance, method=method, settings=changes)
+            judge = replay_surface if recorded.is_of_surface else replay_run
+            again: Replay | SurfaceReplay = judge(store, recorded, decoder_of, tolerance=tolerance, method=method, settings=changes)
     kept = None
     if reason is not None:
         with open_to_record(folder, now) as store:
@@ -187,7 +188,7 @@ def replay(
     document = {"schema": RESULT_SCHEMA, **again.result_json} | {
         "replay_of": recorded.run,
         "chain_sha256": recorded.chain_sha256 if evidence is None else evidence.chain_sha256,
-        "identical": again.identical,
+        "identical": again.agreement.identical,
         "same_decision": again.agreement.same_decision,
         "apart": None if again.agreement.apart is None else number(again.agreement.apart),
         "result_sha256": again.agreement.result_sha256,
@@ -196,23 +197,31 @@ def replay(
     document |= {"ending": again.outcome.ending, "measured_at": utc_words(datetime.fromisoformat(recorded.header["started"]))}
     notes = (*again.notes, *([] if evidence is None else [evidence.words]))
     document |= {"notes": list(notes)}
-    document |= {"changed": [asdict(change) for change in again.changed], "differs": [asdict(change) for change in again.differs]}
+    document |= {"changed": [asdict(change) for change in again.changed], "differs": [asdict(change) for change in again.agreement.differs]}
     document |= {"derived": kept}
     if out is not None:
-        from cmmlink.report import input_of_replay, write_results
-
-        title, report = f"{recorded.header['part']}, run {recorded.run} replayed", input_of_replay(again, document, recorded)
-        with progress(f"writing results to {out}"):
-            write_results(out, document, again.outcome.result, again.profile, title, report=report)
+        _write_replay(out, again, document, recorded)
     if as_json:
         print_json(document)
     else:
-        _print_replay(again, recorded.run, notes)
+        _print_replay(again, recorded.run, document, notes)
         if kept is not None:
             _say(f"kept as record {kept['record']}, chained to run {recorded.run}: {kept['who']}, {kept['why']}")
-    if again.identical is False and not again.changed and not again.agreement.holds:
+    if again.agreement.identical is False and not again.changed and not again.agreement.holds:
         return fail(f"run {recorded.run}: nothing was changed, yet the result is not the recorded one", NO_RECORD)
     return UNUSABLE if again.outcome.result is None else EXIT_OF[again.outcome.result.verdict]
+
+
+def _write_replay(out: Path, again: "Replay | SurfaceReplay", document: dict[str, Any], recorded: "RecordedRun") -> None:
+    from cmmlink.record import Replay
+    from cmmlink.report import input_of_replay, write_results, write_surface
+
+    with progress(f"writing results to {out}"):
+        if isinstance(again, Replay):
+            title, report = f"{recorded.header['part']}, run {recorded.run} replayed", input_of_replay(again, document, recorded)
+            write_results(out, document, again.outcome.result, again.profile, title, report=report)
+        else:
+            write_surface(out, document, again.outcome.result)
 
 
 def _run_or_evidence(opened: ExitStack, name: str, folder: Path) -> tuple["Store", str, "Evidence | None"]:
@@ -246,17 +255,21 @@ def _settings_in(texts: Sequence[str]) -> dict[str, str]:
     return changes
 
 
-def _print_replay(again: "Replay", run_id: str, notes: Sequence[str]) -> None:
-    from cmmlink.report import print_summary
+def _print_replay(again: "Replay | SurfaceReplay", run_id: str, document: Mapping[str, Any], notes: Sequence[str]) -> None:
+    from cmmlink.record import Replay
+    from cmmlink.report import print_summary, print_surface_summary
 
     heading = f"run {run_id}, judged again"
-    print_summary(terminal(), again.outcome.result, again.outcome.counts, heading, again.outcome.ending, notes)
-    for title, changes in (("changed", again.changed), ("differs", again.differs)):
+    if isinstance(again, Replay):
+        print_summary(terminal(), again.outcome.result, again.outcome.counts, heading, again.outcome.ending, notes)
+    else:
+        print_surface_summary(terminal(), document, heading, notes)
+    for title, changes in (("changed", again.changed), ("differs", again.agreement.differs)):
         for change in changes:
             typer.echo(f"{title}: {change.key} {change.recorded} -> {change.replayed}")
-    if again.identical is None:
+    if again.agreement.identical is None:
         typer.echo(f"run {run_id} has no recorded result to compare with")
-    elif again.identical:
+    elif again.agreement.identical:
         typer.echo(f"identical to the recorded result of run {run_id}, to the last bit")
         typer.echo(f"SHA-256 of the result and of every deviation: {again.agreement.result_sha256}")
     else:

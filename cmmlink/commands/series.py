@@ -3,7 +3,7 @@
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import typer
 
@@ -12,7 +12,9 @@ from cmmlink.errors import PlanError
 from cmmlink.words import printable, repetition_words
 
 if TYPE_CHECKING:
-    from cmmlink.plan import Plan
+    from cmmlink.plan import Plan, SurfacePlan
+
+AnyPlan = TypeVar("AnyPlan", "Plan", "SurfacePlan")
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +25,7 @@ class NextPart:
     operator: str | None
     count_up: bool
 
-    def of(self, plan: "Plan", records: Path, *, asks: bool) -> "tuple[Plan, tuple[str, ...]]":
+    def of(self, plan: AnyPlan, records: Path, *, asks: bool) -> tuple[AnyPlan, tuple[str, ...]]:
         """The plan of this part, and notes on it. Raises PlanError for a serial number that the plan does not allow.
 
         asks : whether somebody may be asked here: for a serial number that is required, and whether one is to be measured again
@@ -43,7 +45,7 @@ class NextPart:
             raise PlanError(f"{told}; it was not measured again")
         return part, (told,)
 
-    def _chosen(self, plan: "Plan", records: Path) -> str:
+    def _chosen(self, plan: "Plan | SurfacePlan", records: Path) -> str:
         from cmmlink.plan import next_serial_number
         from cmmlink.record import last_serial_number
 

@@ -7,15 +7,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cmmlink.commands.exit_codes import DEVICE_FAILED, EXIT_OF, NO_RECORD, UNUSABLE, say
 from cmmlink.commands.options import Invalid, Json, NoRecord, Out, Records, RejectOutliers, Uncertainty, Unit, columns_from, records_folder
-from cmmlink.commands.output import now, print_json, say_untold, stop_on_ctrl_c, terminal
+from cmmlink.commands.output import now, stop_on_ctrl_c
 from cmmlink.commands.progress import progress
-from cmmlink.errors import PlanError, StoreError
+from cmmlink.commands.surface_outcome import report_surface
+from cmmlink.errors import PlanError
 from cmmlink.plan import SurfaceFit
 from cmmlink.words import printable
 from drivers import UnitName
-from inspection import NotMeasured
 
 if TYPE_CHECKING:
     from cmmlink.plan import SurfacePlan
@@ -164,41 +163,3 @@ def _pose_in(path: Path) -> dict[str, Any]:
     if not isinstance(pose, dict) or not {"rotation", "translation_mm"} <= set(pose):
         raise PlanError(f"--start {path}: there is no pose in it; {expected}")
     return {key: pose[key] for key in ("rotation", "translation_mm")}
-
-
-def report_surface(run: "FinishedSurface", out: Path | None, *, as_json: bool) -> int:
-    """Print the outcome of a run of a surface and write its files. Returns the exit code.
-
-    Raises NotMeasured where the set-up contradicts the points, and why there is no result where a file of points gave none.
-    """
-    from cmmlink.report import print_surface_summary, write_surface
-
-    outcome, evidence, refusal = run.outcome, run.evidence, run.refusal
-    if isinstance(refusal, NotMeasured) and outcome.failure is None and outcome.ending == "complete":
-        raise refusal
-    message = str(outcome.failure or refusal or "")
-    if outcome.ending == "aborted":
-        message = message or "stopped by the operator: the scan is not complete"
-    if message:
-        say(message)
-    say_untold(() if evidence is None else evidence.anchors)
-    document = run.result_json()
-    folder = run.folder_of(out) if out is not None and outcome.measured else None
-    written: list[str] = []
-    try:
-        if folder is not None:
-            with progress(f"writing results to {folder}"):
-                written = write_surface(folder, document, outcome.result)
-    finally:
-        if as_json:
-            print_json(document)
-        else:
-            print_surface_summary(terminal(), document, f"{run.title}, {run.started.device}", run.notes)
-    if not as_json:
-        if written:
-            typer.echo(f"results in {folder}: {', '.join(written)}")
-        if evidence is not None:
-            typer.echo(f"recorded as run {evidence.run}")
-    if outcome.failure is not None:
-        return NO_RECORD if isinstance(outcome.failure, StoreError) else DEVICE_FAILED
-    return UNUSABLE if outcome.result is None else EXIT_OF[run.verdict]

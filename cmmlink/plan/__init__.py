@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from cmmlink.plan.formats import FormatName
     from cmmlink.plan.given import plan_given_by
     from cmmlink.plan.key_search import KeyEntry, all_keys, keys_named
-    from cmmlink.plan.mistakes import PlanMistake, find_mistakes, kind_of
+    from cmmlink.plan.mistakes import PlanMistake, find_mistakes, kind_of, kind_of_plan
     from cmmlink.plan.own_maps import map_of
     from cmmlink.plan.papers import LanguageName, PaperName, SectionPages
     from cmmlink.plan.report import ReportSettings
@@ -44,7 +44,7 @@ else:
         "cmmlink.plan.key_search": ("KeyEntry", "all_keys", "keys_named"),
         "cmmlink.plan.serial_numbers": ("SerialNumbers", "next_serial_number"),
         "cmmlink.plan.schema": ("schema_of_plans",),
-        "cmmlink.plan.mistakes": ("PlanMistake", "find_mistakes", "kind_of"),
+        "cmmlink.plan.mistakes": ("PlanMistake", "find_mistakes", "kind_of", "kind_of_plan"),
         "cmmlink.plan.formats": ("FormatName",),
         "cmmlink.plan.own_maps": ("map_of",),
         "cmmlink.plan.papers": ("LanguageName", "PaperName", "SectionPages"),
@@ -124,6 +124,7 @@ __all__ = [
     "find_mistakes",
     "keys_named",
     "kind_of",
+    "kind_of_plan",
     "line_of",
     "load_ct_plan",
     "load_plan",

@@ -36,6 +36,14 @@ def kind_of(text: str) -> type[Plan] | type[SurfacePlan] | type[CtPlan] | type[R
     return CtPlan if "mesh" in keys else RegisterMap if "pattern" in keys and "part" not in keys else Plan
 
 
+def kind_of_plan(path: Path) -> type[Plan] | type[SurfacePlan] | type[CtPlan] | type[RegisterMap]:
+    """Which kind of file it is that stands there. Raises PlanError where it cannot be read."""
+    try:
+        return kind_of(read_text(path))
+    except PointFileError as error:
+        raise PlanError(str(error)) from None
+
+
 def find_mistakes(path: Path) -> tuple[PlanMistake, ...]:
     """Everything that is wrong with the text of a plan or a register map; none where it can be read.
 

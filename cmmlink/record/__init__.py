@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from cmmlink.record.station_lock import PATIENCE_S
     from cmmlink.record.store import FILE_NAME, Store, has_records
     from cmmlink.record.surface_bodies import unpack_surface
+    from cmmlink.record.surface_replay import SurfaceReplay, recorded_surface, replay_surface
     from cmmlink.record.trust import trust_in
 else:
     from cmmlink.front_door import load_on_use
@@ -99,6 +100,7 @@ else:
         "cmmlink.record.station_lock": ("PATIENCE_S",),
         "cmmlink.record.store": ("FILE_NAME", "Store", "has_records"),
         "cmmlink.record.surface_bodies": ("unpack_surface",),
+        "cmmlink.record.surface_replay": ("SurfaceReplay", "recorded_surface", "replay_surface"),
         "cmmlink.record.trust": ("trust_in",),
     }
 
@@ -130,6 +132,7 @@ __all__ = [
     "Seal",
     "Signature",
     "Store",
+    "SurfaceReplay",
     "Told",
     "VerdictSought",
     "anchor_ends",
@@ -180,8 +183,10 @@ __all__ = [
     "recorded_profile",
     "recorded_result",
     "recorded_run",
+    "recorded_surface",
     "recorded_surface_plan",
     "replay_run",
+    "replay_surface",
     "restore",
     "rotate_key",
     "seal_of",

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
@@ -13,13 +14,15 @@ from cmmlink.deviations_csv import write_deviations
 from cmmlink.errors import PlanError, StoreError
 from cmmlink.record.bodies import unpack_judged
 from cmmlink.record.evidence import write_chain
-from cmmlink.record.reader import arrivals_of, describe, event_document, points_of, reads_of, recorded_run
+from cmmlink.record.reader import RecordedRun, arrivals_of, describe, event_document, points_of, reads_of, recorded_run
 from cmmlink.record.recorded_inputs import recorded_plan
 from cmmlink.record.recorded_nominal import recorded_profile
 from cmmlink.record.shapes import plain_name
 from cmmlink.record.signature import signature_of
 from cmmlink.record.store import Store
+from cmmlink.record.surface_bodies import unpack_surface
 from cmmlink.result_files import NewFiles, new_files
+from cmmlink.surface_csv import write_surface_deviations
 from cmmlink.zone_file import nominal_document, zone_document
 
 POINT_COLUMNS = {
@@ -96,15 +99,23 @@ def _result(store: Store, run: str, files: NewFiles) -> None:
     if recorded.result is None or recorded.end is None:
         return
     ending = str(recorded.end["state"])
-    blocks = (unpack_judged(record.body) for record in store.records(run, "deviations"))
-    write_deviations(blocks, files("deviations.csv"), ending)
+    rows = (record.body for record in store.records(run, "deviations"))
+    if recorded.is_of_surface:
+        write_surface_deviations(map(unpack_surface, rows), files("deviations.csv"), ending)
+    else:
+        write_deviations(map(unpack_judged, rows), files("deviations.csv"), ending)
+        _nominal(recorded, recorded.result, files)
+    _json(files("result.json"), recorded.result | ({} if ending == "complete" else {"ending": ending}))
+
+
+def _nominal(recorded: RecordedRun, result: Mapping[str, Any], files: NewFiles) -> None:
+    """The curve that was made of the nominal's file, and the certificates that stand on it."""
     with suppress(ValueError, StoreError):  # a plan or nominal that cannot be read has no curve; all else is written all the same
         profile = recorded_profile(recorded_plan(recorded), recorded)
         _json(files("nominal.json"), nominal_document(profile))
-        zones = zone_document(recorded.result, profile)
+        zones = zone_document(result, profile)
         if zones is not None:
             _json(files("zone.json"), zones)
-    _json(files("result.json"), recorded.result | ({} if ending == "complete" else {"ending": ending}))
 
 
 def _signature(store: Store, run: str, files: NewFiles) -> None:

@@ -4,7 +4,6 @@ import threading
 from collections.abc import Callable, Iterator
 
 from cmmlink.errors import StoreError
-from cmmlink.pipeline import RunOutcome
 from cmmlink.record.bodies import PlacedArrival
 from cmmlink.record.reader import RecordedRun, arrivals_of, points_of, reads_of
 from cmmlink.record.store import Store
@@ -27,12 +26,12 @@ class Reading:
             self._failure = error
             raise
 
-    def raise_failure(self, run: str, outcome: RunOutcome) -> None:
+    def raise_failure(self, run: str, failure: Exception | None) -> None:
         """Raise StoreError where not all of the record was read."""
         if self._failure is not None:
             raise self._failure
-        if outcome.failure is not None and not self._has_begun:
-            raise StoreError(f"run {run} cannot be judged again: {outcome.failure}")
+        if failure is not None and not self._has_begun:
+            raise StoreError(f"run {run} cannot be judged again: {failure}")
 
 
 def failure_of(recorded: RecordedRun) -> str:

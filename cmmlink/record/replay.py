@@ -9,14 +9,14 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from cmmlink.characteristics import notes_on_zone
 from cmmlink.errors import StoreError
 from cmmlink.events import RunStarted, Sink
 from cmmlink.from_plan import inspection_of, notes_on_datum, notes_on_nominal, notes_on_temperature
-from cmmlink.pipeline import RunOutcome, run_inspection
-from cmmlink.plan import Plan
+from cmmlink.pipeline import Outcome, RunOutcome, run_inspection
+from cmmlink.plan import Plan, SurfacePlan
 from cmmlink.record.agreement import Agreement, compare, differences_of
 from cmmlink.record.changed_plan import with_changes
 from cmmlink.record.derived import Change, Judgement, keep_judgements
@@ -34,6 +34,9 @@ from cmmlink.scratch import scratch_in
 from cmmlink.words import utc_words
 from drivers import Capture, Decoder
 from inspection import NominalProfile, Reason, SectionCharacteristic
+
+if TYPE_CHECKING:
+    from inspection.surface import SurfaceResult
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,9 +91,7 @@ def replay_run(
 
     Raises StoreError where the record is altered or cannot be read, PlanError where the changed plan cannot be used.
     """
-    altered, _, _ = store.first_alteration(recorded.run)
-    if altered is not None:
-        raise StoreError(f"{store.path}: {altered}; what was altered is not judged again")
+    refuse_altered(store, recorded)
     plan = recorded_plan(recorded)
     changed = with_changes(plan, tolerance, method, settings or {})
     profile = profile or recorded_profile(changed, recorded)
@@ -112,17 +113,57 @@ def replay_run(
         shown=shown,
         cut_short="as recorded" if plan.stop_when_failed else "never",
     )
-    reading.raise_failure(recorded.run, outcome)
+    reading.raise_failure(recorded.run, outcome.failure)
     replayed = result_json(outcome.result, outcome.counts)
-    changes = (*_settings_changed(plan, changed), *_software_changed(recorded.header["software"]))
     notes = (
         *_notes_on(changed, plan, started.notes, recorded),
         *density_notes(density_of(stations_of(outcome.result), profile.length_mm), profile.length_mm),
     )
-    return Replay(changed, outcome, profile, replayed, changes, compare(store, recorded, replayed, outcome.result), notes)
+    return Replay(
+        changed,
+        outcome,
+        profile,
+        replayed,
+        changes_between(plan, changed, recorded),
+        compare(store, recorded, replayed, outcome.result),
+        notes,
+    )
 
 
-def judgement_of(recorded: RecordedRun, again: Replay) -> Judgement:
+def refuse_altered(store: Store, recorded: RecordedRun) -> None:
+    """Raise StoreError where the record of a run was altered."""
+    altered, _, _ = store.first_alteration(recorded.run)
+    if altered is not None:
+        raise StoreError(f"{store.path}: {altered}; what was altered is not judged again")
+
+
+def changes_between(plan: Plan | SurfacePlan, changed: Plan | SurfacePlan, recorded: RecordedRun) -> tuple[Change, ...]:
+    """The settings and the software that are not those of the recorded run."""
+    settings = differences_of(plan.model_dump(mode="json"), changed.model_dump(mode="json"))
+    return (*settings, *differences_of(dict(recorded.header["software"]), software(), "software."))
+
+
+class JudgedAgain(Protocol):
+    """What a replay found, be it of a section or of a surface."""
+
+    @property
+    def plan(self) -> Plan | SurfacePlan:
+        """What was evaluated, with what was changed in it."""
+
+    @property
+    def outcome(self) -> "RunOutcome | Outcome[SurfaceResult]":
+        """How it ended."""
+
+    @property
+    def result_json(self) -> dict[str, Any]:
+        """What was found, as the record tells it."""
+
+    @property
+    def changed(self) -> tuple[Change, ...]:
+        """Settings and software that are not those of the recorded run."""
+
+
+def judgement_of(recorded: RecordedRun, again: JudgedAgain) -> Judgement:
     """What a replay with changes found, as the records keep it."""
     return Judgement(
         recorded.run,
@@ -137,7 +178,7 @@ def judgement_of(recorded: RecordedRun, again: Replay) -> Judgement:
 
 
 def keep_judgement(
-    store: Store, recorded: RecordedRun, again: Replay, *, who: str, why: str, now: datetime, seal: Seal | None = None
+    store: Store, recorded: RecordedRun, again: JudgedAgain, *, who: str, why: str, now: datetime, seal: Seal | None = None
 ) -> dict[str, Any]:
     """Add what a replay with changes found to the records, chained to them and to its run. Returns what says where it stands.
 
@@ -168,11 +209,3 @@ def _doubt_of(recorded: RecordedRun) -> Reason | None:
     """The doubt about the outline of a section of a surface, whose other contours are not on record."""
     words = (recorded.header.get("stack") or {}).get("doubt")
     return Reason("outline", words) if words else None
-
-
-def _settings_changed(plan: Plan, changed: Plan) -> Iterator[Change]:
-    return differences_of(plan.model_dump(mode="json"), changed.model_dump(mode="json"))
-
-
-def _software_changed(recorded: Mapping[str, str]) -> Iterator[Change]:
-    return differences_of(dict(recorded), software(), "software.")
