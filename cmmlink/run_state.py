@@ -23,13 +23,14 @@ class RegistrationState:
 
 @dataclass(frozen=True, slots=True)
 class WorstPoint:
-    """The point farthest from the middle of the zone; x and y are its place in the coordinates of the nominal."""
+    """The point farthest from the middle of the zone; its place in the coordinates of the nominal. Of a surface the station is 0."""
 
     station_mm: float
     deviation_mm: float
     x_mm: float
     y_mm: float
     verdict: VerdictName
+    z_mm: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +56,33 @@ class ZoneLimits:
     upper_mm: float
     uncertainty_mm: float
     decision_rule: str
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceRegion:
+    """A region of a surface that is out of tolerance: its number, from 1, its worst deviation and where on the nominal that is."""
+
+    number: int
+    worst_mm: float
+    area_mm2: float
+    points: int
+    x_mm: float
+    y_mm: float
+    z_mm: float
+
+
+@dataclass(frozen=True, slots=True)
+class WholeSurface:
+    """What is known of a whole surface beside its points: nothing before its end.
+
+    regions    : those out of tolerance, the worst first; `more` there are besides
+    unmeasured : how many places were not measured, and their area together
+    """
+
+    regions: tuple[SurfaceRegion, ...] = ()
+    more: int = 0
+    unmeasured: int = 0
+    unmeasured_mm2: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +114,7 @@ class RunState:
     latency_s     : how long the newest judged point waited for its verdict
     verdict_at_ms : when the newest verdict was given, ms since 1970
     answer        : null where no machine waits for the verdict
+    surface       : of a run of a whole surface, which has no stations; null of a section
     """
 
     number: str
@@ -131,3 +160,4 @@ class RunState:
     answer: AnswerState | None
     length_mm: float
     zone: ZoneLimits
+    surface: WholeSurface | None

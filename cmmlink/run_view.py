@@ -6,30 +6,36 @@ at every batch. What looks is given an immutable `RunState`. Nobody waits for an
 
 import math
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
-
-import numpy as np
-from numpy.typing import NDArray
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 from cmmlink.arrival_rate import ArrivalRate
 from cmmlink.characteristic_rows import Characteristics, characteristics_at_end, characteristics_so_far, names_of, worst_words
 from cmmlink.characteristics import base_row
 from cmmlink.endings import Ended, count_words, reasons_of
 from cmmlink.events import Answered, Arrived, Counts, Evaluated, Event, Judged, ProvenOut, RunStarted
-from cmmlink.extremes import DEVIATION, FOOT_X, NORMAL_X, STATION, VERDICT, ChangedBins, Extremes, PointsVersion
+from cmmlink.extremes import ChangedBins, PointsVersion
 from cmmlink.from_plan import zone_of
 from cmmlink.plan import Plan
-from cmmlink.result_json import density_notes, density_of, number, result_json
-from cmmlink.run_state import AnswerState, LinkPhase, Phase, RegistrationState, RunKind, RunState, VerdictState, WorstPoint, ZoneLimits
-from cmmlink.words import LOOKS_OUT, NOT_MEASURED, VERDICT_NAMES, VERDICT_WORDS, Headline, headline_of, local_words
+from cmmlink.result_json import number, result_json
+from cmmlink.run_state import AnswerState, LinkPhase, Phase, RegistrationState, RunKind, RunState, VerdictState, WholeSurface, ZoneLimits
+from cmmlink.shown_section import ShownSection
+from cmmlink.words import LOOKS_OUT, NOT_MEASURED, VERDICT_WORDS, Headline, headline_of, local_words
 from drivers import Heartbeat, LinkDown, LinkUp, PointBatch, Rejected, ScanClosed, ScanOpened
-from inspection import InspectionResult, LiveUpdate, NominalProfile, ToleranceZone, Verdict, coverage
+from inspection import InspectionResult, LiveUpdate, NominalProfile, ToleranceZone, Verdict
+
+if TYPE_CHECKING:  # who shows sections alone loads nothing of surfaces
+    from cmmlink.shown_surface import ShownSurface
+    from cmmlink.worst_voxels import ChangedVoxels
+    from inspection.surface import NominalSurface, SurfaceResult, SurfaceUpdate
 
 _COUNTED = ("received", "judged", "rejected", "lost", "damaged_bytes", "rejected_by_reason")
 _ALIVE_S = 1.0
 _COVERAGE_EVERY_S = 0.25
+_ROWS_AT_ONCE = 1 << 16
 _MOST_WAITING = 8192  # points; the run itself sees to them where nobody looks
 
 
@@ -37,13 +43,16 @@ _MOST_WAITING = 8192  # points; the run itself sees to them where nobody looks
 class RunContext:
     """What is known of a run before it begins: its number or title, its plan, and what the points are judged by.
 
+    nominal : a section or a whole surface
     base : the place of the characteristic that fails wherever a point is proven to be out of the zone; None where none need fail
     answers : a machine waits for the verdict
+    gap_max_mm  : of a whole surface the diameter of the widest place without a point that counts as measured
+    document_of : says what is told of the result of a whole surface
     """
 
     number: str
     plan: str
-    profile: NominalProfile
+    nominal: "NominalProfile | NominalSurface"
     zone: ToleranceZone
     coverage_min: float
     buffer_points: int
@@ -51,6 +60,8 @@ class RunContext:
     kind: RunKind = "run"
     base: int | None = 0
     answers: bool = False
+    gap_max_mm: float = math.nan
+    document_of: "Callable[[SurfaceResult | None, Counts], Mapping[str, Any]] | None" = None
 
     @classmethod
     def of(cls, plan: Plan, profile: NominalProfile, began: datetime, number: str, plan_name: str, kind: RunKind = "run") -> "RunContext":
@@ -58,6 +69,19 @@ class RunContext:
         zone, coverage_min = zone_of(plan, profile), plan.registration.coverage_min
         answers = plan.answer is not None and kind == "run"
         return cls(number, plan_name, profile, zone, coverage_min, plan.buffer_points, began, kind, base_row(plan), answers)
+
+    @property
+    def length_mm(self) -> float:
+        """The length of the section; 0 of a whole surface, which has none."""
+        return self.nominal.length_mm if isinstance(self.nominal, NominalProfile) else 0.0
+
+    def shown(self) -> "ShownSection | ShownSurface":
+        """What is shown of its points, before there are any."""
+        if isinstance(self.nominal, NominalProfile):
+            return ShownSection(self.nominal, self.zone)
+        from cmmlink.shown_surface import ShownSurface  # noqa: PLC0415 - who shows sections alone loads nothing of surfaces
+
+        return ShownSurface(self.nominal, self.zone, self.gap_max_mm)
 
 
 class RunView:
@@ -76,7 +100,7 @@ class RunView:
         self._lock, self._catching_up = threading.Lock(), threading.Lock()
         self._waiting: list[Judged] = []
         self._waiting_points, self._waiting_at = 0, now()
-        self._extremes = Extremes(context.profile.length_mm, context.zone.middle_mm)
+        self._shown = context.shown()
         self._started = RunStarted("", "", "", "", False)
         self._phase: Phase = "preparing"
         self._counts = Counts()
@@ -89,7 +113,7 @@ class RunView:
         self._alive_s = -math.inf
         self._latency_s = math.nan
         self._verdict_at: datetime | None = None
-        self._update: LiveUpdate | None = None
+        self._update: LiveUpdate | SurfaceUpdate | None = None
         self._out = 0
         self._proven_at: int | None = None
         self._evaluated, self._characteristics = Evaluated(0.0, (), None), Characteristics()
@@ -115,9 +139,7 @@ class RunView:
         elif isinstance(event, Answered):
             self._take_answer(event)
         else:
-            result = event.result if isinstance(event.result, InspectionResult) else None
-            blocks = result.blocks if result is not None else None
-            self._end(Ended(event.ending, event.message, result_json(result, event.counts), blocks), event.counts)
+            self._end(Ended(event.ending, event.message, *self._told(event.result, event.counts)), event.counts)
 
     def recall(self, started: RunStarted, ended: Ended) -> None:
         """Show a run as the records hold it."""
@@ -134,7 +156,7 @@ class RunView:
     def fail(self, message: str) -> None:
         """Note that the run broke off before it could give a result; what arrived without a verdict by then has none."""
         self._catch_up(wait=True)
-        covered = coverage(self._extremes.stations_mm, self.context.profile)
+        covered = self._shown.coverage()
         with self._lock:
             self._failure, self._phase, self._link, self._coverage = message, "finished", "closed", covered
             if self._answer is not None:
@@ -182,13 +204,21 @@ class RunView:
     def newest_points(self) -> PointsVersion:
         """The version of a reader that has seen all points up to now. Never waits."""
         self._catch_up()
-        return self._extremes.newest
+        return self._shown.newest
 
     def points_since(self, seen: PointsVersion) -> tuple[ChangedBins, datetime | None]:
-        """The bins that changed after what was `seen`, and when the newest verdict in them was given."""
+        """The bins of a section that changed after what was `seen`, and when the newest verdict in them was given."""
         self._catch_up()
-        verdict_at = self._verdict_at
-        return self._extremes.changed_since(seen), verdict_at
+        verdict_at, shown = self._verdict_at, self._shown
+        assert isinstance(shown, ShownSection)
+        return shown.changed_since(seen), verdict_at
+
+    def voxels_since(self, seen: PointsVersion) -> "tuple[ChangedVoxels, datetime | None]":
+        """The voxels of a surface that changed after what was `seen`, and when the newest verdict in them was given."""
+        self._catch_up()
+        verdict_at, shown = self._verdict_at, self._shown
+        assert not isinstance(shown, ShownSection)
+        return shown.changed_since(seen), verdict_at
 
     def _set_started(self, started: RunStarted) -> None:
         with self._lock:
@@ -241,20 +271,16 @@ class RunView:
             self._catching_up.release()
 
     def _show_verdicts(self, events: Sequence[Judged], at: datetime) -> None:
-        updates, newest = [event.update for event in events if isinstance(event.update, LiveUpdate)], events[-1]
+        updates, newest = [event.update for event in events], events[-1]
         anew = updates[0].first == 0
-        extremes = self._empty_extremes() if anew else self._extremes
-        columns = ("station_mm", "deviation_mm", "foot_mm", "actual_mm", "verdicts")
-        station, deviation, foot, actual, found = (np.concatenate([getattr(update, name) for update in updates]) for name in columns)
-        extremes.add(station, deviation, foot, actual, found)
-        verdicts = self.context.zone.verdicts(deviation)  # without what the pose can still move: what looks out now
-        out = int(np.count_nonzero(verdicts == Verdict.NONCONFORM)) + (0 if anew else self._out)
+        shown = self._shown.emptied() if anew else self._shown
+        out = shown.add(updates) + (0 if anew else self._out)  # type: ignore[arg-type]  # those of its own kind
         covered, covered_s = self._coverage, self._coverage_s
         if newest.time_s - covered_s > _COVERAGE_EVERY_S:
-            covered, covered_s = coverage(extremes.stations_mm, self.context.profile), newest.time_s
+            covered, covered_s = shown.coverage(), newest.time_s
         with self._lock:
-            self._extremes, self._out, self._coverage, self._coverage_s = extremes, out, covered, covered_s
-            self._update, self._counts, self._latency_s = updates[-1], newest.counts, newest.age_s
+            self._shown, self._out, self._coverage, self._coverage_s = shown, out, covered, covered_s
+            self._update, self._counts, self._latency_s = newest.update, newest.counts, newest.age_s
             if newest.counts.judged:
                 self._verdict_at = at
             self._publish()
@@ -285,25 +311,33 @@ class RunView:
     def _end(self, ended: Ended, counts: Counts) -> None:
         """Replace everything provisional by the result."""
         self._catch_up(wait=True)
-        extremes, places = self._extremes, density_of([], self.context.profile.length_mm)
+        shown = self._shown
         if ended.blocks is not None:
-            extremes = self._empty_extremes()
+            shown = shown.emptied()
             for rows in ended.blocks():
-                extremes.add(rows.station_mm, rows.deviation_mm, rows.foot_mm, rows.actual_mm, rows.verdicts)
-                places += density_of([rows.station_mm], self.context.profile.length_mm)
+                shown.add_rows(rows)  # type: ignore[arg-type]  # those of its own kind
         with self._lock:
-            self._phase, self._ended, self._counts, self._extremes = "finished", ended, counts, extremes
+            self._phase, self._ended, self._counts, self._shown = "finished", ended, counts, shown
             self._characteristics = characteristics_at_end(ended.result)
             self._link = "down" if ended.ending == "interrupted" else "closed"
             self._coverage, self._out = ended.result["coverage"], ended.result["out_of_tolerance"]
-            self._notes = (*self._started.notes, *density_notes(places, self.context.profile.length_mm))
+            self._notes = (*self._started.notes, *ended.result.get("assumed", ()), *(shown.notes if ended.blocks is not None else ()))
             if ended.blocks is not None:
                 self._verdict_at = self._now()
             self._publish()
 
-    def _empty_extremes(self) -> Extremes:
-        context = self.context
-        return Extremes(context.profile.length_mm, context.zone.middle_mm, self._extremes.generation + 1)
+    def _told(
+        self, result: "InspectionResult | SurfaceResult | None", counts: Counts
+    ) -> tuple[Mapping[str, Any], Callable[[], Iterable[Any]] | None]:
+        """What is told of a result as JSON has it, and what gives its rows."""
+        document_of = self.context.document_of
+        if document_of is None:
+            assert result is None or isinstance(result, InspectionResult)
+            return result_json(result, counts), result.blocks if result is not None else None
+        assert not isinstance(result, InspectionResult)
+        from cmmlink.surface_rows import surface_blocks  # noqa: PLC0415 - who shows sections alone loads nothing of surfaces
+
+        return document_of(result, counts), None if result is None else partial(surface_blocks, result, _ROWS_AT_ONCE)
 
     def _publish(self) -> None:
         """Replace the snapshot; called with the lock held."""
@@ -350,22 +384,33 @@ class RunView:
             coverage=self._coverage,
             coverage_min=context.coverage_min,
             out_of_tolerance=self._out,
-            worst=_worst_point(self._extremes.worst),
+            worst=self._shown.worst,
             verdict=self._verdict(),
             answer=self._answer,
-            length_mm=context.profile.length_mm,
+            length_mm=context.length_mm,
             zone=ZoneLimits(zone.lower_mm, zone.upper_mm, zone.guard_mm, zone.decision_rule),
+            surface=self._surface(),
         )
+
+    def _surface(self) -> WholeSurface | None:
+        if isinstance(self.context.nominal, NominalProfile):
+            return None
+        if self._ended is None:
+            return WholeSurface()
+        from cmmlink.shown_surface import whole_surface_in  # noqa: PLC0415 - likewise
+
+        return whole_surface_in(self._ended.result)
 
     def _registration(self) -> RegistrationState:
         found = self._ended.result["registration"] if self._ended else None
         if found is not None and self._ended is not None and self._ended.ending == "complete":
-            return RegistrationState("settled", 0.0, len(found.get("other_poses", [])))
+            return RegistrationState("settled", 0.0, _other_poses(found))
         if found is not None:
-            return RegistrationState("provisional", None, len(found.get("other_poses", [])))  # more points would have moved it
+            return RegistrationState("provisional", None, _other_poses(found))  # more points would have moved it
         if self._update is None:
             return RegistrationState("seeking", None, 0)
-        return RegistrationState(self._update.state, number(self._update.can_move_mm), 0)
+        can_move_mm = self._update.can_move_mm if isinstance(self._update, LiveUpdate) else math.nan
+        return RegistrationState(self._update.state, 0.0 if self._update.state == "settled" else number(can_move_mm), 0)
 
     def _verdict(self) -> VerdictState:
         ended = self._ended
@@ -407,9 +452,6 @@ def _state_of(headline: Headline, final: bool, why: str, further: Sequence[str] 
     return VerdictState(headline.words, headline.shape, final, why, of, tuple(further))
 
 
-def _worst_point(worst: NDArray[np.float64] | None) -> WorstPoint | None:
-    if worst is None:
-        return None
-    x, y = worst[FOOT_X : FOOT_X + 2] + worst[DEVIATION] * worst[NORMAL_X : NORMAL_X + 2]
-    verdict = VERDICT_NAMES[Verdict(int(worst[VERDICT]))]
-    return WorstPoint(float(worst[STATION]), float(worst[DEVIATION]), float(x), float(y), verdict)
+def _other_poses(found: Mapping[str, Any]) -> int:
+    """How many other poses fit as well: a section names them, a surface counts them."""
+    return int(found["rivals"]) if "rivals" in found else len(found.get("other_poses", ()))

@@ -33,7 +33,7 @@ _STRANGER_S = 20.0  # as long as a page may take to load and to show the token
 _CLOSED_WITHIN_S = 2.0  # after the station has said that it closes a page's socket
 _OUT_OF_FILES_S = 0.1
 _MOST_FRAMES = 64  # that one message may come in
-_MOST_UNSENT = 16 << 20  # bytes that wait for a page; the longest message has about 1 MB
+_MOST_UNSENT = 16 << 20  # bytes that wait for a page; the longest message, of a whole surface, has about 8 MB
 
 
 def strangers_allowed() -> int:

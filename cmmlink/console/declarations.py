@@ -13,7 +13,7 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from cmmlink import extremes, words
+from cmmlink import colour_map, extremes, words
 from cmmlink.console import protocol
 from cmmlink.console.form_answers import PlanSaved, Understood
 from cmmlink.console.register_words import MapSaved
@@ -21,12 +21,13 @@ from cmmlink.console.trend_words import TrendChoices, TrendShown
 from inspection import Verdict
 
 _HEAD = "// Written by `python -m cmmlink.console.declarations`; change cmmlink/console/protocol.py, not this file.\n\n"
+_MOST_ON_A_LINE = 6
 _WORDS = {str: "string", bool: "boolean", int: "number", float: "number", NoneType: "null"}
 
 
 def constants_js() -> str:
     """The constants of the protocol as a module of the page."""
-    return _HEAD + "".join(f"export const {name} = {json.dumps(value)};\n" for name, value in _constants().items())
+    return _HEAD + "".join(f"export const {name} = {_constant(value)};\n" for name, value in _constants().items())
 
 
 def declarations_ts() -> str:
@@ -59,12 +60,20 @@ def _constants() -> dict[str, Any]:
         "HEADER_AT": {name: header.fields[name][1] for name, _ in protocol.HEADER} if header.fields else {},
         "POINTS": protocol.POINTS,
         "NOMINAL": protocol.NOMINAL,
+        "SURFACE_POINTS": protocol.SURFACE_POINTS,
+        "NOMINAL_SURFACE": protocol.NOMINAL_SURFACE,
         "CLOSED": protocol.CLOSED,
         **{name: getattr(extremes, name) for name in columns},
         **{verdict.name: int(verdict) for verdict in Verdict},
         "WORDS_OF_VERDICTS": protocol.WORDS_OF_VERDICTS,
         "POSE_MOVES": words.POSE_MOVES,
+        "SURFACE_COLOURS": colour_map.NAMED,
     }
+
+
+def _constant(value: Any) -> str:
+    """A constant on one line, or a line for each of many names."""
+    return json.dumps(value, indent=2 if isinstance(value, Mapping) and len(value) > _MOST_ON_A_LINE else None)
 
 
 def _unions() -> dict[str, Any]:

@@ -19,7 +19,7 @@ def points_message(changed: ChangedBins, generation: int, verdict_at: datetime |
     rows = len(changed.bins)
     time_ms = verdict_at.timestamp() * 1e3 if verdict_at else 0.0
     columns = changed.extremes.reshape(rows, 2 * COLUMNS).T.astype("<f4")
-    return _header(POINTS, generation, rows, 0, time_ms, BINS) + changed.bins.astype("<u4").tobytes() + columns.tobytes()
+    return header(POINTS, generation, rows, 0, time_ms, BINS) + changed.bins.astype("<u4").tobytes() + columns.tobytes()
 
 
 def nominal_message(profile: NominalProfile) -> bytes:
@@ -33,8 +33,9 @@ def nominal_message(profile: NominalProfile) -> bytes:
     breaks = np.flatnonzero(profile.next_site[kept] < 0)[:-1] + 1
     columns = np.insert(columns, breaks, np.nan, axis=0)
     flags = CLOSED if profile.curve.closed else 0
-    return _header(NOMINAL, 0, len(columns), flags, 0.0, profile.length_mm) + columns.T.astype("<f4").tobytes()
+    return header(NOMINAL, 0, len(columns), flags, 0.0, profile.length_mm) + columns.T.astype("<f4").tobytes()
 
 
-def _header(kind: int, generation: int, rows: int, flags: int, time_ms: float, number: float) -> bytes:
+def header(kind: int, generation: int, rows: int, flags: int, time_ms: float, number: float) -> bytes:
+    """The fields that a binary message begins with."""
     return np.array((kind, generation, rows, flags, time_ms, number), dtype=list(HEADER)).tobytes()

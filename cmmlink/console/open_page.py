@@ -3,7 +3,7 @@
 import asyncio
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import anyio.to_thread
 from starlette.websockets import WebSocket
@@ -14,6 +14,11 @@ from cmmlink.console.protocol import FoundRuns, History, Message
 from cmmlink.extremes import PointsVersion
 from cmmlink.record import RunSearch
 from cmmlink.run_view import RunView
+from inspection import NominalProfile
+
+if TYPE_CHECKING:
+    from cmmlink.console.surface_drawing import SurfaceDrawing
+    from inspection.surface import NominalSurface
 
 _SENT_WITHIN_S = 10.0  # a page that takes longer to read one message is gone
 NOTHING_SOUGHT = FoundRuns(None, 0)
@@ -34,6 +39,7 @@ class OpenPage:
     number: int
     opened: RunView | None = None
     nominal_of: RunView | None = None
+    drawing: "SurfaceDrawing | None" = None
     seen: PointsVersion = _UNSEEN
     generation: int = 0
     sent: dict[str, Message] = field(default_factory=dict)
@@ -66,9 +72,10 @@ class OpenPage:
             return
         if self.nominal_of is not view:
             self.nominal_of, self.seen = view, _UNSEEN
-            await self.send(await anyio.to_thread.run_sync(nominal_message, view.context.profile))
+            self.drawing, message = await anyio.to_thread.run_sync(_begin_to_draw, view.context.nominal)
+            await self.send(message)
         if self.seen != view.newest_points:
-            packed = await anyio.to_thread.run_sync(_pack_changes, view, self.seen, self.generation)
+            packed = await anyio.to_thread.run_sync(_pack_changes, view, self.drawing, self.seen, self.generation)
             self.seen, self.generation = packed.seen, packed.generation
             await self.send(packed.message)
 
@@ -81,8 +88,22 @@ class _Packed(NamedTuple):
     generation: int
 
 
-def _pack_changes(view: RunView, seen: PointsVersion, generation: int) -> _Packed:
+def _begin_to_draw(nominal: "NominalProfile | NominalSurface") -> "tuple[SurfaceDrawing | None, bytes]":
+    """What packs the points of a surface, None for a section, and the message with the nominal."""
+    if isinstance(nominal, NominalProfile):
+        return None, nominal_message(nominal)
+    from cmmlink.console.surface_drawing import SurfaceDrawing  # noqa: PLC0415 - who shows sections alone loads nothing of surfaces
+
+    drawing = SurfaceDrawing(nominal)
+    return drawing, drawing.nominal_message()
+
+
+def _pack_changes(view: RunView, drawing: "SurfaceDrawing | None", seen: PointsVersion, generation: int) -> _Packed:
     """Pack the points that changed after what a page has `seen`; `generation` is that of the message before."""
-    changed, verdict_at = view.points_since(seen)
-    generation += changed.seen.generation != seen.generation
-    return _Packed(points_message(changed, generation, verdict_at), changed.seen, generation)
+    if drawing is None:
+        bins, verdict_at = view.points_since(seen)
+        generation += bins.seen.generation != seen.generation
+        return _Packed(points_message(bins, generation, verdict_at), bins.seen, generation)
+    voxels, verdict_at = view.voxels_since(seen)
+    generation += voxels.seen.generation != seen.generation
+    return _Packed(drawing.points_message(voxels, generation, verdict_at), voxels.seen, generation)

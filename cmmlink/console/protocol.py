@@ -28,9 +28,12 @@ LARGEST_NOMINAL = 32 << 20  # bytes of a file that a page may hand in
 #          when the newest verdict was given, ms since 1970, 0 for none; the number is how many bins there are. Another generation
 #          than before says that all points sent before are void.
 # nominal: station, x, y, outward normal x, y, f32; NaN in every column between two pieces. The number is the length in mm.
+# Of a whole surface rows come one after the other, and a row is x, y, z, deviation, f32, and the outward normal, i8 of 127, in 4 bytes.
+# surface points : before each row the number of its voxel, u32, whose worst point it is. The number is the size of a voxel in mm.
+# nominal surface: places of it, whose deviation is 0. The number is about how far they are apart in mm. Voids all points.
 HEADER = (("kind", "<u4"), ("generation", "<u4"), ("rows", "<u4"), ("flags", "<u4"), ("time_ms", "<f8"), ("number", "<f8"))
 HEADER_BYTES = 32
-POINTS, NOMINAL = 1, 2  # kinds
+POINTS, NOMINAL, SURFACE_POINTS, NOMINAL_SURFACE = 1, 2, 3, 4  # kinds
 CLOSED = 1  # flag of a nominal
 
 Severity = Literal["fault", "warning"]
@@ -213,6 +216,7 @@ class RunRow:
     lower_mm: float | None
     upper_mm: float | None
     judged: tuple[str, ...] = ()
+    worst_z_mm: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

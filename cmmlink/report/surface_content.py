@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from cmmlink.report.colour_map import Kind, colours_of, kinds_of, severity_of
+from cmmlink.colour_map import Kind, colours_of, kinds_of, severity_of
 from cmmlink.report.raster import Camera, Dots, Image, View, draw_view
 from cmmlink.report.surface_sides import close_up, four_sides
 from inspection import ToleranceZone

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cmmlink.report.colour_map import colours_of, kinds_of
+from cmmlink.colour_map import colours_of, kinds_of
 from cmmlink.report.folder import or_refuse
 from cmmlink.result_files import NewFiles, new_files
 from cmmlink.result_folder import make_room

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from cmmlink.report.colour_map import COLOURS, Kind, within_zone
+from cmmlink.colour_map import COLOURS, Kind, within_zone
 from cmmlink.report.heading import draw_heading, save_picture
 from cmmlink.report.speech import Speech
 from cmmlink.report.surface_content import CLOSE_PX, SIDE_PX, Panel, SurfaceContent

@@ -9,7 +9,7 @@ import { dated, gettext, translate } from "./words.js";
 /** @import { LinkState } from "./link.js" */
 /** @import { PointClass } from "./points.js" */
 /** @typedef {{ lower_mm: number, upper_mm: number }} Zone */
-/** @typedef {readonly [x: number, y: number]} Place */
+/** @typedef {readonly [x: number, y: number, z?: number]} Place z only of a surface */
 /** @typedef {{ deviation: number, station: number, place: Place | null, kind: PointClass, zone: Zone }} Worst */
 /**
  * What stands at the right of the page.
@@ -87,7 +87,7 @@ function cardOfRun(run, judged) {
   const { word, shape, final, of, why, reasons } = run.verdict;
   const badge = BADGES[run.kind](dated(began));
   const worst = run.worst && {
-    deviation: run.worst.deviation_mm, station: run.worst.station_mm, place: placeOf(run.worst.x_mm, run.worst.y_mm), zone,
+    deviation: run.worst.deviation_mm, station: run.worst.station_mm, place: placeOf(run.worst.x_mm, run.worst.y_mm, run.worst.z_mm), zone,
     kind: classOf(run.worst.deviation_mm, CODE_OF[run.worst.verdict], zone),
   };
   return {
@@ -144,23 +144,29 @@ const useOf = (worst) => (worst ? toleranceUse(worst.deviation, worst.zone) : -1
 /**
  * The worst point of a run or a section as a table holds it; outside the zone it is out only where the verdict says so.
  * @param {Pick<RunRow | SectionRow, "worst_mm" | "worst_station_mm" | "lower_mm" | "upper_mm" | "verdict">
- *   & Partial<Pick<RunRow, "worst_x_mm" | "worst_y_mm">>} row
+ *   & Partial<Pick<RunRow, "worst_x_mm" | "worst_y_mm" | "worst_z_mm">>} row
  * @returns {Worst | null}
  */
-function worstOf({ worst_mm: deviation, worst_station_mm: station, worst_x_mm: x, worst_y_mm: y, lower_mm, upper_mm, verdict }) {
-  if (deviation === null || station === null || lower_mm === null || upper_mm === null) return null;
+function worstOf(row) {
+  const { worst_mm: deviation, worst_station_mm: station, worst_x_mm: x, worst_y_mm: y, worst_z_mm: z, lower_mm, upper_mm, verdict } = row;
+  if (deviation === null || lower_mm === null || upper_mm === null || (station === null && typeof z !== "number")) return null;
   const zone = { lower_mm, upper_mm }, isOutside = deviation < lower_mm || deviation > upper_mm;
   const code = CODE_OF[verdict === "nonconform" ? "nonconform" : "uncertain"];
-  return { deviation, station, place: placeOf(x, y), zone, kind: classOf(deviation, isOutside ? code : CODE_OF.conform, zone) };
+  const kind = classOf(deviation, isOutside ? code : CODE_OF.conform, zone);
+  return { deviation, station: station ?? 0, place: placeOf(x, y, z), zone, kind };
 }
 
 /**
  * A place in the coordinates of the nominal, where it is known.
  * @param {number | null | undefined} x
  * @param {number | null | undefined} y
+ * @param {number | null | undefined} z
  * @returns {Worst["place"]}
  */
-const placeOf = (x, y) => (typeof x === "number" && typeof y === "number" ? [x, y] : null);
+function placeOf(x, y, z = null) {
+  if (typeof x !== "number" || typeof y !== "number") return null;
+  return typeof z === "number" ? [x, y, z] : [x, y];
+}
 
 /**
  * What stands in the verdict's place before a run.

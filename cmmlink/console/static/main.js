@@ -18,6 +18,8 @@ import { Profile } from "./profile.js";
 import { Question } from "./question.js";
 import { RegistersView } from "./registers.js";
 import { Strip } from "./strip.js";
+import { SurfaceScan } from "./surface_scan.js";
+import { SurfaceView } from "./surface_view.js";
 import { Timing } from "./timing.js";
 import { TrendsView } from "./trends.js";
 import { gettext, translate, translateElements } from "./words.js";
@@ -58,6 +60,8 @@ const timing = new Timing();
 const profile = new Profile(byId("profile"), redraw);
 const strip = new Strip(byId("strip"), redraw);
 const drawings = [profile, strip];
+const surfaceScan = new SurfaceScan();
+const surfaceView = new SurfaceView(surfaceScan, redraw);
 const link = new Link(location.hash.slice(1), { onMessage, onBinary, onLink });
 const downloads = new Downloads(() => link.token, say);
 const partView = new PartView(ask, start);
@@ -107,6 +111,7 @@ function greet(hello) {
   heard.run = heard.station = heard.control = cursor = null;
   newest = NaN;
   scan.clear();
+  surfaceScan.clear();
 }
 
 /**
@@ -152,7 +157,7 @@ function showChosen(isOpened) {
 function onBinary(buffer) {
   timing.bytes += buffer.byteLength;
   const { nominal } = scan;
-  scan.take(buffer);
+  if (!surfaceScan.take(buffer)) scan.take(buffer);
   if (scan.nominal !== nominal) cursor = null;
   redraw();
 }
@@ -188,11 +193,12 @@ function paint() {
   if (words) paintWords();
   if (!mustDraw || document.body.dataset.view !== "live") return;
   paintDrawings();
-  timing.note(performance.now() - began, scan.points.newestMs);
+  timing.note(performance.now() - began, heard.run?.surface ? surfaceScan.newestMs : scan.points.newestMs);
 }
 
 function paintDrawings() {
   const { run } = heard;
+  if (run?.surface) return surfaceView.draw();
   for (const drawing of drawings) {
     if (!run) drawing.clear();
     else {
@@ -208,6 +214,7 @@ function paintDrawings() {
 function paintWords() {
   heard.chosen = history.table.chosen ?? null;
   showRun(heard);
+  surfaceView.show(heard.run);
   showLamps(heard);
   showAlarms(alarms, heard.run?.kind ?? "run");
   if (heard.station) {
@@ -389,5 +396,5 @@ setInterval(() => {
   showAge();
   if (performance.now() - saidAt > SAID_MS) put("said", "");
 }, 250);
-Object.assign(window, { timing: () => ({ ...timing.summary(), held: scan.points.held }) });
+Object.assign(window, { timing: () => ({ ...timing.summary(), held: heard.run?.surface ? surfaceScan.points.count : scan.points.held }) });
 go(new URLSearchParams(location.search).has("wall") ? "wall" : "part");

@@ -9,7 +9,7 @@ import { POSE_MOVES } from "./protocol.js";
 import { dated, gettext, ngettext, translate } from "./words.js";
 
 /** @import { RunState } from "./protocol.js" */
-/** @import { Card, Heard } from "./card.js" */
+/** @import { Card, Heard, Worst } from "./card.js" */
 /** @typedef {[symbol: string, word: string]} Lamp */
 /** @typedef {"live" | "take control" | "start again"} BannerAct */
 /** @typedef {{ words: string, kind: "none" | "note" | "warning" | "fault", button: string, act: BannerAct }} Banner */
@@ -128,10 +128,21 @@ function showWorst({ worst, run }) {
   put("worst-shape", worst ? SIGNS[worst.kind] : "");
   put("worst-value", worst ? signed(worst.deviation, digitsFor(worst.zone)) : NONE);
   const nowhere = run ? gettext("no point judged") : "";
-  put("worst-where", worst ? gettext("at station {station} mm", { station: fixed(worst.station, 2) }) : nowhere);
-  put("worst-place", worst?.place ? gettext("x {x} mm, y {y} mm", { x: fixed(worst.place[0], 3), y: fixed(worst.place[1], 3) }) : "");
+  put("worst-where", worst ? whereWords(worst) : nowhere);
+  put("worst-place", worst?.place && worst.place.length < 3
+    ? gettext("x {x} mm, y {y} mm", { x: fixed(worst.place[0], 3), y: fixed(worst.place[1], 3) }) : "");
   const share = worst ? Math.round(100 * toleranceUse(worst.deviation, worst.zone)) : 0;
   put("worst-use", worst ? gettext("{share} % of the tolerance", { share }) : "");
+}
+
+/**
+ * Where the worst point lies: at a station of a profile, or at a place of a surface.
+ * @param {Worst} worst
+ */
+function whereWords({ station, place }) {
+  if (place?.[2] === undefined) return gettext("at station {station} mm", { station: fixed(station, 2) });
+  const [x, y, z] = place.map((value) => fixed(value ?? 0, 2));
+  return gettext("at x {x}, y {y}, z {z} mm", { x, y, z });
 }
 
 /** @param {RunState | null} run */

@@ -6,6 +6,8 @@ export const HEADER_BYTES: 32;
 export const HEADER_AT: { readonly kind: 0; readonly generation: 4; readonly rows: 8; readonly flags: 12; readonly time_ms: 16; readonly number: 24 };
 export const POINTS: 1;
 export const NOMINAL: 2;
+export const SURFACE_POINTS: 3;
+export const NOMINAL_SURFACE: 4;
 export const CLOSED: 1;
 export const STATION: 0;
 export const DEVIATION: 1;
@@ -20,6 +22,7 @@ export const UNCERTAIN: 1;
 export const NONCONFORM: 2;
 export const WORDS_OF_VERDICTS: { readonly conform: "CONFORM"; readonly uncertain: "NOT PROVEN"; readonly nonconform: "NOT CONFORM" };
 export const POSE_MOVES: "the pose still moves";
+export const SURFACE_COLOURS: { readonly lower: "#8fc1e3"; readonly middle: "#f7f5ef"; readonly upper: "#fbbe8a"; readonly above: "#b3300b"; readonly below: "#123f8f"; readonly not_proven: "#e8c400"; readonly not_measured: "#9aa1a8" };
 
 /** The answer to a one-time address: the token, which the page keeps for as long as its tab is open. */
 export interface Admitted {
@@ -122,13 +125,14 @@ export interface RegistrationState {
   readonly other_poses: number;
 }
 
-/** The point farthest from the middle of the zone; x and y are its place in the coordinates of the nominal. */
+/** The point farthest from the middle of the zone; its place in the coordinates of the nominal. Of a surface the station is 0. */
 export interface WorstPoint {
   readonly station_mm: number;
   readonly deviation_mm: number;
   readonly x_mm: number;
   readonly y_mm: number;
   readonly verdict: "conform" | "uncertain" | "nonconform";
+  readonly z_mm?: number | null;
 }
 
 /** The verdict, or how the run ended, in words; its sign; whether it is final; why it is so, and every further reason. of : which of several characteristics gave the part its verdict */
@@ -158,7 +162,26 @@ export interface ZoneLimits {
   readonly decision_rule: string;
 }
 
-/** Everything that is shown of a run in numbers and words, as it was at one moment. run : its id in the records; empty where it is not kept there, or is not over kind : a run that is measured, or what poses as none: a replay, a run from the records, a section of a surface notes : what was assumed about the nominal and the points began : when the points were measured: date, time of day and offset from UTC ending : null while the run is on; message says why a run has no result, or what failed link_detail : why the link was lost, or how long it was away; empty while it never was streaming : whether the device shows itself alive now expected : number of points the device announced latency_s : how long the newest judged point waited for its verdict verdict_at_ms : when the newest verdict was given, ms since 1970 answer : null where no machine waits for the verdict */
+/** A region of a surface that is out of tolerance: its number, from 1, its worst deviation and where on the nominal that is. */
+export interface SurfaceRegion {
+  readonly number: number;
+  readonly worst_mm: number;
+  readonly area_mm2: number;
+  readonly points: number;
+  readonly x_mm: number;
+  readonly y_mm: number;
+  readonly z_mm: number;
+}
+
+/** What is known of a whole surface beside its points: nothing before its end. regions : those out of tolerance, the worst first; `more` there are besides unmeasured : how many places were not measured, and their area together */
+export interface WholeSurface {
+  readonly regions: readonly SurfaceRegion[];
+  readonly more: number;
+  readonly unmeasured: number;
+  readonly unmeasured_mm2: number;
+}
+
+/** Everything that is shown of a run in numbers and words, as it was at one moment. run : its id in the records; empty where it is not kept there, or is not over kind : a run that is measured, or what poses as none: a replay, a run from the records, a section of a surface notes : what was assumed about the nominal and the points began : when the points were measured: date, time of day and offset from UTC ending : null while the run is on; message says why a run has no result, or what failed link_detail : why the link was lost, or how long it was away; empty while it never was streaming : whether the device shows itself alive now expected : number of points the device announced latency_s : how long the newest judged point waited for its verdict verdict_at_ms : when the newest verdict was given, ms since 1970 answer : null where no machine waits for the verdict surface : of a run of a whole surface, which has no stations; null of a section */
 export interface RunState {
   readonly number: string;
   readonly run: string;
@@ -203,6 +226,7 @@ export interface RunState {
   readonly answer: AnswerState | null;
   readonly length_mm: number;
   readonly zone: ZoneLimits;
+  readonly surface: WholeSurface | null;
 }
 
 /** The run the page looks at, null before the first; `recorded` when the page opened a run, or a section, itself. */
@@ -272,6 +296,7 @@ export interface RunRow {
   readonly lower_mm: number | null;
   readonly upper_mm: number | null;
   readonly judged: readonly string[];
+  readonly worst_z_mm?: number | null;
 }
 
 /** The newest runs on record, newest first. */

@@ -36,7 +36,7 @@ def test_declaration_names_every_key_of_a_run() -> None:
     body = re.search(r"export interface RunState \{(.*?)\n\}", declarations_ts(), re.DOTALL)
     assert body is not None
     assert re.findall(r"readonly (\w+):", body[1]) == [field.name for field in fields(RunState)]
-    assert len(fields(RunState)) == 43
+    assert len(fields(RunState)) == 44
 
 
 def test_message_is_sent_with_its_type_and_keys() -> None:

@@ -7,7 +7,7 @@ import pytest
 from matplotlib.image import imread
 from numpy.typing import NDArray
 
-from cmmlink.report.colour_map import AT_LOWER, AT_MIDDLE, AT_UPPER, COLOURS, Kind, colours_of, kinds_of, rgb_of, severity_of
+from cmmlink.colour_map import AT_LOWER, AT_MIDDLE, AT_UPPER, COLOURS, Kind, colours_of, kinds_of, rgb_of, severity_of
 from cmmlink.report.raster import Camera, Dots, draw_view
 from cmmlink.report.surface_content import JudgedSurface, Region, surface_content
 from cmmlink.report.surface_picture import write_surface_picture

@@ -27,6 +27,15 @@ class Kind(IntEnum):
 
 AT_LOWER, AT_MIDDLE, AT_UPPER = "#8fc1e3", "#f7f5ef", "#fbbe8a"
 COLOURS = {Kind.NOT_JUDGED: "#9aa1a8", Kind.UNCERTAIN: "#e8c400", Kind.BELOW: "#123f8f", Kind.ABOVE: "#b3300b"}
+NAMED = {
+    "lower": AT_LOWER,
+    "middle": AT_MIDDLE,
+    "upper": AT_UPPER,
+    "above": COLOURS[Kind.ABOVE],
+    "below": COLOURS[Kind.BELOW],
+    "not_proven": COLOURS[Kind.UNCERTAIN],
+    "not_measured": COLOURS[Kind.NOT_JUDGED],
+}
 
 
 def kinds_of(verdicts: ArrayLike, deviation_mm: ArrayLike, middle_mm: float) -> NDArray[np.int8]:
