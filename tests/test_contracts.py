@@ -48,6 +48,8 @@ PROMISED_NAMES = [
 ]
 GRAB_BAGS = {"utils", "util", "helpers", "helper", "common", "base", "manager", "types", "misc", "core"}
 LIBRARIES_IN_ONE_FILE = {
+    "distributed": {"cmmlink/archive/cluster.py"},
+    "dask": set(),
     "serial": {"drivers/links/serial_scanner.py"},
     "numba": {"inspection/kernels/compiling.py"},
     "ezdxf": {"cmmlink/nominal_files/dxf.py"},
@@ -87,7 +89,7 @@ FRONT_DOORS = [path for path in SOURCES if path.name == "__init__.py" and "_PLAC
 
 def test_the_packages_that_a_command_may_do_without_load_their_names_when_they_are_used() -> None:
     doors = {relative(path.parent) for path in FRONT_DOORS}
-    ours = ("exports", "plan", "plant", "qualification", "record", "reference", "report")
+    ours = ("archive", "exports", "plan", "plant", "qualification", "record", "reference", "report")
     rooms = {"cmmlink", *(f"cmmlink/{room}" for room in ours)}
     inside = {"inspection", "inspection/kernels", "inspection/kernels/surfaces", "inspection/surface"}
     assert doors == rooms | inside | {"drivers"}

@@ -38,9 +38,8 @@ def rows(heading: str) -> dict[str, str]:
     return dict(re.findall(r"^\| `([^`]+)` \| ([^|]+?) \|", section[1], re.MULTILINE))
 
 
-PLAIN, OPEN3D, CAD, PLANT, INSIDE = (
-    rows(name) for name in ("A plain installation", "The extra `open3d`", "The extra `cad`", "The extra `plant`", "Inside the wheels")
-)
+PLAIN, INSIDE = rows("A plain installation"), rows("Inside the wheels")
+OPEN3D, CAD, CLUSTER, PLANT = (rows(f"The extra `{name}`") for name in ("open3d", "cad", "cluster", "plant"))
 
 
 def found(name: str) -> importlib.metadata.Distribution | None:
@@ -110,11 +109,13 @@ def test_everything_that_a_plain_installation_brings_is_listed() -> None:
 
 
 def test_everything_that_the_extras_bring_is_listed() -> None:
-    assert set(PROJECT["optional-dependencies"]) == {"all", "cad", "open3d", "plant", "test", "bench"}, (
+    assert set(PROJECT["optional-dependencies"]) == {"all", "cad", "cluster", "open3d", "plant", "test", "bench"}, (
         "a new extra needs a table of its own"
     )
     if found("cadquery-ocp-novtk") is not None:
         assert brought_by(PROJECT["optional-dependencies"]["cad"]) & pinned() - set(PLAIN) == set(CAD)
+    if found("distributed") is not None:
+        assert brought_by(PROJECT["optional-dependencies"]["cluster"]) & pinned() - set(PLAIN) == set(CLUSTER)
     if found("sqlalchemy") is not None:
         assert brought_by(PROJECT["optional-dependencies"]["plant"]) & pinned() - set(PLAIN) == set(PLANT)
     if found("open3d") is None and found("open3d-cpu") is None:
@@ -122,9 +123,9 @@ def test_everything_that_the_extras_bring_is_listed() -> None:
     assert brought_by(PROJECT["optional-dependencies"]["open3d"]) & pinned() - set(PLAIN) == set(OPEN3D)
 
 
-@pytest.mark.parametrize("name", sorted({**PLAIN, **OPEN3D, **CAD, **PLANT}))
+@pytest.mark.parametrize("name", sorted({**PLAIN, **OPEN3D, **CAD, **CLUSTER, **PLANT}))
 def test_the_licence_that_is_listed_is_the_one_that_is_told(name: str) -> None:
-    told, listed = told_by(name), {**PLAIN, **OPEN3D, **CAD, **PLANT}[name]
+    told, listed = told_by(name), {**PLAIN, **OPEN3D, **CAD, **CLUSTER, **PLANT}[name]
     if not told:
         assert found(name) is None, f"{name} says nothing of its licence"
         return
@@ -140,14 +141,14 @@ def test_a_plain_installation_brings_no_library_under_the_gpl_or_its_kind() -> N
 
 
 def test_what_is_shipped_with_an_extra_and_is_copyleft_is_under_the_lesser_gpl_alone_and_named() -> None:
-    extras = {**OPEN3D, **CAD, **PLANT}
+    extras = {**OPEN3D, **CAD, **CLUSTER, **PLANT}
     told = {name: found for name, listed in extras.items() if COPYLEFT.search(found := f"{told_by(name)} {listed}")}
     assert set(told) == {"psycopg", "psycopg-binary"}
     assert all("LGPL-3.0-only" in words for words in told.values())
 
 
 def test_shared_libraries_inside_the_wheels_are_listed_and_what_is_copyleft_is_named() -> None:
-    inside = set(libraries_inside([*PLAIN, *OPEN3D, *CAD, *PLANT]))
+    inside = set(libraries_inside([*PLAIN, *OPEN3D, *CAD, *CLUSTER, *PLANT]))
     assert inside - set(INSIDE) == set()
     assert {name for name, licence in INSIDE.items() if COPYLEFT.search(licence)} == {
         "libTK*",

@@ -28,6 +28,7 @@ from cmmlink.commands.qualification import qualify
 from cmmlink.commands.records import replay, runs, show
 from cmmlink.commands.reference_set import reference
 from cmmlink.commands.registers import registers
+from cmmlink.commands.rejudge import rejudge
 from cmmlink.commands.report import report
 from cmmlink.commands.setup import doctor, list_ports, nominal, prepare, simulate
 from cmmlink.commands.surfaces import ManyHeights, ct
@@ -69,6 +70,7 @@ app.command(short_help="Write recorded runs as files, also for other programs.")
 app.command(short_help="Write the report of a recorded run as a PDF.")(report)
 app.command(short_help="Lay two scans of one profile over one another.")(compare)
 app.command(short_help="Judge a recorded run again, also with another plan.")(replay)
+app.command(short_help="Judge a whole archive again with another plan.")(rejudge)
 app.command(short_help="Show whether a record was altered, and who signed it.")(verify)
 app.add_typer(key, name="key", short_help="Show or change the key that signs the runs.")
 app.command("verify-zone", short_help="Check the proofs of minimum zones and least consumptions.")(verify_zone)

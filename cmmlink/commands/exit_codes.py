@@ -3,6 +3,7 @@
 import json
 import logging
 import sys
+from collections.abc import Sequence
 from contextlib import suppress
 
 from cmmlink.words import printable
@@ -11,10 +12,16 @@ from inspection import NotMeasured, Verdict
 EXIT_OF = {Verdict.CONFORM: 0, Verdict.NONCONFORM: 1, Verdict.UNCERTAIN: 3}
 UNUSABLE, DEVICE_FAILED, NO_RECORD = 2, 4, 5
 _KIND_OF = {UNUSABLE: "unusable", DEVICE_FAILED: "device-failed", NO_RECORD: "no-record"}
+_WORST_FIRST = (NO_RECORD, EXIT_OF[Verdict.NONCONFORM], DEVICE_FAILED, UNUSABLE, EXIT_OF[Verdict.UNCERTAIN], EXIT_OF[Verdict.CONFORM])
 STOPPED = 130  # by Ctrl-C outside a run; shells and typer use this number
 
 
 _log = logging.getLogger(__name__)
+
+
+def worst_of(codes: Sequence[int]) -> int:
+    """The exit status of several parts together; that of none is 0."""
+    return min(codes, key=_WORST_FIRST.index, default=EXIT_OF[Verdict.CONFORM])
 
 
 def fail(message: str, code: int) -> int:

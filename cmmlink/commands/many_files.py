@@ -8,19 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from cmmlink.commands.exit_codes import DEVICE_FAILED, EXIT_OF, NO_RECORD, UNUSABLE, kind_of_failure, say
+from cmmlink.commands.exit_codes import DEVICE_FAILED, EXIT_OF, NO_RECORD, UNUSABLE, kind_of_failure, say, worst_of
 from cmmlink.commands.output import print_json
 from cmmlink.commands.progress import progress
 from cmmlink.errors import PlanError, RunError, StoreError
 from cmmlink.words import headline_of, printable
 from drivers import DeviceError, PointFileError
-from inspection import InspectionError, Verdict
+from inspection import InspectionError
 
 if TYPE_CHECKING:
     from cmmlink.report import Pictures
     from cmmlink.run import FinishedRun
 
-_WORST_FIRST = (NO_RECORD, EXIT_OF[Verdict.NONCONFORM], DEVICE_FAILED, UNUSABLE, EXIT_OF[Verdict.UNCERTAIN], EXIT_OF[Verdict.CONFORM])
 _WIDEST_NAME = 40
 _NOTHING = "NOT MEASURED"
 
@@ -65,7 +64,7 @@ def inspect_files(
             rows.append(_inspected(file, folder, inspect, pictures))
         if rows[-1].error is not None:
             say(str(rows[-1].error["message"]))
-    worst = min((row.code for row in rows), key=_WORST_FIRST.index)
+    worst = worst_of([row.code for row in rows])
     if as_json:
         print_json({"exit_status": worst, "files": [row.json for row in rows]})
     else:

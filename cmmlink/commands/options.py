@@ -1,6 +1,7 @@
 """Options that several commands share, and what they mean."""
 
 import getpass
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -142,3 +143,16 @@ def who_asks(operator: str | None) -> str:
         return getpass.getuser()
     except (OSError, KeyError, ImportError):  # which of them depends on the system and the version of Python
         raise PlanError("the system does not tell who you are; expected --operator O") from None
+
+
+def settings_in(texts: Sequence[str]) -> dict[str, str]:
+    """The keys of --set with their values. Raises PlanError."""
+    changes: dict[str, str] = {}
+    for text in texts:
+        key, equals, value = text.partition("=")
+        key = key.strip()
+        if not equals or not key or key in changes:
+            problem = f"{key} is given twice" if key in changes else "expected KEY=VALUE, like tolerance.upper_mm=0.08"
+            raise PlanError(f"--set {text}: {problem}")
+        changes[key] = value.strip()
+    return changes

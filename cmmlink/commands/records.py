@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from cmmlink.commands.exit_codes import EXIT_OF, NO_RECORD, UNUSABLE, fail, say
-from cmmlink.commands.options import Json, Out, Records, RunName, RunOrFolder, records_folder, who_asks
+from cmmlink.commands.options import Json, Out, Records, RunName, RunOrFolder, records_folder, settings_in, who_asks
 from cmmlink.commands.output import now, print_json, terminal
 from cmmlink.commands.progress import progress
 from cmmlink.errors import PlanError, RunError, YamlError
@@ -162,7 +162,7 @@ def replay(
     from cmmlink.record import keep_judgement, open_to_record, recorded_run, replay_run, replay_surface, seal_of
     from cmmlink.result_json import number
 
-    changes = _settings_in(settings or ())
+    changes = settings_in(settings or ())
     if changes and not (reason or "").strip():
         raise PlanError("--set judges a recorded run anew: expected --reason TEXT, which is kept with the judgement")
     if reason is not None and not (changes or tolerance or method):
@@ -240,19 +240,6 @@ def _run_or_evidence(opened: ExitStack, name: str, folder: Path) -> tuple["Store
                 raise
     evidence = opened.enter_context(open_evidence(Path(name), now))
     return evidence.store, evidence.run, evidence
-
-
-def _settings_in(texts: Sequence[str]) -> dict[str, str]:
-    """The keys of --set with their values. Raises PlanError."""
-    changes: dict[str, str] = {}
-    for text in texts:
-        key, equals, value = text.partition("=")
-        key = key.strip()
-        if not equals or not key or key in changes:
-            problem = f"{key} is given twice" if key in changes else "expected KEY=VALUE, like tolerance.upper_mm=0.08"
-            raise PlanError(f"--set {text}: {problem}")
-        changes[key] = value.strip()
-    return changes
 
 
 def _print_replay(again: "Replay | SurfaceReplay", run_id: str, document: Mapping[str, Any], notes: Sequence[str]) -> None:

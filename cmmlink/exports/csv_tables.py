@@ -18,12 +18,13 @@ _MARK = b"\xef\xbb\xbf"  # by which spreadsheets know UTF-8
 
 def write_csv(parts: Sequence[MeasuredPart], files: NewFiles, stem: str) -> None:
     """Write STEM.csv with one row a run, STEM-characteristics.csv and STEM-points.csv."""
-    _write_table(files(f"{stem}.csv"), RUN_COLUMNS, run_rows(parts))
-    _write_table(files(f"{stem}-characteristics.csv"), CHARACTERISTIC_COLUMNS, characteristic_rows(parts))
+    write_csv_table(files(f"{stem}.csv"), RUN_COLUMNS, run_rows(parts))
+    write_csv_table(files(f"{stem}-characteristics.csv"), CHARACTERISTIC_COLUMNS, characteristic_rows(parts))
     _write_points(files(f"{stem}-points.csv"), parts)
 
 
-def _write_table(path: Path, columns: Mapping[str, str], rows: Iterable[Mapping[str, Cell]]) -> None:
+def write_csv_table(path: Path, columns: Mapping[str, str], rows: Iterable[Mapping[str, Cell]]) -> None:
+    """Write one table, as spreadsheets read it."""
     with path.open("w", newline="", encoding="utf-8-sig") as file:
         writer = csv.writer(file)
         writer.writerow(columns)
