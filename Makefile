@@ -7,7 +7,7 @@ INSTALL := $(PIP) --no-build-isolation --editable
 # The tests start a hundred processes; where Python may keep no compiled files, each of them compiles every file anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo install test checks compiled lowest lowest-compiled lowest-drivers platforms upgrade bench slower paper faults powercuts kills fuzz soak damage memory elsewhere proofs mutants stops machines laws audit reference uncertainty supply-chain docs bundle page-tools screenshots
+.PHONY: demo install test checks compiled lowest lowest-compiled lowest-drivers platforms upgrade bench slower paper faults powercuts kills fuzz soak damage memory elsewhere proofs mutants stops machines rejudge laws audit reference uncertainty supply-chain docs bundle page-tools screenshots
 demo: .venv/installed
 	$(BIN)/cmmlink demo --out demo-result
 
@@ -140,6 +140,11 @@ machines: .venv/test-installed
 # Copies of the program with one line changed qualify themselves: each mistake must be found, and named by its kind.
 mutants: .venv/test-installed
 	$(BIN)/python -m tests.benchmarks.qualified_mutants
+
+# An archive judged again by one process, two, and a Dask cluster of eight on this computer; 2,000 runs of 50,000 points need 10 GB of disk.
+ARCHIVE ?= 2000
+rejudge: .venv/test-installed
+	$(BIN)/python -m tests.benchmarks.rejudge_benchmark $(ARCHIVE)
 
 # How soon a measuring machine is told to stop, and how much of the scans of 100 bad parts stop_when_failed saves.
 stops: .venv/test-installed

@@ -15,6 +15,8 @@ import drivers
 import inspection
 import simulators
 from cmmlink import deviations_csv, uncertainty_tables
+from cmmlink.archive import COLUMNS as REJUDGED_COLUMNS
+from cmmlink.archive_keys import ArchiveRejudged
 from cmmlink.comparison_keys import Compared
 from cmmlink.exports import tables
 from cmmlink.plan.reference import Group, groups_of, table
@@ -165,6 +167,7 @@ OBJECTS: tuple[tuple[str, type[BaseModel], type[BaseModel] | None], ...] = (
     ("`inspect`, `run` and `demo`: further keys", Recorded, Measured),
     ("`inspect` of several files", FilesInspected, None),
     ("`replay`: further keys", Replayed, Inspected),
+    ("`rejudge`", ArchiveRejudged, None),
     ("`ct`", StackInspected, None),
     ("`nominal`", Understood, None),
     ("`runs`", Runs, None),
@@ -192,6 +195,7 @@ TABLES: tuple[tuple[str, Mapping[str, str]], ...] = (
     ("Runs, in `csv` and `xlsx` of `export --format`: a line for every run or section", tables.RUN_COLUMNS),
     ("Characteristics in them: a line for every characteristic", tables.CHARACTERISTIC_COLUMNS),
     ("Points in them: a line for every received point", tables.POINT_COLUMNS),
+    ("Runs of an archive, in the table of `rejudge --out`: a line for every run", REJUDGED_COLUMNS),
     ("`points.csv` and `points.npy` of `export`: a line for every point", export.POINT_COLUMNS),
     ("`wire.csv` of `export`: a line for every read", export.WIRE_COLUMNS),
     ("`chain.csv` of `export`: a line for every record", evidence.CHAIN_COLUMNS),

@@ -188,7 +188,9 @@ def test_every_library_that_is_imported_is_declared() -> None:
         "cadquery-ocp-novtk": "OCP",
         "XlsxWriter": "xlsxwriter",
     }
-    lines = project["dependencies"] + [line for extra in ("open3d", "cad", "plant") for line in project["optional-dependencies"][extra]]
+    lines = project["dependencies"] + [
+        line for extra in ("open3d", "cad", "cluster", "plant") for line in project["optional-dependencies"][extra]
+    ]
     declared = {re.split(r"[<>=!~\[; ]", line, maxsplit=1)[0] for line in lines}
     known = {imports_of.get(name, name) for name in declared} | set(sys.stdlib_module_names) | set(PACKAGES)
     brought = {"pydantic_core": "pydantic", "llvmlite": "numba", "anyio": "starlette", "h11": "uvicorn"}  # which these cannot do without

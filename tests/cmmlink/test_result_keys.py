@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from pydantic import BaseModel
 
-from cmmlink import comparison_keys, inspection_keys, record_keys, result_keys
+from cmmlink import archive_keys, comparison_keys, inspection_keys, record_keys, result_keys
 from cmmlink.deviations_csv import COLUMNS
 from cmmlink.plan.reference import groups_of
 from cmmlink.record.evidence import CHAIN_COLUMNS
@@ -33,7 +33,7 @@ from tests.cmmlink.command import cmmlink
 from tests.cmmlink.oval_part import oval_points, write_nominal, write_points
 from tests.drivers.surface.meshes import binary_stl, tube, write
 
-KEYS = vars(result_keys) | vars(inspection_keys) | vars(comparison_keys) | vars(record_keys)
+KEYS = vars(result_keys) | vars(inspection_keys) | vars(archive_keys) | vars(comparison_keys) | vars(record_keys)
 OBJECTS = [value for value in KEYS.values() if isinstance(value, type) and issubclass(value, BaseModel) and value.model_fields]
 
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from distributed import LocalCluster
 
-from cmmlink.archive import COLUMNS, Here, Keeper, judge_runs, rejudge
+from cmmlink.archive import COLUMNS, Cluster, Here, Keeper, judge_runs, rejudge
 from cmmlink.archive.tasks import Outcome, Task
 from cmmlink.archive_keys import ArchiveRejudged
 from cmmlink.record import RunSearch, judged_by_means, open_archive, open_to_record
@@ -206,7 +206,7 @@ def test_what_cannot_be_asked_is_refused_in_words(measured: Path, asked: tuple[o
 
 
 def test_a_scheduler_that_does_not_answer_is_a_failed_link(measured: Path) -> None:
-    with patch("cmmlink.archive.cluster.PATIENCE_S", 0.2):
+    with patch.object(Cluster.__init__, "__defaults__", (0.2,)):
         assert "no scheduler of Dask answers there" in cmmlink("rejudge", measured, *WIDER, "--scheduler", "tcp://127.0.0.1:1").failed(4)
 
 

@@ -46,7 +46,7 @@ def loaded_by(*commands: tuple[object, ...]) -> list[tuple[int, str, set[str]]]:
 
 def test_help_version_and_mistakes_load_nothing_heavy() -> None:
     working = ("demo", "run", "inspect", "ct", "nominal", "check", "console", "prepare", "doctor", "ports", "registers")
-    commands = (*working, "runs", "show", "export", "report", "compare", "replay", "verify", "backup", "restore", "merge", "key")
+    commands = (*working, "runs", "show", "export", "report", "compare", "replay", "rejudge", "verify", "backup", "restore", "merge", "key")
     helped = (("--version",), ("--help",), *((command, "--help") for command in commands))
     mistaken = (("inspcet",), ("inspect", "points.csv"), ("inspect", "points.csv", "--nominal", "n.dat", "--tolerance", "wide", 1))
     told = loaded_by(*helped, *mistaken)
