@@ -5,20 +5,26 @@ alone: not on the worker, the task, or the order.
 """
 
 import platform
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 
 from cmmlink.archive.tasks import Failure, Outcome, RunAsked, Task
 from cmmlink.devices import decoder_of
 from cmmlink.errors import PlanError, RunError, StoreError
+from cmmlink.plan import Plan, SurfacePlan
 from cmmlink.record import (
     Nominals,
+    RecordedRun,
+    Replay,
     Store,
+    SurfaceReplay,
     judgement_of,
     means_of,
     recorded_plan,
     recorded_run,
+    recorded_surface_plan,
     replay_run,
+    replay_surface,
     software,
     with_changes,
 )
@@ -46,15 +52,25 @@ def _outcome(store: Store, task: Task, asked: RunAsked, node: str) -> Outcome:
         recorded = recorded_run(store, asked.run)
         if recorded.chain_sha256 != asked.chain_sha256:
             raise StoreError(f"{store.path}: run {asked.run} is there with another content on {node}")
-        plan = with_changes(recorded_plan(recorded), None, None, task.settings)
+        plan = _changed_plan(recorded, task.settings)
         means = means_of(plan.effective_yaml(), software())
         if means in asked.known:
             return Outcome(asked.run, known=means, node=node)
-        profile = _nominals().of(plan, recorded)
-        again = replay_run(store, recorded, decoder_of, settings=task.settings, profile=profile)
+        again: Replay | SurfaceReplay
+        if isinstance(plan, SurfacePlan):
+            again = replay_surface(store, recorded, decoder_of, settings=task.settings)
+        else:
+            profile = _nominals().of(plan, recorded)
+            again = replay_run(store, recorded, decoder_of, settings=task.settings, profile=profile)
         return Outcome(asked.run, judgement_of(recorded, again), node=node)
     except Exception as error:  # whatever it is, the others are judged all the same
         return Outcome(asked.run, failure=_failure(error), node=node)
+
+
+def _changed_plan(recorded: RecordedRun, settings: Mapping[str, str]) -> Plan | SurfacePlan:
+    if recorded.is_of_surface:
+        return with_changes(recorded_surface_plan(recorded), None, None, settings)
+    return with_changes(recorded_plan(recorded), None, None, settings)
 
 
 @cache
@@ -79,7 +95,7 @@ def require_settings(store: Store, runs: Sequence[str], settings: dict[str, str]
     refused: PlanError | None = None
     for run in runs:
         try:
-            with_changes(recorded_plan(recorded_run(store, run)), None, None, settings)
+            _changed_plan(recorded_run(store, run), settings)
         except PlanError as error:
             refused = refused or error
         except (StoreError, RunError):  # which is told of this run, when its turn comes
