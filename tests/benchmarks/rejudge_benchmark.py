@@ -97,7 +97,8 @@ def judged_by(file: Path, make: Callable[[], AbstractContextManager[Workers]], m
 @contextmanager
 def cluster(workers: int) -> Iterator[Workers]:
     """A cluster of processes with one thread each on this computer."""
-    with LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None) as local, Cluster(local.scheduler_address) as found:
+    local = LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None)  # type: ignore[no-untyped-call]
+    with local, Cluster(local.scheduler_address) as found:
         yield found
 
 
@@ -115,7 +116,7 @@ def kill_one(runs: int) -> Callable[[int], None]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])  # type: ignore[union-attr]
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("runs", type=int, nargs="?", default=2000)
     parser.add_argument("--cluster", type=int, default=8)
     parser.add_argument("--folder", type=Path)
