@@ -14,6 +14,7 @@ from pathlib import Path
 
 from platformdirs import user_log_path
 
+from cmmlink.plant import without_password
 from cmmlink.version import __version__
 
 FILE_NAME = "cmmlink.log"
@@ -104,4 +105,5 @@ def _handler(folder: Path) -> logging.Handler:
 
 
 def _quote(argument: str) -> str:
+    argument = without_password(argument)
     return f'"{argument}"' if " " in argument else argument

@@ -23,6 +23,7 @@ from cmmlink.plan.reference import Group, groups_of, table
 from cmmlink.plan.scan import Plan
 from cmmlink.plan.surface import CtPlan
 from cmmlink.plan.whole_surface import SurfacePlan
+from cmmlink.plant_keys import PlantAddress, PlantAgreement, PlantOutbox
 from cmmlink.qualification import QUANTITIES
 from cmmlink.qualification_keys import Qualified
 from cmmlink.record import evidence, export
@@ -181,6 +182,9 @@ OBJECTS: tuple[tuple[str, type[BaseModel], type[BaseModel] | None], ...] = (
     ("`key show`; `key new` prints its first three keys", StationKey, None),
     ("`key rotate`", KeyHandedOver, None),
     ("`backup`, `restore` and `merge`", RecordsCopied, None),
+    ("`plant push` and `plant status`", PlantOutbox, None),
+    ("`plant verify`", PlantAgreement, None),
+    ("`plant address`", PlantAddress, None),
 )
 
 TABLES: tuple[tuple[str, Mapping[str, str]], ...] = (

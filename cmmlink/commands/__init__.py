@@ -22,6 +22,7 @@ from cmmlink.commands.export import export
 from cmmlink.commands.key import key
 from cmmlink.commands.measure import demo, run
 from cmmlink.commands.plans import example, plan
+from cmmlink.commands.plant import plant
 from cmmlink.commands.point_files import inspect
 from cmmlink.commands.proofs import verify_zone
 from cmmlink.commands.qualification import qualify
@@ -34,7 +35,7 @@ from cmmlink.commands.setup import doctor, list_ports, nominal, prepare, simulat
 from cmmlink.commands.surfaces import ManyHeights, ct
 from cmmlink.commands.verify import verify
 from cmmlink.commands.whole_surfaces import surface
-from cmmlink.errors import PlanError, RunError, StoreError
+from cmmlink.errors import PlanError, PlantAwayError, PlantError, RunError, StoreError
 from cmmlink.log import keep_log, log_command, log_folder
 from cmmlink.version import __version__
 from drivers import DeviceError, MeshError, PointFileError
@@ -73,6 +74,7 @@ app.command(short_help="Judge a recorded run again, also with another plan.")(re
 app.command(short_help="Judge a whole archive again with another plan.")(rejudge)
 app.command(short_help="Show whether a record was altered, and who signed it.")(verify)
 app.add_typer(key, name="key", short_help="Show or change the key that signs the runs.")
+app.add_typer(plant, name="plant", short_help="Push results to a database that many stations share.")
 app.command("verify-zone", short_help="Check the proofs of minimum zones and least consumptions.")(verify_zone)
 app.command(short_help="Write points and nominals whose truth is known.")(reference)
 app.command(short_help="Copy all records to one checked file.")(backup)
@@ -121,8 +123,10 @@ def _run_command() -> int | str | None:
         code = fail_in_words("usage", _usage(error))
     except (PlanError, RunError, InspectionError, PointFileError, MeshError) as error:
         code = fail_as_asked(error, UNUSABLE)
-    except DeviceError as error:
+    except (DeviceError, PlantAwayError) as error:
         code = fail_as_asked(error, DEVICE_FAILED)
+    except PlantError as error:
+        code = fail_as_asked(error, UNUSABLE)
     except StoreError as error:
         code = fail_as_asked(error, NO_RECORD)
     except OSError as error:

@@ -21,6 +21,7 @@ _SERVER_OPTIONS = {
     "application_name": "cmmlink",
     "keepalives_idle": 30,
     "tcp_user_timeout": 30_000,  # ms; a server that vanished without a word is given up
+    "options": "-c synchronous_commit=on",  # what counts as pushed has to outlive the server, however it was set up
 }
 
 

@@ -32,6 +32,7 @@ class StoredValue:
 class StoredRun:
     """A run that has ended, as its record tells it.
 
+    section      : of a section of a surface its height, mm; empty for every other run
     verdict      : conform, uncertain or nonconform; None where the run gave none
     chain_sha256 : the hash of its end at the station that measured it
     counts       : received, judged, rejected, lost, damaged_bytes; None where the record does not tell
@@ -41,6 +42,7 @@ class StoredRun:
     station: str
     run: str
     part: str
+    section: str
     serial_number: str
     operator: str
     started: datetime
@@ -94,6 +96,7 @@ class RunFound:
     station: str
     run: str
     part: str
+    section: str
     serial_number: str
     operator: str
     started: datetime

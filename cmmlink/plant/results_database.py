@@ -144,14 +144,23 @@ class ResultsDatabase:
         told, left_out = (verdict, run, where, serial_number), len(rows) - len(of_kind)
         return ResultSeries(part, characteristic, kind.type, kind.unit, value, lower, upper, started_s, *told, left_out)
 
-    def strips(self, part: str, last: int = 60, *, station: str | None = None) -> ProfileStrips:
-        """The deviations along the profile of the newest runs of a part that came to their end, oldest first."""
+    def sections(self, part: str) -> list[str]:
+        """The heights of a part's sections of a surface, mm; empty text among them where there are runs that are none."""
+        with self._engine.reading() as connection:
+            found = connection.scalars(select(RunRow.section).where(RunRow.part == part).distinct())
+            return sorted(found, key=lambda height: float(height or "-inf"))
+
+    def strips(self, part: str, last: int = 60, *, station: str | None = None, section: str = "") -> ProfileStrips:
+        """The deviations along the profile of the newest runs of a part that came to their end, oldest first.
+
+        section : of a part that is measured in sections of a surface, which of them: see `sections`
+        """
         columns = (
             StripRow.mean_mm, StripRow.worst_mm, StripRow.length_mm, StripRow.lower_mm, StripRow.upper_mm, self._seconds(RunRow.started),
             RunRow.verdict, RunRow.run, StationRow.name, RunRow.serial_number,
         )  # fmt: skip
         asked = select(*columns).join(RunRow, RunRow.id == StripRow.run_id).join(StationRow, StationRow.id == RunRow.station_id)
-        asked = asked.where(RunRow.part == part, RunRow.state == "complete", *_equal((StationRow.name, station)))
+        asked = asked.where(RunRow.part == part, RunRow.section == section, RunRow.state == "complete", *_equal((StationRow.name, station)))
         with self._engine.reading() as connection:
             rows = list(connection.execute(asked.order_by(RunRow.started.desc(), RunRow.id.desc()).limit(last)))[::-1]
         columns_of: list[Any] = list(zip(*rows, strict=True)) if rows else [()] * 10
@@ -178,18 +187,19 @@ class ResultsDatabase:
         most  : at most so many
         """
         columns = (
-            StationRow.name, RunRow.run, RunRow.part, RunRow.serial_number, RunRow.operator, RunRow.started, RunRow.state, RunRow.verdict,
-            RunRow.chain_sha256,
+            StationRow.name, RunRow.run, RunRow.part, RunRow.section, RunRow.serial_number, RunRow.operator, RunRow.started, RunRow.state,
+            RunRow.verdict, RunRow.chain_sha256,
         )  # fmt: skip
         of_month = (None, None) if month is None else month_of(month)
         wanted = [*_between(RunRow.started, since, until), *_between(RunRow.started, *of_month)]
         wanted += _equal((RunRow.part, part), (RunRow.serial_number, serial_number), (RunRow.operator, operator), (RunRow.verdict, verdict))
         asked = select(*columns).join(StationRow, StationRow.id == RunRow.station_id).where(*wanted, *_equal((StationRow.name, station)))
         with self._engine.reading() as connection:
-            return [RunFound(*row) for row in connection.execute(asked.order_by(RunRow.started.desc(), RunRow.id.desc()).limit(most))]
+            rows: Iterable[Any] = connection.execute(asked.order_by(RunRow.started.desc(), RunRow.id.desc()).limit(most))
+            return [RunFound(*row) for row in rows]
 
     def events(
-        self, *, part: str | None = None, kind: str | None = None, since: datetime | None = None, most: int = 1000
+        self, *, part: str | None = None, kind: str | None = None, since: datetime | None = None, most: int | None = 1000
     ) -> list[StoredEvent]:
         """The newest events that have all that is given, newest first."""
         columns = [getattr(EventRow, field.name) for field in fields(StoredEvent)]

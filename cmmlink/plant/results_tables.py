@@ -65,6 +65,7 @@ class RunRow(Tables):
     station_id: Mapped[int] = mapped_column(_KEY, ForeignKey("station.id", name="run_station"))
     run: Mapped[str] = mapped_column(Text)
     part: Mapped[str] = mapped_column(Text)
+    section: Mapped[str] = mapped_column(Text)
     serial_number: Mapped[str] = mapped_column(Text)
     operator: Mapped[str] = mapped_column(Text)
     started: Mapped[datetime] = mapped_column(Moment)

@@ -36,13 +36,14 @@ if TYPE_CHECKING:
         reads_of,
         recorded_result,
         recorded_run,
+        run_header,
     )
     from cmmlink.record.recorded_inputs import recorded_plan, recorded_surface_plan
     from cmmlink.record.recorded_nominal import Nominals, recorded_profile
     from cmmlink.record.recorder import QUEUE_BYTES, Recorder, RecordReference
     from cmmlink.record.replay import Replay, judgement_of, keep_judgement, replay_run
     from cmmlink.record.run_inputs import RunInputs, software
-    from cmmlink.record.seal import KEY_FILE, PUBLIC_FILE, Seal, seal_of
+    from cmmlink.record.seal import KEY_FILE, PUBLIC_FILE, Seal, seal_of, station_name
     from cmmlink.record.search import RunSearch, VerdictSought
     from cmmlink.record.signature import Signature, key_id_of, signature_of
     from cmmlink.record.station_lock import PATIENCE_S
@@ -88,13 +89,14 @@ else:
             "reads_of",
             "recorded_result",
             "recorded_run",
+            "run_header",
         ),
         "cmmlink.record.recorded_inputs": ("recorded_plan", "recorded_surface_plan"),
         "cmmlink.record.recorder": ("QUEUE_BYTES", "Recorder", "RecordReference"),
         "cmmlink.record.recorded_nominal": ("Nominals", "recorded_profile"),
         "cmmlink.record.replay": ("Replay", "judgement_of", "keep_judgement", "replay_run"),
         "cmmlink.record.run_inputs": ("RunInputs", "software"),
-        "cmmlink.record.seal": ("KEY_FILE", "PUBLIC_FILE", "Seal", "seal_of"),
+        "cmmlink.record.seal": ("KEY_FILE", "PUBLIC_FILE", "Seal", "seal_of", "station_name"),
         "cmmlink.record.search": ("RunSearch", "VerdictSought"),
         "cmmlink.record.signature": ("Signature", "key_id_of", "signature_of"),
         "cmmlink.record.station_lock": ("PATIENCE_S",),
@@ -189,9 +191,11 @@ __all__ = [
     "replay_surface",
     "restore",
     "rotate_key",
+    "run_header",
     "seal_of",
     "signature_of",
     "software",
+    "station_name",
     "trust_in",
     "unpack_judged",
     "unpack_surface",

@@ -209,6 +209,13 @@ def recorded_run(store: Store, run: str) -> RecordedRun:
     return RecordedRun(documents["run"], plan, found["nominal"].body, documents.get("end"), documents.get("result"), sha256)
 
 
+def run_header(store: Store, run: str) -> dict[str, Any]:
+    """What a run begins with. Raises StoreError where it cannot be read."""
+    for record in store.records(run, "run"):
+        return _document(store, record)
+    raise StoreError(f"{store.path}: the run record of run {run} is missing; `cmmlink verify` says more")
+
+
 def recorded_result(store: Store, run: str) -> dict[str, Any]:
     """The result of a run alone; nothing where there is none. Raises StoreError where it cannot be read."""
     return next((_document(store, record) for record in store.records(run, "result")), {})

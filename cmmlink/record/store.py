@@ -190,6 +190,12 @@ class Store:
             for row in self._connection.execute(f"SELECT {_COLUMNS} FROM record WHERE number >= ? ORDER BY number", (number,)):
                 yield Record(*row)
 
+    def added_behind_number(self, number: int, kinds: Sequence[str], most: int) -> list[Record]:
+        """The first records of some kinds behind a number, read at once: nothing of the file is held for whoever goes on adding."""
+        query = f"SELECT {_COLUMNS} FROM record WHERE number > ? AND kind IN ({', '.join('?' * len(kinds))}) ORDER BY number LIMIT ?"
+        with translate_errors(self.path):
+            return [Record(*row) for row in self._connection.execute(query, (number, *kinds, most)).fetchall()]
+
     def records(self, run: str, kind: str | None = None) -> Iterator[Record]:
         """Records of a run in their order, all or of one kind. Raises StoreError where one cannot be read."""
         query = f"SELECT {_COLUMNS} FROM record WHERE run = ?" + (" AND kind = ?" if kind else "") + " ORDER BY number"

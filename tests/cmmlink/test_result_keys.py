@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from pydantic import BaseModel
 
-from cmmlink import archive_keys, comparison_keys, inspection_keys, record_keys, result_keys
+from cmmlink import archive_keys, comparison_keys, inspection_keys, plant_keys, record_keys, result_keys
 from cmmlink.deviations_csv import COLUMNS
 from cmmlink.plan.reference import groups_of
+from cmmlink.plant_keys import PlantAddress, PlantAgreement, PlantOutbox
 from cmmlink.record.evidence import CHAIN_COLUMNS
 from cmmlink.record.export import POINT_COLUMNS, WIRE_COLUMNS
 from cmmlink.record_keys import KeyHandedOver, KeyShown, StationKey, Verified
@@ -33,7 +34,7 @@ from tests.cmmlink.command import cmmlink
 from tests.cmmlink.oval_part import oval_points, write_nominal, write_points
 from tests.drivers.surface.meshes import binary_stl, tube, write
 
-KEYS = vars(result_keys) | vars(inspection_keys) | vars(archive_keys) | vars(comparison_keys) | vars(record_keys)
+KEYS = vars(result_keys) | vars(inspection_keys) | vars(archive_keys) | vars(comparison_keys) | vars(plant_keys) | vars(record_keys)
 OBJECTS = [value for value in KEYS.values() if isinstance(value, type) and issubclass(value, BaseModel) and value.model_fields]
 
 
@@ -105,6 +106,9 @@ def test_records(folder: Path) -> None:
     assert printed(Verified, "verify", *records)["signatures"]["keys"][0]["public_key"] == shown["public_key"]
     assert printed(KeyHandedOver, "key", "rotate", "--reason", "yearly", *records)["before"] == shown["public_key"]
     printed(KeyShown, "key", "new", folder / "stick.pem")
+    assert printed(PlantOutbox, "plant", "status", *records)["waiting"] == printed(PlantOutbox, "plant", "push", *records)["added"] > 0
+    assert printed(PlantAgreement, "plant", "verify", *records)["sound"]
+    assert printed(PlantAddress, "plant", "address", *records)["address"] == str(folder / "records" / "plant.sqlite")
     written = printed(Exported, "export", first, "--out", folder / "exported", *records)["files"]
     assert Path(printed(Reported, "report", first, "-o", folder / "a.pdf", *records)["file"]).read_bytes().startswith(b"%PDF")
     tables = {Path(name).name: header_of(Path(name)) for name in written if name.endswith(".csv") and "nominal" not in name}

@@ -20,7 +20,10 @@ CAD, BOOKS, SURFACES = {"ezdxf", "OCP"}, {"xlsxwriter"}, {"drivers.surface"}
 MATHS, PLANS, SPEECH = {"numpy", "scipy", "numba", "llvmlite"}, {"yaml", "cmmlink.plan.scan"}, {"rich"}
 SCIPY = {f"scipy.{part}" for part in ("interpolate", "linalg", "optimize", "sparse", "spatial", "special")}  # a third of a second together
 SIGNATURES = {"cryptography"}  # where something is signed, or a signature verified
-HEAVY = SIGNATURES | SCIPY | DEVICES | PAGE | PICTURES | MATHS | PLANS | SPEECH | CAD | BOOKS | SURFACES | {"simulators", "sqlite3"}
+RESULTS = {"sqlalchemy", "alembic", "psycopg"}
+HEAVY = (
+    SIGNATURES | RESULTS | SCIPY | DEVICES | PAGE | PICTURES | MATHS | PLANS | SPEECH | CAD | BOOKS | SURFACES | {"simulators", "sqlite3"}
+)
 
 IN_ONE_PROCESS = """
 import contextlib, io, json, sys
@@ -46,7 +49,22 @@ def loaded_by(*commands: tuple[object, ...]) -> list[tuple[int, str, set[str]]]:
 
 def test_help_version_and_mistakes_load_nothing_heavy() -> None:
     working = ("demo", "run", "inspect", "ct", "nominal", "check", "console", "prepare", "doctor", "ports", "registers")
-    commands = (*working, "runs", "show", "export", "report", "compare", "replay", "rejudge", "verify", "backup", "restore", "merge", "key")
+    commands = (
+        *working,
+        "runs",
+        "show",
+        "export",
+        "report",
+        "compare",
+        "replay",
+        "rejudge",
+        "verify",
+        "backup",
+        "restore",
+        "merge",
+        "key",
+        "plant",
+    )
     helped = (("--version",), ("--help",), *((command, "--help") for command in commands))
     mistaken = (("inspcet",), ("inspect", "points.csv"), ("inspect", "points.csv", "--nominal", "n.dat", "--tolerance", "wide", 1))
     told = loaded_by(*helped, *mistaken)

@@ -25,7 +25,14 @@ def a_run(k: int, part: str = "blade", station: str = "hall-1", **others: Any) -
         StoredValue("chord", "chord", "mm", 60 + k / 100, 59.9, 60.1, 0.004, "uncertain"),
     )
     run = StoredRun(
-        station, f"20260301-{k:04d}", part, f"SN {k}", "Ada", BEGAN + timedelta(hours=k), "complete", "uncertain", "cmmlink 1",
+        station, f"20260301-{k:04d}", part, "", f"SN {k}", "Ada", BEGAN + timedelta(hours=k), "complete", "uncertain", "cmmlink 1",
         f"{k:064x}", "1" * 64, "2" * 64, 1000, 990, 10, 3, 7, False, values, strip(k / 1000),
     )  # fmt: skip
     return replace(run, **others)
+
+
+def plain(run: StoredRun) -> tuple[object, ...]:
+    """A run as values that can be compared."""
+    strip = run.strip
+    told = None if strip is None else (strip.length_mm, strip.lower_mm, strip.upper_mm, strip.mean_mm.tobytes(), strip.worst_mm.tobytes())
+    return (*[getattr(run, name) for name in run.__slots__ if name != "strip"], told)

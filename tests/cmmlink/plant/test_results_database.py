@@ -9,16 +9,9 @@ import numpy as np
 import pytest
 
 from cmmlink.errors import PlantAwayError, PlantError
-from cmmlink.plant import PartCharacteristic, ResultsDatabase, StoredEvent, StoredRun, address_of, month_of, strip_of, without_password
+from cmmlink.plant import PartCharacteristic, ResultsDatabase, StoredEvent, address_of, month_of, strip_of, without_password
 from tests.cmmlink.plant.postgres import PostgresServer
-from tests.cmmlink.plant.results import BEGAN, a_run
-
-
-def plain(run: StoredRun) -> tuple[object, ...]:
-    """A run as values that can be compared."""
-    strip = run.strip
-    told = None if strip is None else (strip.length_mm, strip.lower_mm, strip.upper_mm, strip.mean_mm.tobytes(), strip.worst_mm.tobytes())
-    return (*[getattr(run, name) for name in run.__slots__ if name != "strip"], told)
+from tests.cmmlink.plant.results import BEGAN, a_run, plain
 
 
 def test_a_run_comes_back_as_it_was_and_is_there_once(address: str) -> None:

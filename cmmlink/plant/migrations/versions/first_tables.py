@@ -22,7 +22,7 @@ def upgrade() -> None:
         "run",
         sa.Column("id", _KEY, primary_key=True),
         sa.Column("station_id", _KEY, sa.ForeignKey("station.id", name="run_station"), nullable=False),
-        *[sa.Column(name, sa.Text(), nullable=False) for name in ("run", "part", "serial_number", "operator")],
+        *[sa.Column(name, sa.Text(), nullable=False) for name in ("run", "part", "section", "serial_number", "operator")],
         sa.Column("started", _MOMENT, nullable=False),
         sa.Column("state", sa.Text(), nullable=False),
         sa.Column("verdict", sa.Text()),

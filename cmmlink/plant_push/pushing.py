@@ -1,0 +1,134 @@
+"""Pushes what is due to the results database, oldest first: it counts as pushed once it is in the database.
+
+It reads the records as any reader does: nothing is written to them, and whoever records meanwhile waits for nothing.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+from pathlib import Path
+
+from cmmlink.errors import PlanError, PlantAwayError, PlantError, RunError, StoreError
+from cmmlink.plant import ResultsDatabase, StoredRun, words_of
+from cmmlink.plant_push.outbox import OutboxState, Waiting, due, in_these_records, keep_state, read_state, waiting
+from cmmlink.plant_push.plant_settings import address_for
+from cmmlink.plant_push.recorded_results import judged_again, stored_run
+from cmmlink.record import Nominals, Record, Store, has_records
+from cmmlink.words import utc_words
+from inspection import InspectionError
+
+_MOST_NOMINALS = 4
+_CANNOT_BE_READ = (StoreError, PlanError, RunError, InspectionError, KeyError)
+
+
+@dataclass(frozen=True, slots=True)
+class Outbox:
+    """What a station has pushed, and what waits.
+
+    address : where to, in words
+    added   : runs that this attempt added to the database
+    waiting, since_s : runs that wait, and since when, in seconds since 1970
+    problem : why they wait; empty where nothing keeps them
+    away    : whether another attempt may succeed by itself
+    pushed  : when something was pushed last, in UTC; empty: never
+    unreadable, others : see OutboxState
+    """
+
+    address: str
+    added: int
+    waiting: int
+    since_s: float | None
+    problem: str
+    away: bool
+    pushed: str
+    unreadable: dict[str, str]
+    others: tuple[str, ...]
+
+
+def push(folder: Path, now: Callable[[], datetime], *, again: bool = False, tell: Callable[[float], None] = lambda share: None) -> Outbox:
+    """Push all that is due. What keeps it from being pushed is told, not raised.
+
+    again : push every run of the records, also those that are known to be there
+    tell  : is told the share done
+
+    Raises PlantError where the settings cannot be used, StoreError where the records cannot be read.
+    """
+    address = address_for(folder)
+    state = read_state(folder, address, now())
+    if not has_records(folder):
+        return _outbox(address, state, Waiting(0, None))
+    with _reading(folder, now) as store:
+        begun = in_these_records(replace(state, number=0) if again else state, store)
+        pushing = _Pushing(folder, store, begun, now, tell)
+        away = pushing.push_all(address)
+        return _outbox(address, pushing.state, waiting(store, pushing.state), pushing.added, away)
+
+
+def outbox_of(folder: Path, now: Callable[[], datetime]) -> Outbox:
+    """What waits, without asking the database. Raises like `push`."""
+    address = address_for(folder)
+    state = read_state(folder, address, now())
+    if not has_records(folder):
+        return _outbox(address, state, Waiting(0, None))
+    with _reading(folder, now) as store:
+        return _outbox(address, state, waiting(store, state))
+
+
+def _reading(folder: Path, now: Callable[[], datetime]) -> Store:
+    """The records, to be read: runs that were cut off are closed by whoever records next, and are due then."""
+    return Store(folder, writing=False, epoch_s=lambda: now().timestamp())
+
+
+class _Pushing:
+    """One attempt, batch by batch."""
+
+    def __init__(self, folder: Path, store: Store, state: OutboxState, now: Callable[[], datetime], tell: Callable[[float], None]) -> None:
+        self.state, self.added = state, 0
+        self._folder, self._store, self._now, self._tell = folder, store, now, tell
+        self._nominals = Nominals(_MOST_NOMINALS)
+
+    def push_all(self, address: str) -> bool:
+        """Push what is due, and keep how far it is after each batch. Returns whether the database was away."""
+        batches = due(self._store, self.state.number)
+        records = next(batches, None)
+        if records is None:
+            return False
+        problem, away = "", False
+        try:
+            with ResultsDatabase(address) as database:
+                while records is not None:
+                    self._push(database, records)
+                    self._tell(records[-1].number / max(self._store.head[0], 1))
+                    records = next(batches, None)
+        except PlantError as error:
+            problem, away = str(error), isinstance(error, PlantAwayError)
+        self.state = replace(self.state, problem=problem)
+        keep_state(self._folder, self.state)
+        return away
+
+    def _push(self, database: ResultsDatabase, records: Sequence[Record]) -> None:
+        """Push what follows from some records."""
+        unreadable: dict[str, str] = {}
+        runs = list[StoredRun]()
+        for record in records:
+            try:
+                if record.kind == "end":
+                    runs.append(stored_run(self._store, record.run, self._nominals))
+                else:
+                    database.add_event(judged_again(self._store, record))
+            except _CANNOT_BE_READ as error:
+                unreadable[str(record.run)] = f"{error}"[:200]
+        added = database.add_runs(runs) if runs else []
+        self.added += added.count("added")
+        others = (f"{run.station} {run.run}" for run, how in zip(runs, added, strict=True) if how == "another")
+        last = records[-1]
+        pushed = utc_words(self._now()) if runs else self.state.pushed
+        self.state = replace(self.state, number=last.number, sha256=last.sha256.hex(), pushed=pushed).with_trouble(unreadable, others)
+        keep_state(self._folder, self.state)
+
+
+def _outbox(address: str, state: OutboxState, left: Waiting, added: int = 0, away: bool = False) -> Outbox:
+    return Outbox(
+        words_of(address), added, left.runs, left.since_s, state.problem if left.runs else "", away, state.pushed,
+        dict(state.unreadable), state.others,
+    )  # fmt: skip

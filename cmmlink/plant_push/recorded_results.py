@@ -1,0 +1,130 @@
+"""What the record of a station says of a run, as the results database stores it."""
+
+import hashlib
+from collections.abc import Iterator, Mapping
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmmlink.errors import StoreError
+from cmmlink.plan import Plan
+from cmmlink.plant import ProfileStrip, StoredEvent, StoredRun, StoredValue, strip_of
+from cmmlink.record import (
+    Nominals,
+    Record,
+    RecordedRun,
+    Store,
+    derived_of,
+    origin_of,
+    recorded_plan,
+    recorded_run,
+    run_header,
+    station_name,
+    unpack_judged,
+)
+from inspection import NOT_JUDGED
+
+JUDGED_AGAIN = "judged again"
+_COUNTS = ("received", "judged", "rejected", "lost", "damaged_bytes")
+
+
+def stored_run(store: Store, run: str, nominals: Nominals) -> StoredRun:
+    """A run that has ended, with its values and its strip. Raises StoreError where its record cannot be read."""
+    recorded = recorded_run(store, run)
+    header, end, result = recorded.header, recorded.end, recorded.result
+    if end is None:
+        raise StoreError(f"{store.path}: run {run} has no end yet")
+    plan = None if recorded.is_of_surface else recorded_plan(recorded)
+    origin = origin_of(store, run)
+    place = header.get("stack")
+    section = f"{place['height_mm']:.3f}" if place else ""
+    counts = {"received": end["received"]} | {name: (result or {}).get(name) for name in _COUNTS if result}
+    return StoredRun(
+        station=_clean(header.get("station") or station_name(None)),
+        run=run,
+        part=_clean(header["part"]),
+        section=section,
+        serial_number=_clean(header["serial_number"]),
+        operator=_clean(header["operator"]),
+        started=datetime.fromisoformat(header["started"]),
+        state=end["state"],
+        verdict=end["verdict"],
+        software=f"cmmlink {header['software'].get('cmmlink')}",
+        chain_sha256=recorded.chain_sha256 if origin is None else origin.chain_sha256,
+        plan_sha256=header["plan_sha256"],
+        nominal_sha256=header["nominal_sha256"],
+        **{name: counts.get(name) for name in _COUNTS},
+        simulated=header["simulated"],
+        values=tuple(_values(plan, result or {}, section)),
+        strip=None if plan is None or result is None else _strip(store, recorded, plan, result, nominals),
+    )
+
+
+def station_of(store: Store, run: str) -> str:
+    """The name of the station that measured a run, as the database has it. Raises StoreError where its record cannot be read."""
+    return _clean(run_header(store, run).get("station") or station_name(None))
+
+
+def judged_again(store: Store, record: Record) -> StoredEvent:
+    """A judgement of a run that was made later, as an event, from the record that keeps it. Raises StoreError where it cannot be read."""
+    station = station_of(store, record.run)
+    told = next((one for one in derived_of(store, record.run) if one["chain_sha256"] == record.sha256.hex()), None)
+    if told is None:
+        raise StoreError(f"{store.path}: record {record.number} is no judgement of run {record.run}")
+    changes = ", ".join(f"{one['key']} {one['recorded']} -> {one['replayed']}" for one in told["changed"])
+    return StoredEvent(
+        key=f"{station} {record.run} {hashlib.sha256(record.body).hexdigest()}",
+        at=datetime.fromisoformat(told["when"]),
+        kind=JUDGED_AGAIN,
+        words=_clean(f"{told['verdict']}: {changes}; {told['why']}"),
+        station=station,
+        part=_clean(run_header(store, record.run)["part"]),
+        run=record.run,
+        who=_clean(told["who"]),
+    )
+
+
+def _values(plan: Plan | None, result: Mapping[str, Any], section: str) -> Iterator[StoredValue]:
+    """The characteristics of a result, with limits of the value itself."""
+    asked = () if plan is None else plan.characteristics
+    varying = {one.name for one in asked if one.type == "line-profile" and one.zone.stations_mm is not None}
+    at = f" at {section}" if section else ""
+    for one in result.get("characteristics", ()):
+        value, lower, upper, unit = _with_limits(one, one["name"] in varying)
+        uncertainty = one["uncertainty"] if unit == one["unit"] else None
+        yield StoredValue(_clean(one["name"]) + at, one["type"], unit, value, lower, upper, uncertainty, one["verdict"])
+
+
+def _with_limits(one: Mapping[str, Any], varying: bool) -> tuple[float | None, float | None, float | None, str]:
+    """Value, limits and unit: of a profile the width that is used, of a zone that varies the share of it, else the number itself."""
+    lower, upper, nominal = one["lower"], one["upper"], one.get("nominal")
+    if varying:
+        return one["consumption"], None, 1.0, "1"
+    if one["type"] == "line-profile":
+        return one["value"], None, None if lower is None or upper is None else upper - lower, one["unit"]
+    lower, upper = (None if nominal is None or limit is None else nominal + limit for limit in (lower, upper))
+    return one["value"], lower, upper, one["unit"]
+
+
+def _strip(store: Store, recorded: RecordedRun, plan: Plan, result: Mapping[str, Any], nominals: Nominals) -> ProfileStrip | None:
+    """The deviations along the profile; None where nothing was judged."""
+    if not result["judged"]:
+        return None
+    zone = result.get("tolerance") or {}
+    length_mm = nominals.of(plan, recorded).length_mm
+    return strip_of(_judged(store, recorded.run), length_mm, zone.get("lower_mm"), zone.get("upper_mm"))
+
+
+def _judged(store: Store, run: str) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Stations and deviations of the points that have a verdict, some thousands at a time."""
+    for record in store.records(run, "deviations"):
+        rows = unpack_judged(record.body)
+        judged = rows.verdicts != NOT_JUDGED
+        yield rows.station_mm[judged], rows.deviation_mm[judged]
+
+
+def _clean(text: str) -> str:
+    """The text without what a database cannot hold: a zero byte, and halves of signs."""
+    return text.replace("\x00", "\\x00").encode("utf-8", "backslashreplace").decode()
