@@ -12,6 +12,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
+from inspection.surface.feet import NominalSurface
 from inspection.surface.nominal_places import NominalPlaces, with_sides
 from inspection.surface.surface_result import Unmeasured
 
@@ -39,12 +40,12 @@ class CoveredArea:
     measured: NDArray[np.bool_]
 
 
-def measure_area(places: NominalPlaces, distance_mm: Array, gap_max_mm: float) -> CoveredArea:
-    """What was measured by points that are so far (n,) from places: between two places one may be farther off, by their spacing at most."""
-    measured = 2 * (distance_mm + places.spacing_mm) <= gap_max_mm
-    unmeasured = _parts(places, distance_mm, measured)
-    seen = float(distance_mm[measured].max(initial=0.0)) + places.spacing_mm
-    gap = max([2 * seen, *(part.width_mm for part in unmeasured)])
+def measure_area(nominal: NominalSurface, places: NominalPlaces, distance_mm: Array, gap_max_mm: float) -> CoveredArea:
+    """What was measured by points that are so far (n,) from places: what lies between two places may be farther off, by their reach."""
+    away = distance_mm + places.reach_mm
+    measured = 2 * away <= gap_max_mm
+    unmeasured = _parts(nominal, places, away, measured)
+    gap = max([2 * float(away[measured].max(initial=0.0)), *(part.width_mm for part in unmeasured)])
     return CoveredArea(float(np.count_nonzero(measured) / len(places)), unmeasured, gap, measured)
 
 
@@ -59,7 +60,7 @@ def neighbours_among(places: NominalPlaces, which: Index) -> Ways:
     return one[near], other[near], distance[near]
 
 
-def _parts(places: NominalPlaces, distance_mm: Array, measured: NDArray[np.bool_]) -> tuple[Unmeasured, ...]:
+def _parts(nominal: NominalSurface, places: NominalPlaces, away_mm: Array, measured: NDArray[np.bool_]) -> tuple[Unmeasured, ...]:
     """What was not measured, in parts that hang together."""
     which = np.flatnonzero(~measured)
     if not len(which):
@@ -69,8 +70,14 @@ def _parts(places: NominalPlaces, distance_mm: Array, measured: NDArray[np.bool_
     row[which] = np.arange(len(which))
     inner = ~measured[other]
     ways = row[one[inner]], row[other[inner]], length[inner]
-    inward = _inward(ways, row[one[~inner]], distance_mm[which])
-    parts = [_part(places, which[rows], inward[rows]) for rows in groups_of(ways, len(which))]
+    inward = _inward(ways, row[one[~inner]], away_mm[which])
+    found = [_middle_and_width(places, which[rows], inward[rows]) for rows in groups_of(ways, len(which))]
+    centres = places.places_mm[[middle for middle, _, _ in found]]
+    faces = nominal.project(centres).face.tolist()
+    parts = [
+        Unmeasured(count * places.each_mm2, (x, y, z), on, width)
+        for (x, y, z), on, (_, count, width) in zip(centres.tolist(), faces, found, strict=True)
+    ]
     return tuple(sorted(parts, key=lambda part: -part.area_mm2))
 
 
@@ -82,22 +89,22 @@ def groups_of(ways: Ways, count: int) -> list[Index]:
     return np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
 
 
-def _inward(ways: Ways, border: Index, distance_mm: Array) -> Array:
+def _inward(ways: Ways, border: Index, away_mm: Array) -> Array:
     """How far each unmeasured place (u,) is from the nearest point on the way along the surface; infinite where no way leads there."""
-    border, u = np.unique(border), len(distance_mm)
+    border, u = np.unique(border), len(away_mm)
     one, other, length = ways
     ends = np.concatenate([one, np.full(len(border), u)]), np.concatenate([other, border])  # the points stand at the end of the numbers
-    graph = coo_array((np.concatenate([length, distance_mm[border]]), ends), shape=(u + 1, u + 1)).tocsr()
-    return np.asarray(dijkstra(graph, indices=np.array([u])))[0, :u]
+    graph = coo_array((np.concatenate([length, away_mm[border]]), ends), shape=(u + 1, u + 1)).tocsr()
+    return np.asarray(dijkstra(graph, directed=False, indices=np.array([u])))[0, :u]
 
 
-def _part(places: NominalPlaces, numbers: Index, inward_mm: Array) -> Unmeasured:
-    """One part: as wide as twice the way in to its innermost place, or as the whole of it where no way leads in."""
+def _middle_and_width(places: NominalPlaces, numbers: Index, inward_mm: Array) -> tuple[int, int, float]:
+    """The middle place of one part, how many places it has, and its width.
+
+    It is as wide as twice the way in to its innermost place, or as the whole of it where no way leads in.
+    """
+    if np.isfinite(inward_mm).all():
+        return int(numbers[inward_mm.argmax()]), len(numbers), 2 * float(inward_mm.max())
     at = places.places_mm[numbers]
     across = float(np.linalg.norm(np.ptp(at, axis=0))) + 2 * places.spacing_mm
-    if np.isfinite(inward_mm).all():
-        middle, width = int(inward_mm.argmax()), 2 * (float(inward_mm.max()) + places.spacing_mm)
-    else:
-        middle, width = int(((at - at.mean(axis=0)) ** 2).sum(axis=1).argmin()), across
-    x, y, z = at[middle].tolist()
-    return Unmeasured(len(numbers) * places.each_mm2, (x, y, z), int(places.face[numbers[middle]]), width)
+    return int(numbers[((at - at.mean(axis=0)) ** 2).sum(axis=1).argmin()]), len(numbers), across

@@ -111,8 +111,8 @@ def rejections(feet: SurfaceFeet, farthest_mm: float, scan_normals: ArrayLike | 
             raise ValueError(f"scan normals must have shape {feet.normal.shape}, got {normals.shape}")
         along = (normals * feet.normal).sum(axis=1)
         result[along < _OPPOSITE * np.sqrt((normals**2).sum(axis=1))] = Rejection.OPPOSITE_FACE
-    result[feet.kind == FootKind.BORDER] = Rejection.BEYOND_EDGE
     result[np.abs(feet.distance_mm) > farthest_mm] = Rejection.OFF_SURFACE
+    result[feet.kind == FootKind.BORDER] = Rejection.BEYOND_EDGE  # however far: what lies there is not this surface
     result[feet.kind == FootKind.NONE] = Rejection.NOT_FINITE
     return result
 

@@ -146,7 +146,7 @@ class _Scan:
         judged = np.flatnonzero(found.verdicts != NOT_JUDGED)
         places = spread_places(nominal, limits.gap_max_mm)
         distance, nearest = nearest_of(places, feet.foot_mm[judged], feet.normal[judged])
-        covered = measure_area(places, distance, limits.gap_max_mm)
+        covered = measure_area(nominal, places, distance, limits.gap_max_mm)
         is_out = found.verdicts[judged] == Verdict.NONCONFORM
         regions = find_defects(places, feet, judged, is_out, nearest, covered.measured, zone.middle_mm)
         points = max((verdict for verdict in Verdict if found.count_of(verdict)), default=Verdict.UNCERTAIN)
@@ -165,6 +165,7 @@ class _Scan:
             covered=covered,
             registration=registration,
             nominal_error_mm=_error_that_counts(found, terms.zone),
+            sides_known=nominal.sides_known,
         )
         conclusion = conclude_surface(findings, terms.zone, self.missing, limits, self.complete)
         deviation = feet.distance_mm[judged]

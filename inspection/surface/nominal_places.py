@@ -14,25 +14,27 @@ from inspection.surface.feet import NominalSurface
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-_SHARE = 6.0  # spacings in the widest gap that counts as measured
+_SHARE = 8.0  # spacings in the widest gap that counts as measured
 _FEWEST, _MOST = 4000, 400_000  # places
-_SIDE = 0.25  # of the widest gap: what a difference of 1 between unit normals counts for as a distance
+_OTHERS = 0.7  # times as many places of another pattern show how far these are apart
+_SIDE = 0.67  # of how near a foot must be: what a difference of 1 between unit normals counts for, so that a right angle is too far
+_BETWEEN = 1.1  # for what lies between those
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NominalPlaces:
-    """Places (n, 3) of a nominal with the outward normals (n, 3) there and the numbers (n,) of their faces.
+    """Places (n, 3) of a nominal with the outward normals (n, 3) there.
 
-    each_mm2   : the area that each stands for
-    spacing_mm : the side of a square of that area: no place of the surface is farther from the nearest of these
+    each_mm2   : the area that each stands for; spacing_mm : the side of a square of that area
+    reach_mm   : (n,) how far the places of the surface to which it is the nearest one lie from it at most
     side_mm    : what a difference of 1 between normals counts for as a distance
     """
 
     places_mm: Array
     normals: Array
-    face: NDArray[np.int32]
     each_mm2: float
     spacing_mm: float
+    reach_mm: Array
     side_mm: float
 
     def __len__(self) -> int:
@@ -42,14 +44,26 @@ class NominalPlaces:
 def spread_places(nominal: NominalSurface, gap_max_mm: float) -> NominalPlaces:
     """Places near enough to each other to tell a gap that is too wide."""
     wanted = nominal.area_mm2 * (_SHARE / min(gap_max_mm, nominal.size_mm)) ** 2
-    places, normals = nominal.sample(int(np.clip(wanted, _FEWEST, _MOST)))
+    count = int(np.clip(wanted, _FEWEST, _MOST))
+    places, normals = nominal.sample(count)
     order = np.lexsort(places.T)  # a cloud gives its points more than once where it has few
     places, normals = places[order], normals[order]
     new = np.append(True, (np.diff(places, axis=0) != 0).any(axis=1))
     places, normals = places[new], normals[new]
     each = nominal.area_mm2 / len(places)
-    face = nominal.project(places).face
-    return NominalPlaces(places, normals, face, each, float(np.sqrt(each)), _SIDE * min(gap_max_mm, nominal.size_mm))
+    spacing = float(np.sqrt(each))
+    reach = _reach(places, normals, nominal.sample(int(_OTHERS * count)), spacing)
+    near = gap_max_mm / 2 - spacing  # no foot farther off measures a place
+    return NominalPlaces(places, normals, each, spacing, reach, _SIDE * min(max(near, spacing), nominal.size_mm))
+
+
+def _reach(places: Array, normals: Array, others: tuple[Array, Array], spacing_mm: float) -> Array:
+    """How far (n,) what each place stands for lies from it, by other places of the surface and their normals (k, 3)."""
+    tree = cKDTree(with_sides(places, normals, spacing_mm), compact_nodes=False, balanced_tree=False)
+    number = np.asarray(tree.query(with_sides(*others, spacing_mm), workers=-1)[1])
+    reach = np.full(len(places), spacing_mm)
+    np.maximum.at(reach, number, _BETWEEN * np.linalg.norm(others[0] - places[number], axis=1))
+    return reach
 
 
 def with_sides(places_mm: Array, normals: Array, side_mm: float) -> Array:

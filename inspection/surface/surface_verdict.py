@@ -28,6 +28,7 @@ class SurfaceFindings:
     covered       : what of the area was measured
     registration  : None where the pose was known
     nominal_error_mm : the largest error of the nominal at a point that is uncertain because of it alone; 0 where there is none
+    sides_known   : it is known which side of the nominal is out of material
     """
 
     points: Verdict
@@ -39,6 +40,7 @@ class SurfaceFindings:
     covered: CoveredArea
     registration: SurfaceRegistration | None
     nominal_error_mm: float
+    sides_known: bool
 
 
 def conclude_surface(found: SurfaceFindings, zone: ToleranceZone, missing: Missing, limits: Limits, complete: bool) -> Conclusion:
@@ -65,8 +67,11 @@ def conclude_surface(found: SurfaceFindings, zone: ToleranceZone, missing: Missi
 
 
 def _nominal(found: SurfaceFindings, zone: ToleranceZone) -> list[Reason]:
-    """The error of the nominal, where it is the reason that less is proven."""
+    """What of the nominal is the reason that less is proven: its error, and a side that is not known."""
     error, width = found.nominal_error_mm, zone.upper_mm - zone.lower_mm
+    if found.points is Verdict.UNCERTAIN and not found.sides_known:
+        told = "It is not known which side of the nominal is out of material: what holds for one side only is not proven."
+        return [Reason("nominal", f"{told} Bring a surface that has a known outside: a closed one, or a cloud with normals.")]
     if not error or found.points is Verdict.NONCONFORM:
         return []
     mend = "Bring the STEP or IGES file of the part, or a finer mesh"
