@@ -170,9 +170,10 @@ def test_rejected_points_keep_a_part_from_conforming() -> None:
         assert found.received == found.judged + found.rejected == len(points)
         assert (found.verdicts[found.rejection != Rejection.NONE] == NOT_JUDGED).all()
         assert judge_surface(found.points_mm, NOTCHED, replace(terms, allow_unseen_mm=5.0)).verdict is Verdict.CONFORM
-    turned = np.where(np.arange(len(points))[:, None] % 600 == 0, -normals, 2 * normals)
+    turned = 2 * normals
+    turned[few] *= -1
     found = judge_surface(points, NOTCHED, WHERE_IT_IS, turned)
-    assert (found.rejected_by_reason, found.verdict) == ({"opposite face": len(points[::600])}, Verdict.UNCERTAIN)
+    assert (found.rejected_by_reason, found.verdict) == ({"opposite face": len(few)}, Verdict.UNCERTAIN)
     lost = np.where(np.arange(len(points))[:, None] % 600 == 0, np.nan, points)
     assert judge_surface(lost, NOTCHED, NEAR).rejected_by_reason == {"not finite": len(points[::600])}
 
