@@ -41,11 +41,11 @@ class NominalWords:
         }
 
 
-def surface_json(result: "SurfaceResult | None", counts: Counts, nominal: NominalWords) -> dict[str, Any]:
+def surface_json(result: "SurfaceResult | None", counts: Counts, nominal: NominalWords | None) -> dict[str, Any]:
     """The result with the keys that the command line promises. Without a result: the counts, the verdict uncertain, and nulls."""
     head = {"received": counts.received, "judged": counts.judged, "rejected": counts.rejected, "lost": counts.lost}
     tail = {
-        "nominal": nominal.to_json(),
+        "nominal": None if nominal is None else nominal.to_json(),
         "rejected_by_reason": dict(counts.rejected_by_reason),
         "damaged_bytes": counts.damaged_bytes,
     }

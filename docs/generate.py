@@ -14,7 +14,7 @@ import cmmlink
 import drivers
 import inspection
 import simulators
-from cmmlink import deviations_csv, uncertainty_tables
+from cmmlink import deviations_csv, surface_csv, uncertainty_tables
 from cmmlink.archive import COLUMNS as REJUDGED_COLUMNS
 from cmmlink.archive_keys import ArchiveRejudged
 from cmmlink.comparison_keys import Compared
@@ -43,6 +43,7 @@ from cmmlink.result_keys import (
     Understood,
     ZonesVerified,
 )
+from cmmlink.surface_keys import SurfaceInspected, SurfaceMeasured, SurfaceRecorded, SurfaceReplayed
 from cmmlink.version import RESULT_SCHEMA
 from drivers.codecs import decoders
 from drivers.codecs.register_map import PATTERNS, POINTS_FIELDS, POP_FIELDS, STATUS_FIELDS, RegisterMap
@@ -169,6 +170,10 @@ OBJECTS: tuple[tuple[str, type[BaseModel], type[BaseModel] | None], ...] = (
     ("`inspect` of several files", FilesInspected, None),
     ("`replay`: further keys", Replayed, Inspected),
     ("`rejudge`", ArchiveRejudged, None),
+    ("`surface`, and `run` with the plan of a surface", SurfaceInspected, None),
+    ("The same with `--no-record`: further keys", SurfaceMeasured, SurfaceInspected),
+    ("The same on record: further keys", SurfaceRecorded, SurfaceMeasured),
+    ("`replay` of a run of a surface: further keys", SurfaceReplayed, SurfaceInspected),
     ("`ct`", StackInspected, None),
     ("`nominal`", Understood, None),
     ("`runs`", Runs, None),
@@ -191,6 +196,10 @@ TABLES: tuple[tuple[str, Mapping[str, str]], ...] = (
     (
         "`deviations.csv`: a line for every received point (`ending` only of a run that did not come to its end)",
         deviations_csv.EARLY_COLUMNS,
+    ),
+    (
+        "`deviations.csv` of a surface, and `csv` of `export --format`: a line for every received point (`ending` as above)",
+        surface_csv.EARLY_SURFACE_COLUMNS,
     ),
     ("`uncertainty.csv`, where the plan states a budget: a line for every place along the profile", uncertainty_tables.COLUMNS),
     ("`sections.csv` of `ct`: a line for every section", stack_folder.SECTION_COLUMNS),
@@ -320,7 +329,9 @@ def _example(script: Path) -> str:
 
 def result_schema() -> str:
     """The JSON schema of result.json. Keys may be added without another version, so a reader has to pass over what it does not know."""
-    found: dict[str, Any] = TypeAdapter(Recorded | Measured | Replayed | StackInspected).json_schema()
+    found: dict[str, Any] = TypeAdapter(
+        Recorded | Measured | Replayed | SurfaceRecorded | SurfaceMeasured | SurfaceReplayed | StackInspected
+    ).json_schema()
     for model in found["$defs"].values():
         if "properties" in model:
             model.pop("additionalProperties", None)

@@ -78,16 +78,23 @@ def _formats_in(texts: Sequence[str]) -> list[FormatName]:
 
 def _write_formats(store: "Store", runs: Sequence[str], formats: Sequence[FormatName], out: Path | None) -> list[Path]:
     """Write the results of runs. Returns the files; raises PlanError where they cannot be written."""
-    from cmmlink.exports import part_on_record, write_exports
+    from cmmlink.exports import part_on_record, write_exports, write_surfaces
+    from cmmlink.record import recorded_run
     from cmmlink.result_files import new_files
 
     folder, stem = out or Path(), runs[0] if len(runs) == 1 else MANY
     if out is not None and len(formats) == 1 and out.suffix.lower() == f".{formats[0]}" and not out.is_dir():
         folder, stem = out.parent, out.stem
-    parts = [part_on_record(store, run) for run in runs]
+    surfaces = [run for run in runs if recorded_run(store, run).is_of_surface]
+    if surfaces and len(surfaces) < len(runs):
+        raise PlanError(f"{surfaces[0]} is a run of a whole surface and others are of sections; export them one after the other")
+    parts = [] if surfaces else [part_on_record(store, run) for run in runs]
     try:
         with new_files(folder, alone=True) as files:
-            write_exports(parts, formats, files, stem)
+            if surfaces:
+                write_surfaces(store, surfaces, formats, files, stem)
+            else:
+                write_exports(parts, formats, files, stem)
     except OSError as error:
         raise PlanError(f"{folder}: the results cannot be written there ({error.strerror}); choose another folder with --out") from None
     return [folder / name for name in files.names]

@@ -6,6 +6,7 @@ if TYPE_CHECKING:
     from cmmlink.exports.formats import write_exports
     from cmmlink.exports.measured_part import MeasuredPart, part_of_run, part_of_stack
     from cmmlink.exports.recorded_part import document_on_record, judged_rows, part_on_record, sound_run
+    from cmmlink.exports.recorded_surface import surface_document, write_surfaces
     from cmmlink.exports.single_table import write_table
     from cmmlink.exports.trend_workbook import write_trend_workbook
 else:
@@ -14,6 +15,7 @@ else:
     _PLACES = {
         "cmmlink.exports.measured_part": ("MeasuredPart", "part_of_run", "part_of_stack"),
         "cmmlink.exports.recorded_part": ("document_on_record", "judged_rows", "part_on_record", "sound_run"),
+        "cmmlink.exports.recorded_surface": ("surface_document", "write_surfaces"),
         "cmmlink.exports.formats": ("write_exports",),
         "cmmlink.exports.single_table": ("write_table",),
         "cmmlink.exports.trend_workbook": ("write_trend_workbook",),
@@ -30,7 +32,9 @@ __all__ = [
     "part_of_stack",
     "part_on_record",
     "sound_run",
+    "surface_document",
     "write_exports",
+    "write_surfaces",
     "write_table",
     "write_trend_workbook",
 ]

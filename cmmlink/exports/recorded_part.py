@@ -69,11 +69,16 @@ def document_on_record(store: Store, recorded: RecordedRun, profile: NominalProf
         *earlier_notes(recorded.result or {}),
         *density_notes(density_of(stations, profile.length_mm), profile.length_mm),
     ]
-    began = utc_words(datetime.fromisoformat(recorded.header["started"]))
-    return run_document(found, started, notes, end["state"], began, _evidence(store, recorded))
+    return run_document(found, started, notes, end["state"], began_of(recorded), evidence_of(store, recorded))
 
 
-def _evidence(store: Store, recorded: RecordedRun) -> Mapping[str, Any]:
+def began_of(recorded: RecordedRun) -> str:
+    """When a run on record began, in UTC."""
+    return utc_words(datetime.fromisoformat(recorded.header["started"]))
+
+
+def evidence_of(store: Store, recorded: RecordedRun) -> Mapping[str, Any]:
+    """What ties the result of a run to its record."""
     header, signature = recorded.header, signature_of(store, recorded.run)
     return {
         "run": recorded.run,
