@@ -36,6 +36,8 @@ def find_surface_problems(plan: SurfacePlan, plan_file: Path) -> tuple[SurfaceFi
     found = Problems(plan_file)
     file = found.attempt("surface.file", lambda: surface_of(plan))
     found.attempt("registration", lambda: terms_of(plan))
+    if file is not None:
+        found.attempt("probe.tip_radius_mm", lambda: held_against(plan, file))
     return file, tuple(found.problems)
 
 
@@ -127,7 +129,11 @@ def live_surface_of(plan: SurfacePlan, file: SurfaceFile, *, provisional: bool =
 
 def held_against(plan: SurfacePlan, file: SurfaceFile) -> "NominalSurface":
     """What the points of a plan are held against: the nominal, or the surface of ball centres around it."""
-    return file.nominal
+    if not plan.probe.tip_radius_mm:
+        return file.nominal
+    from inspection.surface import BallCentres  # noqa: PLC0415 - likewise
+
+    return BallCentres(file.nominal, plan.probe.tip_radius_mm)
 
 
 def words_of_nominal(file: SurfaceFile) -> NominalWords:

@@ -20,7 +20,7 @@ SURFACE_COLUMNS = {
     "foot_z_mm": "z of the foot point",
     "deviation_mm": "the deviation, positive out of material",
     "verdict": "conform, nonconform or uncertain; of a rejected point `rejected:` and the reason, beside empty numbers",
-    "face": "the number of the face or triangle of the nominal that the foot lies on, from 0",
+    "face": "the number of the face or triangle of the nominal that the foot lies on, from 1",
 }
 
 EARLY_SURFACE_COLUMNS = {
@@ -50,5 +50,5 @@ def _columns(rows: SurfaceRows, first: int, last: str) -> list[Column]:
     numbers[~judged] = np.nan
     codes = np.where(judged, rows.verdicts, len(Verdict) + rows.rejection)
     faces, which = np.unique(rows.face, return_inverse=True)
-    names = [("" if face < 0 else str(face)) + last for face in faces.tolist()]
+    names = [("" if face < 0 else str(face + 1)) + last for face in faces.tolist()]
     return [np.arange(first, first + rows.received), numbers, Texts(codes, POINT_WORDS), Texts(which.ravel(), names)]

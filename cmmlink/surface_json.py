@@ -126,7 +126,7 @@ def _worst(result: "SurfaceResult") -> dict[str, Any] | None:
         "z_mm": z,
         "foot_mm": foot,
         "deviation_mm": float(result.feet.distance_mm[at]),
-        "face": int(result.feet.face[at]),
+        "face": int(result.feet.face[at]) + 1,
     }
 
 
@@ -136,13 +136,13 @@ def _region(region: "Defect") -> dict[str, Any]:
         "worst_mm": region.worst_mm,
         "worst_at_mm": list(region.worst_at_mm),
         "centre_mm": list(region.centre_mm),
-        "face": region.face,
+        "face": region.face + 1,
         "points": region.points,
     }
 
 
 def _unmeasured(place: "Unmeasured") -> dict[str, Any]:
-    return {"area_mm2": place.area_mm2, "centre_mm": list(place.centre_mm), "face": place.face, "width_mm": place.width_mm}
+    return {"area_mm2": place.area_mm2, "centre_mm": list(place.centre_mm), "face": place.face + 1, "width_mm": place.width_mm}
 
 
 def _registration(registration: "SurfaceRegistration | None", pose: "RigidMotion") -> dict[str, Any]:

@@ -30,7 +30,7 @@ class WorstOnSurface(JsonObject):
     z_mm: float = Field(description="z of the measured point")
     foot_mm: list[float] = Field(min_length=3, max_length=3, description="its foot point on the nominal, [x, y, z]")
     deviation_mm: float = Field(description="its deviation, positive out of material")
-    face: int = Field(description="the number of the face or triangle that the foot lies on, from 0")
+    face: int = Field(description="the number of the face or triangle that the foot lies on, from 1")
 
 
 class SurfacePlaced(JsonObject):
@@ -55,7 +55,7 @@ class OutRegion(JsonObject):
     worst_mm: float = Field(description="the deviation farthest from the middle of the zone")
     worst_at_mm: list[float] = Field(min_length=3, max_length=3, description="the place on the nominal where that is, [x, y, z]")
     centre_mm: list[float] = Field(min_length=3, max_length=3, description="the place on the nominal in the middle of it")
-    face: int = Field(description="the number of the face or triangle of the worst place, from 0")
+    face: int = Field(description="the number of the face or triangle of the worst place, from 1")
     points: int = Field(description="how many points are out of tolerance there")
 
 
@@ -64,7 +64,7 @@ class UnmeasuredPlace(JsonObject):
 
     area_mm2: float = Field(description="its area")
     centre_mm: list[float] = Field(min_length=3, max_length=3, description="the place farthest from what was measured, [x, y, z]")
-    face: int = Field(description="the number of the face or triangle of that place, from 0")
+    face: int = Field(description="the number of the face or triangle of that place, from 1")
     width_mm: float = Field(description="the diameter of the widest place without points in it")
 
 

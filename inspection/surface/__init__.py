@@ -6,6 +6,7 @@ This is the front door, beside that of the package around it, which holds what b
 TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer to load than all of this
 
 if TYPE_CHECKING:
+    from inspection.surface.ball_centres import BallCentres
     from inspection.surface.cloud_surface import CloudSurface
     from inspection.surface.feet import FootKind, NominalSurface, SurfaceFeet, rejections
     from inspection.surface.judged_surface import judge_surface
@@ -23,6 +24,7 @@ else:
     from inspection.front_door import load_on_use
 
     _PLACES = {
+        "inspection.surface.ball_centres": ("BallCentres",),
         "inspection.surface.cloud_surface": ("CloudSurface",),
         "inspection.surface.feet": ("FootKind", "NominalSurface", "SurfaceFeet", "rejections"),
         "inspection.surface.judged_surface": ("judge_surface",),
@@ -42,6 +44,7 @@ else:
 
 
 __all__ = [
+    "BallCentres",
     "CloudSurface",
     "Defect",
     "FootKind",
