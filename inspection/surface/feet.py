@@ -1,6 +1,6 @@
 """What every kind of nominal surface answers: the closest point to each measured point, on which side, and what it lies on."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import IntEnum
 from typing import Any, Protocol
 
@@ -109,12 +109,28 @@ def rejections(feet: SurfaceFeet, farthest_mm: float, scan_normals: ArrayLike | 
         normals = np.asarray(scan_normals, dtype=np.float64)
         if normals.shape != feet.normal.shape:
             raise ValueError(f"scan normals must have shape {feet.normal.shape}, got {normals.shape}")
-        along = (normals * feet.normal).sum(axis=1)
-        result[along < _OPPOSITE * np.sqrt((normals**2).sum(axis=1))] = Rejection.OPPOSITE_FACE
+        result[faces_away(feet, normals)] = Rejection.OPPOSITE_FACE
     result[np.abs(feet.distance_mm) > farthest_mm] = Rejection.OFF_SURFACE
     result[feet.kind == FootKind.BORDER] = Rejection.BEYOND_EDGE  # however far: what lies there is not this surface
     result[feet.kind == FootKind.NONE] = Rejection.NOT_FINITE
     return result
+
+
+def faces_away(feet: SurfaceFeet, scan_normals: Array) -> NDArray[np.bool_]:
+    """Whether feet (m,) lie on a face that looks elsewhere, by more than 60 degrees, than the measured surface did at the points.
+
+    scan_normals : (m, 3) its outward directions, of any length; zero or NaN where they are not known
+    """
+    along = (scan_normals * feet.normal).sum(axis=1)
+    return np.asarray(along < _OPPOSITE * np.sqrt((scan_normals**2).sum(axis=1)))
+
+
+def with_rows(feet: SurfaceFeet, rows: Index, which: NDArray[np.bool_], others: SurfaceFeet) -> SurfaceFeet:
+    """The feet with those of others (k,) that are marked (k,) in place of some rows, one for each mark."""
+    made = {field.name: getattr(feet, field.name).copy() for field in fields(SurfaceFeet)}
+    for name, column in made.items():
+        column[rows] = getattr(others, name)[which]
+    return SurfaceFeet(**made)
 
 
 def surface_feet(found: SpaceFeet, error_mm: float, face: NDArray[np.int32] | None = None) -> SurfaceFeet:

@@ -15,6 +15,7 @@ from inspection.surface.covered_area import measure_area
 from inspection.surface.defect_regions import find_defects
 from inspection.surface.feet import NominalSurface, SurfaceFeet, points_in_space, rejections
 from inspection.surface.nominal_places import nearest_of, spread_places
+from inspection.surface.own_face import feet_on_own_face
 from inspection.surface.rigid_motion import RigidMotion
 from inspection.surface.surface_fit import SurfaceRegistration, register_surface
 from inspection.surface.surface_result import SurfaceResult
@@ -52,8 +53,11 @@ def judge_points(
     normals : (m, 3) outward directions of the measured surface, or None
     zone    : with the U of the measuring device alone; the error of the nominal counts where it is
     """
-    feet = nominal.project(pose.apply(points_mm))
-    rejection = rejections(feet, farthest_mm, None if normals is None else pose.turn(normals))
+    moved, seen = pose.apply(points_mm), None if normals is None else pose.turn(normals)
+    feet = nominal.project(moved)
+    if seen is not None:
+        feet = feet_on_own_face(moved, seen, nominal, feet, farthest_mm)
+    rejection = rejections(feet, farthest_mm, seen)
     judged = zone.verdicts(feet.distance_mm, feet.error_mm)
     if not nominal.sides_known:  # what holds for one side only is not proven
         judged = np.where(judged == zone.verdicts(-feet.distance_mm, feet.error_mm), judged, np.int8(Verdict.UNCERTAIN))

@@ -178,6 +178,25 @@ def test_rejected_points_keep_a_part_from_conforming() -> None:
     assert judge_surface(lost, NOTCHED, NEAR).rejected_by_reason == {"not finite": len(points[::600])}
 
 
+def test_a_wall_that_lacks_more_than_half_is_judged_from_the_side_that_was_seen() -> None:
+    """0.2 mm thick, its top 0.15 mm too low: the bottom is nearer, and from there the part would look 0.05 mm off."""
+    for thin in (TriangleSurface(10 * meshes.prism(meshes.NOTCHED, 0.02)), PatchSurface(faces.box((40.0, 30.0, 0.2)))):
+        places, normals, points = scan(thin, 4000, noise_mm=0.0)
+        low = (normals[:, 2] > 0.9) & (np.linalg.norm(places - (20, 5, 0.2), axis=1) < 4)
+        points = points - 0.15 * low[:, None] * normals
+        blind = judge_surface(points, thin, WHERE_IT_IS)
+        assert blind.out_of_tolerance < 0.1 * np.count_nonzero(low)
+        found = judge_surface(points, thin, WHERE_IT_IS, normals)
+        assert found.verdict is Verdict.NONCONFORM
+        assert found.out_of_tolerance == np.count_nonzero(low)
+        assert found.feet.distance_mm[low] == pytest.approx(-0.15, abs=1e-9)
+        assert not found.rejected
+    ball = PatchSurface([faces.sphere(20.0)])
+    far = judge_surface([(0.0, 0, 19.9), (0, 19.8, 0), (0, 0, 15)], ball, WHERE_IT_IS, [(0.0, 0, 1), (0, 0.8, 0.6), (0, 0, -1)])
+    assert far.rejected_by_reason == {"off surface": 1}
+    assert far.feet.distance_mm[:2] == pytest.approx([-0.1, -0.2], abs=1e-9)
+
+
 def test_points_beyond_an_edge_of_an_open_surface_need_an_allowance() -> None:
     sheet = TriangleSurface(meshes.wave(30))
     _, _, points = scan(sheet, 8000, noise_mm=0.002)
