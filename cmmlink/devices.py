@@ -30,7 +30,7 @@ class Connected:
     trial: ScanSource | None = None
 
 
-Connect = Callable[[Plan], AbstractContextManager[Connected]]
+Connect = Callable[[Plan | SurfacePlan], AbstractContextManager[Connected]]
 """Open the device of a plan for one scan, for as long as the context is entered."""
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from cmmlink.events import Ending
+from cmmlink.surface_rows import SurfaceRows
 from inspection import JudgedRows, Verdict
 
 _EARLY = {
@@ -24,7 +25,7 @@ class Ended:
     ending: Ending | Literal["running"]
     message: str
     result: Mapping[str, Any]
-    blocks: Callable[[], Iterable[JudgedRows]] | None
+    blocks: Callable[[], Iterable[JudgedRows | SurfaceRows]] | None
 
 
 def reasons_of(ended: Ended, verdict: Verdict | None) -> list[str]:

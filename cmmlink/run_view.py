@@ -19,7 +19,7 @@ from cmmlink.endings import Ended, count_words, reasons_of
 from cmmlink.events import Answered, Arrived, Counts, Evaluated, Event, Judged, ProvenOut, RunStarted
 from cmmlink.extremes import ChangedBins, PointsVersion
 from cmmlink.from_plan import zone_of
-from cmmlink.plan import Plan
+from cmmlink.plan import Plan, SurfacePlan
 from cmmlink.result_json import number, result_json
 from cmmlink.run_state import AnswerState, LinkPhase, Phase, RegistrationState, RunKind, RunState, VerdictState, WholeSurface, ZoneLimits
 from cmmlink.shown_section import ShownSection
@@ -28,6 +28,7 @@ from drivers import Heartbeat, LinkDown, LinkUp, PointBatch, Rejected, ScanClose
 from inspection import InspectionResult, LiveUpdate, NominalProfile, ToleranceZone, Verdict
 
 if TYPE_CHECKING:  # who shows sections alone loads nothing of surfaces
+    from cmmlink.nominal_files.surface_file import SurfaceFile
     from cmmlink.shown_surface import ShownSurface
     from cmmlink.worst_voxels import ChangedVoxels
     from inspection.surface import NominalSurface, SurfaceResult, SurfaceUpdate
@@ -69,6 +70,34 @@ class RunContext:
         zone, coverage_min = zone_of(plan, profile), plan.registration.coverage_min
         answers = plan.answer is not None and kind == "run"
         return cls(number, plan_name, profile, zone, coverage_min, plan.buffer_points, began, kind, base_row(plan), answers)
+
+    @classmethod
+    def of_surface(
+        cls,
+        plan: SurfacePlan,
+        file: "SurfaceFile",
+        document_of: "Callable[[SurfaceResult | None, Counts], Mapping[str, Any]]",
+        began: datetime,
+        number: str,
+        plan_name: str,
+        kind: RunKind = "run",
+    ) -> "RunContext":
+        """What the plan of a whole surface says of a run; `document_of` says what is told of its result."""
+        from cmmlink.from_surface_plan import held_against, terms_of  # noqa: PLC0415 - who shows sections alone loads nothing of surfaces
+
+        nominal, terms = held_against(plan, file), terms_of(plan)
+        return cls(
+            number,
+            plan_name,
+            nominal,
+            terms.zone_on(nominal),
+            plan.registration.coverage_min,
+            plan.buffer_points,
+            began,
+            kind,
+            gap_max_mm=terms.limits_on(nominal).gap_max_mm,
+            document_of=document_of,
+        )
 
     @property
     def length_mm(self) -> float:

@@ -9,7 +9,6 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -17,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cmmlink.commands.options import NoBrowser, Records, records_folder
-from cmmlink.commands.output import Output, now, report_outcome, stop_on_ctrl_c
+from cmmlink.commands.output import Output, now, stop_on_ctrl_c
 from cmmlink.errors import PlanError
 from cmmlink.version import __version__
 from cmmlink.words import VERDICT_WORDS
@@ -29,9 +28,10 @@ if TYPE_CHECKING:
     from cmmlink.console.past_runs import PastRuns
     from cmmlink.console.server import ConsoleServer
     from cmmlink.devices import Connect, Connected
-    from cmmlink.plan import CtPlan, Plan
+    from cmmlink.plan import CtPlan, Plan, SurfacePlan
     from cmmlink.run import FinishedRun
     from cmmlink.stack import SectionOutcome
+    from cmmlink.surface_run import FinishedSurface
 
 CONSOLE_PORT = 8207
 _PAGE_OPENS_S = 20.0  # how long a run waits for the page that is to show it
@@ -86,23 +86,32 @@ def serve_console(
 def or_demo(connect: "Connect") -> "Connect":
     """Connect the device of a plan; that of the demonstration's plan is simulated, and every part of it is another one."""
     from cmmlink.demo import plan_file
-    from cmmlink.plan import load_plan
+    from cmmlink.plan import Plan, load_plan
 
     seeds, demo = itertools.count(1), load_plan(plan_file())
 
-    def connect_any(plan: "Plan") -> "AbstractContextManager[Connected]":
+    def connect_any(plan: "Plan | SurfacePlan") -> "AbstractContextManager[Connected]":
         from cmmlink.from_plan import profile_of
         from cmmlink.simulated import connect_demo_device
 
-        is_demo = (plan.device, plan.nominal) == (demo.device, demo.nominal)
-        return connect_demo_device(plan, profile_of(plan), next(seeds), None) if is_demo else connect(plan)
+        if isinstance(plan, Plan) and (plan.device, plan.nominal) == (demo.device, demo.nominal):
+            return connect_demo_device(plan, profile_of(plan), next(seeds), None)
+        return connect(plan)
 
     return connect_any
 
 
-def run_on_page(plan_file: Path, connect: "Connect", output: Output, serial_number: str | None = None, operator: str | None = None) -> int:
+def run_on_page(
+    plan_file: Path,
+    connect: "Connect",
+    output: Output,
+    report: "Callable[[FinishedRun | FinishedSurface], int]",
+    serial_number: str | None = None,
+    operator: str | None = None,
+) -> int:
     """Carry out a plan on the console's page, and stay for the next part while the page is open.
 
+    report : prints the outcome of the first part, whose files are written already, and gives the exit code
     serial_number, operator : of the first part; None leaves what the plan says
     """
     from cmmlink.console.launch import serve, stay_while_seen
@@ -131,7 +140,7 @@ def run_on_page(plan_file: Path, connect: "Connect", output: Output, serial_numb
         if job.failure is not None:
             raise job.failure
         assert job.finished is not None
-        code = report_outcome(job.finished, replace(output, out=None))
+        code = report(job.finished)
         if job.unwritten is not None:
             raise job.unwritten
         if output.out is not None and job.finished.outcome.measured:
@@ -191,14 +200,19 @@ def _past_runs(folder: Path | None) -> "PastRuns":
     return PastRuns(records_folder(folder), decoder_of, time.monotonic, now)
 
 
-def _write_for(out: Path | None = None) -> "Callable[[Plan, FinishedRun], None]":
+def _write_for(out: Path | None = None) -> "Callable[[FinishedRun | FinishedSurface], None]":
     """Return the function that writes the results of each run: into `out`, or else into the folder that its plan names."""
-    from cmmlink.report import write_run
+    from cmmlink.report import write_run, write_surface
+    from cmmlink.run import FinishedRun
 
-    def write(plan: "Plan", run: "FinishedRun") -> None:
-        folder = out or plan.out.folder
-        if folder is not None and run.outcome.measured:
+    def write(run: "FinishedRun | FinishedSurface") -> None:
+        folder = out or run.plan.out.folder
+        if folder is None or not run.outcome.measured:
+            return
+        if isinstance(run, FinishedRun):
             write_run(run.folder_of(folder), run)
+        else:
+            write_surface(run.folder_of(folder), run.result_json(), run.outcome.result)
 
     return write
 

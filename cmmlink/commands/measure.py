@@ -4,8 +4,8 @@ import itertools
 import math
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -23,13 +23,15 @@ from cmmlink.commands.options import (
     records_folder,
 )
 from cmmlink.commands.output import Output, now, report_outcome, stop_on_ctrl_c
-from cmmlink.commands.series import NextPart
+from cmmlink.commands.series import NextPart, connect_part
 from cmmlink.commands.surface_outcome import run_surface
 from cmmlink.errors import PlanError
 
 if TYPE_CHECKING:
-    from cmmlink.devices import Connect, Connected
-    from cmmlink.plan import Plan
+    from cmmlink.devices import Connect
+    from cmmlink.plan import Plan, SurfacePlan
+    from cmmlink.run import FinishedRun
+    from cmmlink.surface_run import FinishedSurface
     from inspection import NominalProfile
 
 
@@ -57,8 +59,10 @@ def demo(
     output = Output(headless, as_json, out, records, no_browser)
     if output.on_page:
         seeds = itertools.count(seed)
-        return run_on_page(demo_plan_file(), lambda plan: connect_demo_device(plan, profile, next(seeds), bump), output)
-    return _run(plan, profile, lambda plan: connect_demo_device(plan, profile, seed, bump), output)
+        return run_on_page(
+            demo_plan_file(), lambda plan: connect_demo_device(_of_section(plan), profile, next(seeds), bump), output, _report(output)
+        )
+    return _run(plan, profile, lambda plan: connect_demo_device(_of_section(plan), profile, seed, bump), output)
 
 
 def _defect(text: str, length_mm: float) -> tuple[float, float]:
@@ -99,17 +103,29 @@ def run(
     output = Output(headless, as_json, out or plan.out.folder, records or plan.records.folder, no_browser)
     plan, notes = NextPart(serial, operator, count_up).of(plan, records_folder(output.records), asks=not as_json)
     prepare(output.out)
-    connect_part = partial(_connect_part, connect, plan.part.serial_number, notes)
+    connect_this = partial(connect_part, connect, plan.part.serial_number, notes)
     if output.on_page:
-        return run_on_page(plan_file, connect_part, output, plan.part.serial_number, plan.operator)
-    return _run(plan, profile, connect_part, output)
+        return run_on_page(plan_file, connect_this, output, _report(output), plan.part.serial_number, plan.operator)
+    return _run(plan, profile, connect_this, output)
 
 
-@contextmanager
-def _connect_part(connect: "Connect", serial_number: str | None, notes: tuple[str, ...], plan: "Plan") -> Iterator["Connected"]:
-    """Connect the device of a plan; what is known of the part with this serial number stands beside its verdict."""
-    with connect(plan) as device:
-        yield replace(device, notes=(*notes, *device.notes)) if plan.part.serial_number == serial_number else device
+def _of_section(plan: "Plan | SurfacePlan") -> "Plan":
+    """The plan of the demonstration, which is one of a section."""
+    from cmmlink.plan import Plan
+
+    assert isinstance(plan, Plan)
+    return plan
+
+
+def _report(output: Output) -> "Callable[[FinishedRun | FinishedSurface], int]":
+    """What prints the outcome of a run of a section that was shown on a page, and gives the exit code."""
+    from cmmlink.run import FinishedRun
+
+    def report(run: "FinishedRun | FinishedSurface") -> int:
+        assert isinstance(run, FinishedRun)
+        return report_outcome(run, replace(output, out=None))
+
+    return report
 
 
 def _run(plan: "Plan", profile: "NominalProfile", connect: "Connect", output: Output) -> int:

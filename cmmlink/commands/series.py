@@ -1,7 +1,9 @@
 """The next part of a series, from the command line: its serial number, who measures, and what was recorded of it before."""
 
 import sys
-from dataclasses import dataclass
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -12,6 +14,7 @@ from cmmlink.errors import PlanError
 from cmmlink.words import printable, repetition_words
 
 if TYPE_CHECKING:
+    from cmmlink.devices import Connect, Connected
     from cmmlink.plan import Plan, SurfacePlan
 
 AnyPlan = TypeVar("AnyPlan", "Plan", "SurfacePlan")
@@ -64,3 +67,12 @@ class NextPart:
         if not following:
             raise PlanError(f"--next: the last serial number, {last}, ends in no number to be counted up; give one with --serial")
         return following
+
+
+@contextmanager
+def connect_part(
+    connect: "Connect", serial_number: str | None, notes: tuple[str, ...], plan: "Plan | SurfacePlan"
+) -> Iterator["Connected"]:
+    """Connect the device of a plan; what is known of the part with this serial number stands beside its verdict."""
+    with connect(plan) as device:
+        yield replace(device, notes=(*notes, *device.notes)) if plan.part.serial_number == serial_number else device

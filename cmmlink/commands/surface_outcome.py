@@ -2,20 +2,23 @@
 
 import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
+from cmmlink.commands.console import run_on_page
 from cmmlink.commands.exit_codes import DEVICE_FAILED, EXIT_OF, NO_RECORD, UNUSABLE, say
 from cmmlink.commands.options import records_folder
 from cmmlink.commands.output import Output, now, print_json, say_untold, stop_on_ctrl_c, terminal
 from cmmlink.commands.progress import progress
-from cmmlink.commands.series import NextPart
+from cmmlink.commands.series import NextPart, connect_part
 from cmmlink.errors import StoreError
 from inspection import NotMeasured
 
 if TYPE_CHECKING:
+    from cmmlink.run import FinishedRun
     from cmmlink.surface_run import FinishedSurface
 
 
@@ -33,10 +36,23 @@ def run_surface(plan_file: Path, part: NextPart, output: Output) -> int:
     out, records = output.out or plan.out.folder, records_folder(output.records or plan.records.folder)
     plan, notes = part.of(plan, records, asks=not output.as_json)
     prepare(out)
+    if output.on_page:
+        shown = replace(output, out=out, records=records)
+        connect_this = partial(connect_part, connect, plan.part.serial_number, notes)
+        report = partial(_report_shown, as_json=output.as_json)
+        return run_on_page(plan_file, connect_this, shown, report, plan.part.serial_number, plan.operator)
     with connect(plan) as device, stop_on_ctrl_c() as stop, progress(f"measuring {plan.part.name}"):
         noted = replace(device, notes=(*notes, *device.notes))
         finished = carry_out_surface(plan, file, noted, records=records, clock=time.monotonic, now=now, stop=stop)
     return report_surface(finished, out, as_json=output.as_json)
+
+
+def _report_shown(run: "FinishedRun | FinishedSurface", *, as_json: bool) -> int:
+    """Print the outcome of a run that was shown on a page; its files are written already."""
+    from cmmlink.surface_run import FinishedSurface
+
+    assert isinstance(run, FinishedSurface)
+    return report_surface(run, None, as_json=as_json)
 
 
 def report_surface(run: "FinishedSurface", out: Path | None, *, as_json: bool) -> int:

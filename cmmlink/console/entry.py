@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 
-from cmmlink.console.choice import CheckedPlan, Choice
+from cmmlink.console.choice import CheckedPlan, CheckedSurface, Choice
 from cmmlink.console.device_test import UNTESTED
 from cmmlink.console.protocol import DeviceTest
 from cmmlink.console.refused import Refused, answer_errors
@@ -54,18 +54,18 @@ class Entry:
             address=self.address if address is None else _printable(address, "address"),
         )
 
-    def planned(self) -> CheckedPlan:
+    def planned(self) -> CheckedPlan | CheckedSurface:
         """The chosen plan with the part and the address that were entered, and its nominal. Raises Refused."""
         if self.choice is None:
             raise Refused("choose a plan first")
         checked = self.choice.checked
         if checked is None:
             raise Refused(self.choice.shown.problem)
-        plan = checked.plan
-        if self.address and plan.has_address:
-            with answer_errors():
-                plan = plan.with_address(self.address)
         with answer_errors():
+            if isinstance(checked, CheckedSurface):
+                surface = checked.plan.with_address(self.address) if self.address and checked.plan.has_address else checked.plan
+                return CheckedSurface(surface.with_part(self.serial_number, self.operator), checked.file)
+            plan = checked.plan.with_address(self.address) if self.address and checked.plan.has_address else checked.plan
             return CheckedPlan(plan.with_part(self.serial_number, self.operator), checked.profile)
 
 

@@ -11,6 +11,7 @@ from typing import Literal
 from cmmlink.errors import PlanError
 from cmmlink.run import FinishedRun
 from cmmlink.run_view import RunView
+from cmmlink.surface_run import FinishedSurface
 from drivers import ScanSource
 
 JobKind = Literal["run", "replay", "device test", "surface", "registers"]
@@ -32,7 +33,7 @@ class Job:
         self.kind = kind
         self.stop = threading.Event()
         self.view: RunView | None = None
-        self.finished: FinishedRun | None = None
+        self.finished: FinishedRun | FinishedSurface | None = None
         self.failure: Exception | None = None
         self.unwritten: PlanError | None = None
         self._on_end = on_end

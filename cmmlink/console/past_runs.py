@@ -16,9 +16,12 @@ from cmmlink.console.protocol import RunRow
 from cmmlink.endings import Ended
 from cmmlink.errors import StoreError
 from cmmlink.events import Counts, RunStarted, Sink
-from cmmlink.plan import Plan
+from cmmlink.from_surface_plan import document_of_surface
+from cmmlink.plan import Plan, SurfacePlan
 from cmmlink.record import (
-    Replay,
+    Agreement,
+    Change,
+    RecordedRun,
     RunSearch,
     Store,
     derived_of,
@@ -31,16 +34,23 @@ from cmmlink.record import (
     recorded_profile,
     recorded_result,
     recorded_run,
+    recorded_surface,
+    recorded_surface_plan,
     replay_run,
+    replay_surface,
     unpack_judged,
+    unpack_surface,
 )
 from cmmlink.record import export_run as export_files
 from cmmlink.result_json import result_json
 from cmmlink.run_state import RunKind
 from cmmlink.run_view import RunContext
+from cmmlink.surface_rows import SurfaceRows
 from cmmlink.words import headline_of, judgement_words, local_words, section_words
 from drivers import Decoder
-from inspection import JudgedRows, NominalProfile, Verdict
+from inspection import JudgedRows, Verdict
+
+Rows = JudgedRows | SurfaceRows
 
 _MOST_LISTED = 500
 
@@ -50,15 +60,14 @@ class OpenedRun:
     """One run as the records hold it."""
 
     run: str
-    plan: Plan
-    profile: NominalProfile
     began: datetime
     started: RunStarted
     ended: Ended
+    context_of: Callable[[str, RunKind], RunContext]
 
     def context(self, title: str, kind: RunKind) -> RunContext:
         """What the run was judged by, under a title that pages show in place of a number."""
-        return RunContext.of(self.plan, self.profile, self.began, title, plan_name="", kind=kind)
+        return self.context_of(title, kind)
 
 
 @dataclass(slots=True)
@@ -70,7 +79,7 @@ class PastRuns:
     """
 
     folder: Path
-    decoder_of: Callable[[Plan], Decoder | None]
+    decoder_of: Callable[[Plan | SurfacePlan], Decoder | None]
     clock: Callable[[], float]
     now: Callable[[], datetime]
     _known: dict[tuple[str, str], RunRow] = field(default_factory=dict)
@@ -102,30 +111,31 @@ class PastRuns:
         with open_to_read(self.folder, self.now) as store:
             recorded = recorded_run(store, find_run(store, run))
             end = recorded.end or end_missing(store, recorded.run)
-            blocks = partial(self._judged_blocks, recorded.run) if recorded.result and "deviations" in store.totals(recorded.run) else None
+            unpack = unpack_surface if recorded.is_of_surface else unpack_judged
+            has_rows = recorded.result and "deviations" in store.totals(recorded.run)
+            blocks = partial(self._judged_blocks, recorded.run, unpack) if has_rows else None
         received = end["received"] or 0
         counts = Counts(received=received, rejected=received, rejected_by_reason={"not judged": received})
         result = recorded.result or result_json(None, counts)
-        return OpenedRun(
-            recorded.run,
-            plan := recorded_plan(recorded),
-            recorded_profile(plan, recorded),
-            datetime.fromisoformat(recorded.header["started"]).astimezone(),
-            RunStarted.from_header(recorded.header),
-            Ended(end["state"], end["message"], result, blocks),
-        )
+        began = datetime.fromisoformat(recorded.header["started"]).astimezone()
+        ended = Ended(end["state"], end["message"], result, blocks)
+        context_of = _context_of_surface(recorded, began) if recorded.is_of_surface else _context_of_section(recorded, began)
+        return OpenedRun(recorded.run, began, RunStarted.from_header(recorded.header), ended, context_of)
 
-    def _judged_blocks(self, run: str) -> Iterator[JudgedRows]:
+    def _judged_blocks(self, run: str, unpack: Callable[[bytes], Rows]) -> Iterator[Rows]:
         """Read the judged rows of a run from the records, piece by piece."""
         with open_to_read(self.folder, self.now) as store:
-            yield from (unpack_judged(record.body) for record in store.records(run, "deviations"))
+            yield from (unpack(record.body) for record in store.records(run, "deviations"))
 
     def replay_run(self, run: str, sinks: Sequence[Sink], stop: threading.Event) -> str:
         """Measure a run again from its record; returns a sentence on the result. Raises StoreError, RunError, PlanError."""
         with open_to_read(self.folder, self.now) as store:
             recorded = recorded_run(store, find_run(store, run))
+            if recorded.is_of_surface:
+                surface = replay_surface(store, recorded, self.decoder_of, clock=self.clock, sinks=sinks, stop=stop)
+                return _comparison_of(surface.agreement, surface.changed, recorded.run)
             again = replay_run(store, recorded, self.decoder_of, clock=self.clock, sinks=sinks, stop=stop, shown=True)
-            return _comparison_of(again, recorded.run)
+            return _comparison_of(again.agreement, again.changed, recorded.run)
 
     def export_run(self, run: str, folder: Path) -> Path:
         """Write one run as a zip archive into a folder. Raises StoreError, RunError, PlanError."""
@@ -152,6 +162,19 @@ class PastRuns:
         file = folder / "comparison.pdf"
         make_comparison(self.folder, first, second, file)
         return file
+
+
+def _context_of_section(recorded: RecordedRun, began: datetime) -> Callable[[str, RunKind], RunContext]:
+    plan = recorded_plan(recorded)
+    profile = recorded_profile(plan, recorded)
+    return lambda title, kind: RunContext.of(plan, profile, began, title, plan_name="", kind=kind)
+
+
+def _context_of_surface(recorded: RecordedRun, began: datetime) -> Callable[[str, RunKind], RunContext]:
+    plan = recorded_surface_plan(recorded)
+    file = recorded_surface(plan, recorded)
+    document_of = partial(document_of_surface, file)
+    return lambda title, kind: RunContext.of_surface(plan, file, document_of, began, title, plan_name="", kind=kind)
 
 
 def _key(entry: dict[str, Any]) -> tuple[str, str]:
@@ -201,15 +224,16 @@ def _row_of(entry: dict[str, Any], result: dict[str, Any]) -> RunRow:
         worst.get("y_mm"),
         zone.get("lower_mm"),
         zone.get("upper_mm"),
+        worst_z_mm=worst.get("z_mm"),
     )
 
 
-def _comparison_of(again: Replay, run: str) -> str:
-    changed = f"; changed since: {', '.join(change.key for change in again.changed)}" if again.changed else ""
-    if again.identical is None:
+def _comparison_of(agreement: Agreement, changes: Sequence[Change], run: str) -> str:
+    changed = f"; changed since: {', '.join(change.key for change in changes)}" if changes else ""
+    if agreement.identical is None:
         return f"Replay of run {run}, which has no recorded result to compare with{changed}"
-    if again.identical:
+    if agreement.identical:
         return f"Replay of run {run}: identical to the recorded result, to the last bit{changed}"
-    if again.agreement.holds:
-        return f"Replay of run {run}: the same decision as recorded, with numbers at most {again.agreement.apart:.1e} apart{changed}"
-    return f"Replay of run {run}: NOT the recorded result; {', '.join(change.key for change in again.differs[:4])} differ{changed}"
+    if agreement.holds:
+        return f"Replay of run {run}: the same decision as recorded, with numbers at most {agreement.apart:.1e} apart{changed}"
+    return f"Replay of run {run}: NOT the recorded result; {', '.join(change.key for change in agreement.differs[:4])} differ{changed}"

@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from cmmlink.console.alarms import Alarms
-from cmmlink.console.choice import CheckedPlan
+from cmmlink.console.choice import CheckedPlan, CheckedSurface
 from cmmlink.console.ct_import import CtImport, InspectSurface
 from cmmlink.console.device_test import TESTING, listen_to_device
 from cmmlink.console.entry import Entry
@@ -27,9 +27,9 @@ from cmmlink.console.station_setup import Records, StationSetup
 from cmmlink.devices import words_of
 from cmmlink.errors import StoreError
 from cmmlink.events import RunStarted
-from cmmlink.plan import Plan
+from cmmlink.plan import Plan, SurfacePlan
 from cmmlink.record import RunSearch
-from cmmlink.run_view import RunContext, RunView
+from cmmlink.run_view import RunView
 from cmmlink.words import repetition_words
 
 _MOST_HISTORY = 500
@@ -306,7 +306,7 @@ class Station:
             job.give_up()
             raise
 
-    def _run(self, job: Job, view: RunView, checked: CheckedPlan) -> None:
+    def _run(self, job: Job, view: RunView, checked: CheckedPlan | CheckedSurface) -> None:
         raise_alarms(job, view, self.alarms, lambda: measure(job, view, checked, self._setup, self.alarms))
         finished = job.finished
         if finished is not None and finished.outcome.ending == "complete" and finished.outcome.result is not None:
@@ -318,7 +318,7 @@ class Station:
         sinks = [sink_of(view, self.alarms)]
         raise_alarms(job, view, self.alarms, lambda: view.remark(records.replay_run(run, sinks, job.stop)))
 
-    def _test(self, job: Job, plan: Plan) -> None:
+    def _test(self, job: Job, plan: Plan | SurfacePlan) -> None:
         try:
             test = listen_to_device(job, lambda: self._setup.connect(plan), self._setup.clock)
         except Exception as error:
@@ -342,7 +342,7 @@ class Station:
             raise Refused("this station keeps no records")
         return self._setup.records
 
-    def _knowing_the_part(self, checked: CheckedPlan, *, again: bool) -> CheckedPlan:
+    def _knowing_the_part(self, checked: CheckedPlan | CheckedSurface, *, again: bool) -> CheckedPlan | CheckedSurface:
         """The plan with a note where its part was measured before, which is refused unless it is to be measured again."""
         part = checked.plan.part
         if self._setup.records is None or not part.serial_number:
@@ -358,13 +358,12 @@ class Station:
             raise Refused(told)
         return replace(checked, notes=(told,))
 
-    def _new_view(self, name: str, checked: CheckedPlan) -> RunView:
+    def _new_view(self, name: str, checked: CheckedPlan | CheckedSurface) -> RunView:
         with self._lock:
             self._runs_begun += 1
             number = str(self._runs_begun)
         plan = checked.plan
-        context = RunContext.of(plan, checked.profile, self._setup.now(), number, name)
-        view = RunView(context, self._setup.clock, self._setup.now)
+        view = RunView(checked.context(self._setup.now(), number, name), self._setup.clock, self._setup.now)
         part, operator = plan.part, plan.operator or ""
         started = RunStarted(part.name, part.serial_number or "", operator, words_of(plan.device), simulated=False)
         view(started)

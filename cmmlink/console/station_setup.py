@@ -13,9 +13,9 @@ from cmmlink.console.protocol import RunRow
 from cmmlink.console.trend_look import TrendLook
 from cmmlink.devices import Connect
 from cmmlink.events import Sink
-from cmmlink.plan import Plan
 from cmmlink.record import RunSearch
 from cmmlink.run import FinishedRun
+from cmmlink.surface_run import FinishedSurface
 
 
 class Records(Protocol):
@@ -74,7 +74,7 @@ class StationSetup:
     now: Callable[[], datetime]
     ct_plans: Callable[[], Mapping[str, Path]] = dict
     inspect_surface: InspectSurface | None = None
-    write: Callable[[Plan, FinishedRun], None] = lambda *_: None
+    write: Callable[[FinishedRun | FinishedSurface], None] = lambda _: None
     folder: Path | None = None
     demo: Path | None = None
     trends: TrendLook | None = None

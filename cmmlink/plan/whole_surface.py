@@ -171,6 +171,11 @@ class SurfacePlan(Spelled):
         """The file of the nominal."""
         return self.surface.file
 
+    @property
+    def has_address(self) -> bool:
+        """Whether the device is reached at an address, and not read from a file."""
+        return getattr(self.device, "address", None) is not None
+
     def with_nominal_file(self, file: Path) -> "SurfacePlan":
         """Give the same plan with its nominal in another file."""
         return self.model_copy(update={"surface": self.surface.model_copy(update={"file": file})})

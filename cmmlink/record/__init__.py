@@ -4,6 +4,7 @@ TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer 
 
 if TYPE_CHECKING:
     from cmmlink.record.against import disagreements, read_result
+    from cmmlink.record.agreement import Agreement
     from cmmlink.record.anchors import Head, Told, anchor_ends, anchors_of, heads_in
     from cmmlink.record.backup import Copied, back_up, merge, open_archive, restore
     from cmmlink.record.bodies import unpack_judged
@@ -61,6 +62,7 @@ else:
         "cmmlink.record.bodies": ("unpack_judged",),
         "cmmlink.record.chain": ("Draft", "Record"),
         "cmmlink.record.changed_plan": ("with_changes",),
+        "cmmlink.record.agreement": ("Agreement",),
         "cmmlink.record.derived": ("Change", "Derived", "Judgement", "derived_of", "judged_by_means", "keep_judgements", "means_of"),
         "cmmlink.record.evidence": ("Evidence", "is_evidence", "open_evidence"),
         "cmmlink.record.export": ("export_run",),
@@ -115,6 +117,7 @@ __all__ = [
     "PATIENCE_S",
     "PUBLIC_FILE",
     "QUEUE_BYTES",
+    "Agreement",
     "Change",
     "Copied",
     "Derived",

@@ -33,6 +33,7 @@ from cmmlink.devices import Connected
 from cmmlink.events import Counts, Judged, RunStarted
 from cmmlink.from_plan import inspection_of, profile_of
 from cmmlink.plan.scan import Plan, load_plan
+from cmmlink.plan.whole_surface import SurfacePlan
 from cmmlink.run_view import RunContext, RunView
 from drivers.source import Arrival, PointBatch
 from inspection import LiveUpdate, NominalProfile
@@ -180,7 +181,7 @@ class Rated:
         self.rng = np.random.default_rng(2)
         self.ended = False
 
-    def connect(self, plan: Plan) -> AbstractContextManager[Connected]:
+    def connect(self, plan: Plan | SurfacePlan) -> AbstractContextManager[Connected]:
         return nullcontext(Connected(self, "benchmark", True))
 
     def stop(self) -> None:

@@ -111,7 +111,7 @@ export function verdictCell(word, shape) {
  * @param {Pick<RunRow, "worst_mm" | "worst_station_mm" | "lower_mm" | "upper_mm">} run
  */
 export function worstCells({ worst_mm, worst_station_mm, lower_mm, upper_mm }) {
-  if (worst_mm === null || worst_station_mm === null) return [cell(""), cell("")];
+  if (worst_mm === null) return [cell(""), cell("")];
   const digits = digitsFor({ lower_mm: lower_mm ?? 0, upper_mm: upper_mm ?? 0 });
-  return [cell(signed(worst_mm, digits), "number"), cell(fixed(worst_station_mm, 2), "number")];
+  return [cell(signed(worst_mm, digits), "number"), cell(worst_station_mm === null ? "" : fixed(worst_station_mm, 2), "number")];
 }

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from cmmlink.console.station_setup import Records, StationSetup
 from cmmlink.devices import Connected
 from cmmlink.plan.scan import Plan
+from cmmlink.plan.whole_surface import SurfacePlan
 from drivers.errors import DeviceError
 from drivers.source import Arrival, PointBatch, ScanClosed, ScanOpened
 from inspection import NominalProfile, RigidTransform, synthetic
@@ -99,13 +100,13 @@ class Device:
     def renew(self) -> None:
         self.source = PlayedSource()
 
-    def connect(self, plan: Plan) -> AbstractContextManager[Connected]:
+    def connect(self, plan: Plan | SurfacePlan) -> AbstractContextManager[Connected]:
         return nullcontext(Connected(self.source, "played scanner", True))
 
 
 def setup_of(
     plans: Mapping[str, Path],
-    connect: Callable[[Plan], AbstractContextManager[Connected]],
+    connect: Callable[[Plan | SurfacePlan], AbstractContextManager[Connected]],
     records: Records | None = None,
     devices: Sequence[tuple[str, str]] = (("played", "the device of this test"),),
 ) -> StationSetup:

@@ -29,6 +29,7 @@ def finished(bench: Bench) -> InspectionResult:
     assert job is not None
     assert job.finished is not None
     assert job.finished.outcome.result is not None
+    assert isinstance(job.finished.outcome.result, InspectionResult)
     return job.finished.outcome.result
 
 

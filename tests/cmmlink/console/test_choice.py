@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from cmmlink.console.choice import check_choice
+from cmmlink.console.choice import CheckedPlan, check_choice
 
 from .played import PLAN, write_plan
 
@@ -38,4 +38,5 @@ def test_plan_that_can_be_run_is_described_with_its_limits_and_its_device(tmp_pa
     facts = dict(choice.shown.facts)
     assert facts["Tolerance"] == "-0.05 to +0.05 mm"
     assert facts["Device"] == "serial played"
+    assert isinstance(choice.checked, CheckedPlan)
     assert facts["Nominal"] == f"section.yaml, {choice.checked.profile.length_mm:.1f} mm, closed"

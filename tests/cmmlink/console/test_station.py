@@ -24,6 +24,7 @@ from cmmlink.extremes import Extremes, PointsVersion
 from cmmlink.from_plan import check_plan, profile_of
 from cmmlink.plan.scan import Plan, load_plan
 from cmmlink.run import FinishedRun
+from cmmlink.surface_run import FinishedSurface
 from drivers.errors import LinkError
 from inspection import NominalProfile
 
@@ -78,7 +79,7 @@ def test_runs_are_recorded_listed_and_opened_as_they_were(bench: Bench) -> None:
 def test_the_results_of_every_run_are_written_and_a_full_disk_is_an_alarm(bench: Bench, tmp_path: Path) -> None:
     written: list[str] = []
 
-    def write(plan: Plan, run: FinishedRun) -> None:
+    def write(run: FinishedRun | FinishedSurface) -> None:
         assert run.outcome.result is not None
         written.append(run.started.serial_number)
         if len(written) == 2:
