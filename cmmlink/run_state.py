@@ -75,10 +75,12 @@ class SurfaceRegion:
 class WholeSurface:
     """What is known of a whole surface beside its points: nothing before its end.
 
+    gap_max_mm : the diameter of the widest place without a point that counts as measured
     regions    : those out of tolerance, the worst first; `more` there are besides
     unmeasured : how many places were not measured, and their area together
     """
 
+    gap_max_mm: float
     regions: tuple[SurfaceRegion, ...] = ()
     more: int = 0
     unmeasured: int = 0

@@ -425,10 +425,10 @@ class RunView:
         if isinstance(self.context.nominal, NominalProfile):
             return None
         if self._ended is None:
-            return WholeSurface()
+            return WholeSurface(self.context.gap_max_mm)
         from cmmlink.shown_surface import whole_surface_in  # noqa: PLC0415 - likewise
 
-        return whole_surface_in(self._ended.result)
+        return whole_surface_in(self._ended.result, self.context.gap_max_mm)
 
     def _registration(self) -> RegistrationState:
         found = self._ended.result["registration"] if self._ended else None

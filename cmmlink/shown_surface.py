@@ -98,7 +98,7 @@ class ShownSurface:
         return self._voxels.changed_since(seen)
 
 
-def whole_surface_in(result: Mapping[str, Any]) -> WholeSurface:
+def whole_surface_in(result: Mapping[str, Any], gap_max_mm: float) -> WholeSurface:
     """What a result tells of a surface beside its points."""
     regions, unmeasured = result.get("regions", ()), result.get("unmeasured", ())
     rows = [
@@ -106,4 +106,4 @@ def whole_surface_in(result: Mapping[str, Any]) -> WholeSurface:
         for number, region in enumerate(regions[:_MOST_REGIONS], start=1)
     ]
     area = sum(place["area_mm2"] for place in unmeasured)
-    return WholeSurface(tuple(rows), len(regions) - len(rows), len(unmeasured), area)
+    return WholeSurface(gap_max_mm, tuple(rows), len(regions) - len(rows), len(unmeasured), area)

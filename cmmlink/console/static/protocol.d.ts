@@ -173,8 +173,9 @@ export interface SurfaceRegion {
   readonly z_mm: number;
 }
 
-/** What is known of a whole surface beside its points: nothing before its end. regions : those out of tolerance, the worst first; `more` there are besides unmeasured : how many places were not measured, and their area together */
+/** What is known of a whole surface beside its points: nothing before its end. gap_max_mm : the diameter of the widest place without a point that counts as measured regions : those out of tolerance, the worst first; `more` there are besides unmeasured : how many places were not measured, and their area together */
 export interface WholeSurface {
+  readonly gap_max_mm: number;
   readonly regions: readonly SurfaceRegion[];
   readonly more: number;
   readonly unmeasured: number;

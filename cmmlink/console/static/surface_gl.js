@@ -14,7 +14,7 @@ import { WORDS } from "./surface_scan.js";
  */
 
 const STRIDE = 4 * WORDS;
-export const WIDER = 2; // than a voxel is a dot, so that neighbours touch wherever in their voxels they lie
+export const WIDER = 2; // than places of the nominal are apart is a dot of them
 export const BEHIND = 2.5; // voxels that the nominal is drawn behind its place, so that it shows only where nothing was measured
 const LEAST_PX = 2;
 export const BAD_PX = 2; // more for each step from within over not proven to out of tolerance
@@ -67,7 +67,7 @@ export class SurfaceGl {
    * @param {HTMLCanvasElement} canvas
    */
   static on(canvas) {
-    const gl = canvas.getContext("webgl", { antialias: false, alpha: true, powerPreference: "high-performance" });
+    const gl = canvas.getContext("webgl", { antialias: false, preserveDrawingBuffer: true, powerPreference: "high-performance" });
     return gl && new SurfaceGl(canvas, gl);
   }
 
@@ -114,10 +114,11 @@ export class SurfaceGl {
    * @param {SurfaceScan} scan
    * @param {Turn} turn
    * @param {ZoneLimits} zone
+   * @param {number} gap the diameter of the widest place without a point that counts as measured, mm
    * @param {number} ratio pixels of the canvas to one of the page
    * @param {number} level how many times voxels are doubled, so that fewer dots are drawn
    */
-  draw(scan, turn, zone, ratio, level = 0) {
+  draw(scan, turn, zone, gap, ratio, level = 0) {
     const { gl, uniforms } = this, { scale, radius } = turn, [right, up, towards] = turn.axes;
     gl.viewport(0, 0, this.canvas.width, this.canvas.height);
     gl.clearColor(0, 0, 0, 0);
@@ -129,18 +130,19 @@ export class SurfaceGl {
     gl.uniform1f(uniforms.depth, 1.2 * radius);
     gl.uniform3f(uniforms.zone, zone.lower_mm, zone.upper_mm, zone.uncertainty_mm);
     const depth = this.canThin ? level : 0, size = scan.size * 2 ** depth, spacing = scan.spacing * 2 ** depth;
+    const dot = Math.max(scan.dot(gap), WIDER * size), back = Math.max(BEHIND * size, dot, 0.5 * spacing);
     const middle = (zone.lower_mm + zone.upper_mm) / 2;
     gl.uniform1f(uniforms.size_mm, size);
     const [places, points] = depth ? [scan.nominal.few(spacing, 0), scan.points.few(size, middle)] : [null, null];
-    this.drawRows("nominal", scan.nominal, places, spacing * scale * ratio, BEHIND * Math.max(size, 0.25 * spacing), 0);
-    this.drawRows("points", scan.points, points, size * scale * ratio, 0, BAD_PX * ratio);
+    this.drawRows("nominal", scan.nominal, places, WIDER * spacing * scale * ratio, back, 0);
+    this.drawRows("points", scan.points, points, dot * scale * ratio, 0, BAD_PX * ratio);
   }
 
   /**
    * @param {Drawn} name
    * @param {Rows} rows
    * @param {Uint32Array | null} few which rows are drawn; null: all
-   * @param {number} dot about how far rows are apart, px
+   * @param {number} dot its width, px
    * @param {number} back mm
    * @param {number} worse px
    */
@@ -154,7 +156,7 @@ export class SurfaceGl {
     gl.enableVertexAttribArray(1);
     gl.uniform1f(uniforms.back, back);
     gl.uniform1f(uniforms.bare, name === "nominal" ? 1 : 0);
-    gl.uniform2f(uniforms.size, Math.max(WIDER * dot, LEAST_PX), worse);
+    gl.uniform2f(uniforms.size, Math.max(dot, LEAST_PX), worse);
     if (!few) return gl.drawArrays(gl.POINTS, 0, rows.count);
     this.choose(name, few);
     gl.drawElements(gl.POINTS, few.length, gl.UNSIGNED_INT, 0);

@@ -9,6 +9,8 @@ import { HEADER_AT, HEADER_BYTES, NOMINAL_SURFACE, SURFACE_POINTS } from "./prot
 /** A point that is read out. @typedef {{ place: Spot, deviation: number }} SurfacePoint */
 
 const CELLS = 2 ** 17; // of a size along each axis, on both sides of zero together
+const WIDER = 2; // than a voxel is a dot, so that neighbours touch wherever in their voxels they lie
+const APART = 0.7; // of the side of the square that a point stands for: half its diagonal
 export const WORDS = 5; // of a row as it is held: x, y, z, deviation, and the normal in the bytes of the fifth
 
 /** Rows of x, y, z, deviation and normal, 20 bytes each. */
@@ -108,6 +110,15 @@ export class SurfaceScan {
     /** @type {Box | null} */
     this.box = null;
     this.version = 0; // counts everything that was taken
+  }
+
+  /**
+   * How wide a dot is that stands for a point, mm: neighbours touch, and none covers more than counts as measured.
+   * @param {number} gap the diameter of the widest place without a point that counts as measured
+   */
+  dot(gap) {
+    const apart = this.spacing * Math.sqrt(this.nominal.count / Math.max(this.points.count, 1));
+    return Math.max(WIDER * this.size, Math.min(WIDER * APART * apart, gap));
   }
 
   /** Forget everything. */

@@ -21,15 +21,16 @@ export class SurfaceStill {
    * @param {SurfaceScan} scan
    * @param {Turn} turn
    * @param {ZoneLimits} zone
+   * @param {number} gap the diameter of the widest place without a point that counts as measured, mm
    * @param {number} ratio pixels of the canvas to one of the page
    */
-  draw(scan, turn, zone, ratio) {
+  draw(scan, turn, zone, gap, ratio) {
     const pen = this.canvas.getContext("2d"), { width, height } = this.canvas;
     if (!pen || !width || !height) return;
     const painting = { image: pen.createImageData(width, height), depth: new Float32Array(width * height).fill(-Infinity), ratio };
-    const { size, spacing } = scan, back = BEHIND * Math.max(size, 0.25 * spacing);
+    const { size, spacing } = scan, dot = scan.dot(gap), back = Math.max(BEHIND * size, dot, 0.5 * spacing);
     paint(painting, scan.nominal, turn, WIDER * spacing, () => [UNMEASURED, 0, -back]);
-    paint(painting, scan.points, turn, WIDER * size, (row, facing) => {
+    paint(painting, scan.points, turn, dot, (row, facing) => {
       const deviation = scan.points.deviation(row), kind = surfaceClassOf(deviation, zone), bad = BADNESS[kind];
       return [kind === "within" ? withinZone(deviation, zone) : COLOURS[kind], bad, facing > 0 ? 0.5 * bad * size : 0];
     });

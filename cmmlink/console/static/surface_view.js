@@ -97,10 +97,10 @@ export class SurfaceView {
       this.beheld = scan.box;
       turn.behold(scan.box);
     }
-    const shown = JSON.stringify([scan.version, turn.axes, turn.scale, turn.x, turn.y, run.zone]);
+    const shown = JSON.stringify([scan.version, turn.axes, turn.scale, turn.x, turn.y, run.zone, this.isMoving]);
     if (shown === this.drawn) return;
     this.drawn = shown;
-    this.painter.draw(scan, turn, run.zone, this.ratio, this.isMoving ? this.level : 0);
+    this.painter.draw(scan, turn, run.zone, run.surface?.gap_max_mm ?? 0, this.ratio, this.isMoving ? this.level : 0);
   }
 
   get isMoving() {
