@@ -146,7 +146,8 @@ def test_a_browser_without_webgl_shows_a_still_picture(station: Bench) -> None:
     page = station.page(address="about:blank")
     page.add_init_script(
         "const get = HTMLCanvasElement.prototype.getContext;"
-        "HTMLCanvasElement.prototype.getContext = function (kind, ...more) { return kind === 'webgl' ? null : get.call(this, kind, ...more); };"
+        "HTMLCanvasElement.prototype.getContext = function (kind, ...more) {"
+        "    return kind === 'webgl' ? null : get.call(this, kind, ...more); };"
     )
     page.goto(station.server.new_address())
     started(station, page)
