@@ -7,7 +7,7 @@ INSTALL := $(PIP) --no-build-isolation --editable
 # The tests start a hundred processes; where Python may keep no compiled files, each of them compiles every file anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo install test checks compiled lowest lowest-compiled lowest-drivers platforms upgrade bench slower paper faults powercuts kills fuzz soak damage memory elsewhere proofs mutants stops machines rejudge laws audit reference uncertainty supply-chain docs bundle page-tools screenshots
+.PHONY: demo install test checks compiled lowest lowest-compiled lowest-drivers platforms upgrade bench slower paper faults powercuts kills fuzz soak damage memory elsewhere proofs mutants stops machines rejudge laws audit surfaces reference uncertainty supply-chain docs bundle page-tools screenshots
 demo: .venv/installed
 	$(BIN)/cmmlink demo --out demo-result
 
@@ -168,6 +168,10 @@ airfoils: .venv/test-installed
 # The audit of verdicts: live scans, minimum zones, partial scans and mirrored parts whose truth is known.
 audit: .venv/test-installed
 	$(BIN)/python -m tests.benchmarks.verdict_audit
+
+# Whole surfaces: poses found without a start, of whole scans and of parts, and how many points the stated error of clouds covers.
+surfaces: .venv/test-installed
+	$(BIN)/python -m tests.benchmarks.surface_poses
 
 # Every point of every case of the reference set, and every number that is stated of it, found anew by mpmath; takes some minutes.
 reference: .venv/test-installed

@@ -5,7 +5,6 @@ The order of the points has no say: they are sorted first. Nor has their density
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import permutations, product
 from typing import Literal, get_args
 
 import numpy as np
@@ -13,7 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from inspection.errors import RegistrationError
 from inspection.surface.feet import NominalSurface, points_in_space
-from inspection.surface.pose_steps import FitProblem, SettledPose, linearise, settle_pose, step_of
+from inspection.surface.pose_search import are_apart, seek_pose
+from inspection.surface.pose_steps import FitProblem, SettledPose, settle_pose
 from inspection.surface.rigid_motion import RigidMotion
 from inspection.surface.weakness import Weakness, weakness_of
 
@@ -27,12 +27,7 @@ _FEWEST = 6
 _MADS = 6.0  # median absolute deviations beyond which a point is an outlier, as for profiles
 _MANY, _AHEAD = 1 << 17, 1 << 14  # points from which on a choice of so many goes ahead
 _ROUNDS = 20  # in which outliers are found anew
-_FEW, _TRIES = 500, 25  # points that a pose is tried with, and steps
-_PLACES = 4000  # of the nominal from which its axes are taken
-_WORST = 0.1  # of the points that are left out while a pose is tried
-_RIVAL = 1.1  # times the least rms: another pose that fits as well
-_FITS = 0.02  # of the size: a larger rms means that the pose was not found
-_OTHER_POSE = 0.02  # of the size at the rim: poses farther apart are different ones
+_PLACES = 4000  # of the nominal that tell how much of it would hold the part
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,8 +77,8 @@ def register_surface(
 ) -> SurfaceRegistration:
     """Bring points (m, 3) onto a nominal.
 
-    start     : the pose to begin with, within the reach of the nearest surface; None seeks it by the principal axes of both, for scans
-                of the whole part
+    start     : the pose to begin with, within the reach of the nearest surface; None seeks it by the principal axes of both, and
+                for scans of a part by pairs of points
     locked    : shifts and turns, in the coordinates of the nominal, that stay as they are in `start`
     target_mm : the deviation that points are brought to, the middle of the zone
     gross_mm  : leave out what deviates more than six times the median and more than this; None leaves nothing out
@@ -106,15 +101,19 @@ def register_surface(
     weights = _weights(given, _CELL * nominal.size_mm)
     others: list[RigidMotion] = []
     if start is None:
-        start, others = _seek(given, weights, nominal, target_mm)
+        start, others = seek_pose(given, weights, nominal, target_mm)
     free = np.array([name not in locked for name in _FREEDOMS])
     problem = FitProblem(given, weights, nominal, free, target_mm)
     found = _fit(problem, start, gross_mm, farthest_mm)
-    rivals = tuple(_fit(problem, other, gross_mm, farthest_mm).nominal_from_scan for other in others)
+    rivals: list[RigidMotion] = []
+    for other in others:
+        rival = _fit(problem, other, gross_mm, farthest_mm).nominal_from_scan
+        if all(are_apart(rival, known, given, nominal) for known in [found.nominal_from_scan, *rivals]):
+            rivals.append(rival)
     used, outlier = (np.zeros(len(points), dtype=bool) for _ in range(2))
     same = np.cumsum(is_new) - 1
     used[order], outlier[order] = found.used[same], found.outlier[same]
-    return replace(found, used=used, outlier=outlier, rivals=len(rivals), rival_poses=rivals)
+    return replace(found, used=used, outlier=outlier, rivals=len(rivals), rival_poses=tuple(rivals))
 
 
 def _weights(points: Array, cell_mm: float) -> Array:
@@ -168,78 +167,3 @@ def _registration(problem: FitProblem, found: SettledPose, outlier: Truth) -> Su
     whole = np.column_stack([normals, np.cross(places - state.centre, normals)])
     weakest = weakness_of(state.rows, state.weights, state.arms, problem.free, rms, whole)
     return SurfaceRegistration(found.motion, rms, found.steps, found.converged, state.used, outlier, weakest, state.centre)
-
-
-def _seek(points: Array, weights: Array, nominal: NominalSurface, target_mm: float) -> tuple[RigidMotion, list[RigidMotion]]:
-    """The start for a scan of the whole part, and others that fit as well.
-
-    Principal axes are laid on principal axes in all ways, each is refined, the least rms wins.
-    """
-    places, _ = nominal.sample(_PLACES)
-    to_middle, to_axes = _axes(places, np.ones(len(places)))
-    from_middle, from_axes = _axes(points, weights)
-    few = points[np.unique(np.linspace(0, len(points) - 1, _FEW).astype(np.int64))]
-    tried = []
-    for turn in _proper_turns():
-        rotation = to_axes @ turn @ from_axes.T
-        motion = RigidMotion(rotation, to_middle - rotation @ from_middle)
-        tried.append(_trimmed(few, nominal, motion, target_mm))
-    tried.sort(key=lambda each: each[0])
-    least, best = tried[0]
-    if not least <= _FITS * nominal.size_mm:
-        raise RegistrationError(
-            f"the pose was not found: at best the points lie {least:.3g} mm (rms) off the surface. Is the whole part scanned, is it the "
-            "right one and the right unit? Else give a start"
-        )
-    spread = np.sqrt(((few - few.mean(axis=0)) ** 2).sum(axis=1).max())
-    corners = few.mean(axis=0) + spread * np.concatenate([np.eye(3), -np.eye(3)])
-    others: list[RigidMotion] = []
-    for rms, motion in tried[1:]:
-        far = all(np.abs(motion.apply(corners) - known.apply(corners)).max() > _OTHER_POSE * nominal.size_mm for known in [best, *others])
-        if rms <= _RIVAL * least + 1e-9 * nominal.size_mm and far:
-            others.append(motion)
-    return best, others
-
-
-def _axes(points: Array, weights: Array) -> tuple[Array, Array]:
-    """The middle (3,) of points and their principal axes, as the columns of a rotation."""
-    middle = (points * weights[:, None]).sum(axis=0) / weights.sum()
-    off = points - middle
-    _, axes = np.linalg.eigh(np.einsum("mi,mj,m->ij", off, off, weights))
-    if np.linalg.det(axes) < 0:
-        axes[:, 0] *= -1
-    return middle, axes
-
-
-def _proper_turns() -> list[Array]:
-    """The 24 rotations that bring axes onto axes, those that keep every axis in its line first."""
-    turns = []
-    for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
-        turn = np.zeros((3, 3))
-        turn[range(3), order] = signs
-        if np.linalg.det(turn) > 0:
-            turns.append(turn)
-    return turns
-
-
-def _trimmed(few: Array, nominal: NominalSurface, motion: RigidMotion, target_mm: float) -> tuple[float, RigidMotion]:
-    """A pose refined with few points, the worst tenth of them left out in each step: its rms, infinite where it leaves the surface."""
-    problem = FitProblem(few, np.ones(len(few)), nominal, np.ones(6, dtype=bool), target_mm)
-    rms, kept = np.inf, len(few) - int(_WORST * len(few))
-    for _ in range(_TRIES):
-        feet = nominal.project(motion.apply(few))
-        off = np.abs(feet.distance_mm - target_mm)  # from borders as well, or a pose with all points beyond one would fit
-        worst = np.argsort(off, kind="stable")[kept:]
-        now = float(np.sqrt((np.sort(off)[:kept] ** 2).mean()))
-        if not now < rms * (1 - 1e-3):
-            return min(rms, now), motion
-        rms = now
-        outlier = np.zeros(len(few), dtype=bool)
-        outlier[worst] = True
-        try:
-            state = linearise(problem, motion, outlier)
-        except RegistrationError:
-            return np.inf, motion
-        change = step_of(state, problem.free, 1e-6)
-        motion = RigidMotion.about(state.centre, change[3:], change[:3]).after(motion)
-    return rms, motion

@@ -62,6 +62,29 @@ def test_random_poses_of_a_whole_part_are_all_found() -> None:
         assert found.rivals == 0
 
 
+def test_a_scan_of_a_part_is_found_by_pairs_where_axes_lead_astray() -> None:
+    """A quarter of a mould: its principal axes have nothing to do with those of the whole, and lead to a pose 100 mm off."""
+    surface = PatchSurface([faces.mould()])
+    places, normals = surface.sample(4000)
+    quarter = (places[:, 0] < 55) & (places[:, 1] < 65)
+    rng = np.random.default_rng(7)
+    scan = places[quarter] + rng.normal(0, 0.005, (np.count_nonzero(quarter), 1)) * normals[quarter]
+    motion = RigidMotion.about((3, 5, 1), (1.0, -2.0, 0.7), (40, -20, 90))
+    points = motion.inverse().apply(scan)
+    found = register_surface(points, surface)
+    assert apart(found.nominal_from_scan, motion, points) < 0.02
+    assert found.rivals == 0
+
+
+def test_what_a_scan_of_a_part_leaves_open_is_said() -> None:
+    """Half of a box fits at either end and turned over: no fit can tell, so the others are counted."""
+    surface = PatchSurface(faces.box((4.0, 3.0, 2.0)))
+    places, _ = surface.sample(2000)
+    found = register_surface(RigidMotion.about((0, 0, 0), (0.4, 0.2, 1.3), (5, 0, 0)).apply(places[places[:, 0] < 2]), surface)
+    assert found.rms_mm < 1e-6
+    assert found.rivals >= 3
+
+
 def test_a_symmetric_part_has_rivals() -> None:
     surface = PatchSurface(faces.box((4.0, 3.0, 2.0)))
     found = register_surface(scan_of(surface, 900, RigidMotion.about((0, 0, 0), (0.1, 0.2, 0.3), (5, 0, 0))), surface)
