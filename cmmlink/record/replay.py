@@ -100,7 +100,8 @@ def replay_run(
     reading = Reading(arrivals_in(store, recorded, decoder, stop))
     source = Capture(reading, decoder, failure_of(recorded))
     started = RunStarted.from_header(recorded.header)
-    live = inspection_of(changed, profile, scratch_in(store.path.parent), numbers=numbers)
+    is_seen = bool(sinks) or shown  # else a provisional pose, which takes most of the time, would be told to nobody
+    live = inspection_of(changed, profile, scratch_in(store.path.parent), numbers=numbers, provisional=is_seen)
     outcome = run_inspection(
         source,
         live,
