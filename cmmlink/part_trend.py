@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from cmmlink.plant import FORM_TYPES, drift_of, trend_of
+from cmmlink import plant  # whose statistics are loaded when they serve
 
 if TYPE_CHECKING:
     from cmmlink.plant import Drift, ProfileStrips, ResultSeries, Trend
@@ -94,8 +94,8 @@ def look_at_trend(
     """
     series = results.series(part, characteristic, station=station, since=since, last=last)
     unproven = sum(verdict == "uncertain" for verdict in series.verdict)
-    is_form = series.type in FORM_TYPES
-    trend = trend_of(series.value, series.lower, series.upper, is_form=is_form, subgroup=subgroup, unproven=unproven)
+    is_form = series.type in plant.FORM_TYPES
+    trend = plant.trend_of(series.value, series.lower, series.upper, is_form=is_form, subgroup=subgroup, unproven=unproven)
     strips = results.strips(part, min(last, MOST_STRIPS), station=station)
     strips = strips if since is None else _only(strips, strips.started_s >= since.timestamp())
     strip, told = heat_strip_of(strips) if strips.run else (None, ("No run has a profile on record.",))
@@ -122,7 +122,7 @@ def heat_strip_of(strips: "ProfileStrips") -> tuple[HeatStrip, Sequence[str]]:
     same = strips.length_mm == strips.length_mm[-1]
     left, kept = int((~same).sum()), _only(strips, same)
     levels = levels_of(kept.worst_mm, kept.lower_mm, kept.upper_mm)
-    drift = drift_of(kept.mean_mm)
+    drift = plant.drift_of(kept.mean_mm)
     notes = list(drift.notes)
     if left:
         notes.append(f"Left out of the heat strip: {left} runs whose nominal has another length.")

@@ -44,6 +44,7 @@ from cmmlink.result_keys import (
     ZonesVerified,
 )
 from cmmlink.surface_keys import SurfaceInspected, SurfaceMeasured, SurfaceRecorded, SurfaceReplayed
+from cmmlink.trend_keys import PlantTrend
 from cmmlink.version import RESULT_SCHEMA
 from drivers.codecs import decoders
 from drivers.codecs.register_map import PATTERNS, POINTS_FIELDS, POP_FIELDS, STATUS_FIELDS, RegisterMap
@@ -190,6 +191,7 @@ OBJECTS: tuple[tuple[str, type[BaseModel], type[BaseModel] | None], ...] = (
     ("`plant push` and `plant status`", PlantOutbox, None),
     ("`plant verify`", PlantAgreement, None),
     ("`plant address`", PlantAddress, None),
+    ("`plant trends`", PlantTrend, None),
 )
 
 TABLES: tuple[tuple[str, Mapping[str, str]], ...] = (

@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -27,8 +28,10 @@ if TYPE_CHECKING:
     from cmmlink.console.ct_import import Section
     from cmmlink.console.past_runs import PastRuns
     from cmmlink.console.server import ConsoleServer
+    from cmmlink.console.trend_look import TrendLook
     from cmmlink.devices import Connect, Connected
     from cmmlink.plan import CtPlan, Plan, SurfacePlan
+    from cmmlink.plant import ResultsDatabase
     from cmmlink.run import FinishedRun
     from cmmlink.stack import SectionOutcome
     from cmmlink.surface_run import FinishedSurface
@@ -69,7 +72,10 @@ def serve_console(
     scans, surfaces = (lambda: _plans_in(folder, surfaces=False)), (lambda: _plans_in(folder, surfaces=True))
     inspect = partial(inspect_surface, past.folder)
     open_device = or_demo(connect)
-    setup = StationSetup(scans, open_device, serial_ports, past, time.monotonic, now, surfaces, inspect, _write_for(), folder, plan_file())
+    trends = _trends_of(past.folder)
+    setup = StationSetup(
+        scans, open_device, serial_ports, past, time.monotonic, now, surfaces, inspect, _write_for(), folder, plan_file(), trends
+    )
     if key is not None and certificate is None:
         raise PlanError("--key belongs to a certificate; give that with --certificate")
     access = Access(host, port, certificate, key, unencrypted)
@@ -81,6 +87,19 @@ def serve_console(
         while not stop.wait(_LOOK_S):
             pass
     return 0
+
+
+def _trends_of(records: Path) -> "TrendLook | None":
+    """What looks into the results that the station with these records pushes; None where the extra for that is not installed."""
+    from cmmlink.console.trend_look import TrendLook
+
+    def open_results() -> "ResultsDatabase":
+        from cmmlink.plant import ResultsDatabase
+        from cmmlink.plant_push import address_for
+
+        return ResultsDatabase(address_for(records))
+
+    return TrendLook(open_results, records) if find_spec("sqlalchemy") else None
 
 
 def or_demo(connect: "Connect") -> "Connect":
@@ -121,7 +140,9 @@ def run_on_page(
 
     past = _past_runs(output.records)
     write = _write_for(output.out)
-    setup = StationSetup(lambda: {plan_file.name: plan_file}, connect, serial_ports, past, time.monotonic, now, write=write)
+    setup = StationSetup(
+        lambda: {plan_file.name: plan_file}, connect, serial_ports, past, time.monotonic, now, write=write, trends=_trends_of(past.folder)
+    )
     with stop_on_ctrl_c() as stop, serve(setup, __version__) as server:
         station = server.station
         _show(server, output.no_browser)

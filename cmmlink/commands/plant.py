@@ -13,6 +13,7 @@ from cmmlink.commands.exit_codes import DEVICE_FAILED, UNUSABLE, fail
 from cmmlink.commands.options import Json, Records, records_folder
 from cmmlink.commands.output import now, print_json
 from cmmlink.commands.progress import progress
+from cmmlink.commands.trends import trends
 from cmmlink.words import local_words, printable
 
 if TYPE_CHECKING:
@@ -114,6 +115,9 @@ def address(
     else:
         typer.echo(printable(f"results of {folder} go to {told}"))
     return 0
+
+
+plant.command()(trends)
 
 
 def _stay(folder: Path) -> int:

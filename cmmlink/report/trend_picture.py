@@ -16,16 +16,17 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 from numpy.typing import NDArray
 
+from cmmlink.colour_map import COLOURS, Kind
 from cmmlink.part_trend import HeatStrip, PartTrend
 from cmmlink.report.heading import draw_heading, save_picture, short_title
-from cmmlink.report.profile_drawing import BAND, NOMINAL, NOTES, UNMEASURED, prepare_axes
+from cmmlink.report.profile_drawing import BAND, NOMINAL, NOTES, prepare_axes
 from cmmlink.report.speech import Speech
 
 if TYPE_CHECKING:
     from cmmlink.plant import CapabilityIndex, ControlChart
 
 MOST_DRAWN = 500  # of the newest values: more are not told apart on a page
-HEAT_COLOURS = ("#08306b", "#4a90c4", "#b3d3e8", "#f7f7f7", "#fdd0a2", "#ec8a33", "#7f2704")
+HEAT_COLOURS = (COLOURS[Kind.BELOW], "#4a90c4", "#b3d3e8", "#f7f7f7", "#fdd0a2", "#ec8a33", COLOURS[Kind.ABOVE])
 """From below the zone to above it; blue against orange is told apart by every eye, and both ends are dark."""
 _LINE, _LIMIT, _BROKEN = "#14608c", "#6d8f84", "#c2410c"
 _INCHES, _DOTS_PER_INCH = (7.1, 10.0), 200  # fits on A4 and on Letter
@@ -174,7 +175,7 @@ def _draw_strip(axes: Axes, strip: HeatStrip | None, say: Speech) -> None:
         axes.text(0.5, 0.5, say("no profile on record"), transform=axes.transAxes, ha="center", va="center", color=NOTES, fontsize=8)
         return
     rows, places = strip.levels.shape
-    colours = ListedColormap(HEAT_COLOURS).with_extremes(bad=UNMEASURED)
+    colours = ListedColormap(HEAT_COLOURS).with_extremes(bad=COLOURS[Kind.NOT_JUDGED])
     norm = BoundaryNorm(np.arange(-3.5, 4), len(HEAT_COLOURS))
     stations = np.linspace(0, strip.length_mm, places + 1)
     axes.pcolormesh(stations, np.arange(rows + 1), np.ma.masked_invalid(strip.levels), cmap=colours, norm=norm)

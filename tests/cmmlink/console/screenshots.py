@@ -22,10 +22,13 @@ from cmmlink.commands.console import inspect_surface
 from cmmlink.console.past_runs import PastRuns
 from cmmlink.console.server import ConsoleServer
 from cmmlink.console.station import Station
+from cmmlink.console.trend_look import TrendLook
 from cmmlink.from_plan import profile_of
 from cmmlink.plan.scan import load_plan
+from cmmlink.plant import ResultsDatabase
 from drivers.source import Damaged
 from inspection import RigidTransform, synthetic
+from tests.cmmlink.plant.trending import drifting_runs
 from tests.drivers.surface.meshes import binary_stl, tube, write
 from tests.inspection.profiles import AIRFOILS
 from tests.integration.simulated import simulated
@@ -39,7 +42,7 @@ from .test_browser_records import CT_PLAN
 SIZES = ((1920, 1080), (1366, 768), (800, 600), (360, 740))
 LANGUAGES = ("en-GB", "de-DE")
 THEMES = ("light", "dark")
-VIEWS = ("part", "live", "history", "ct", "new-plan", "registers", "wall")
+VIEWS = ("part", "live", "history", "ct", "trends", "new-plan", "registers", "wall")
 
 
 @contextmanager
@@ -58,9 +61,12 @@ def measured_station(folder: Path) -> Iterator[tuple[Station, ConsoleServer, Dev
     setup = replace(
         setup_of(files, device.connect, records),
         folder=folder,
+        trends=TrendLook(lambda: ResultsDatabase(folder / "plant.sqlite"), folder),
         ct_plans=lambda: {"ct.yaml": surface},
         inspect_surface=lambda file, stop, on_start, on_section: inspect_surface(folder / "records", file, stop, on_start, on_section),
     )
+    with ResultsDatabase(folder / "plant.sqlite") as results:
+        results.add_runs(drifting_runs(60))
     station = Station(setup)
     server = ConsoleServer(station, "screenshots", token=TOKEN)
     server.start()
@@ -113,7 +119,7 @@ def show(page: Page, station: Station, view: str, modbus: str) -> None:
         page.locator("#new-device").click()
         look_at_registers(page, modbus)
     else:
-        page.keyboard.press(str(("live", "part", "history", "ct").index(view) + 1))
+        page.keyboard.press(str(("live", "part", "history", "ct", "trends").index(view) + 1))
 
 
 def main(folder: Path, only: str = "") -> None:
