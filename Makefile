@@ -153,7 +153,7 @@ stops: .venv/test-installed
 # The two laws over every source, format and surface, with thirty times as many random cases as `make test` tries; every rotation, too.
 laws: .venv/test-installed
 	$(BIN)/pytest --hypothesis-profile=laws --timeout 7200 tests/integration/test_laws.py tests/integration/test_laws_of_files.py \
-		tests/inspection/test_coarse.py
+		tests/inspection/test_coarse.py tests/inspection/surface/test_surface_laws.py
 
 # Two hundred sound runs of every kind, exported and checked by docs/verify/verify.py, which may call nothing untrue; then some are altered.
 RUNS ?= 200

@@ -46,21 +46,29 @@ class JudgedPoints:
 
 
 def judge_points(
-    points_mm: Array, normals: Array | None, nominal: NominalSurface, pose: RigidMotion, zone: ToleranceZone, farthest_mm: float
+    points_mm: Array,
+    normals: Array | None,
+    nominal: NominalSurface,
+    pose: RigidMotion,
+    zone: ToleranceZone,
+    farthest_mm: float,
+    reserve_mm: float = 0.0,
 ) -> JudgedPoints:
     """Points (m, 3) as they are at a pose; a point's result depends on nothing but itself.
 
-    normals : (m, 3) outward directions of the measured surface, or None
-    zone    : with the U of the measuring device alone; the error of the nominal counts where it is
+    normals    : (m, 3) outward directions of the measured surface, or None
+    zone       : with the U of the measuring device alone; the error of the nominal counts where it is
+    reserve_mm : how far a deviation may still move; a verdict on a point is given where that cannot change it
     """
     moved, seen = pose.apply(points_mm), None if normals is None else pose.turn(normals)
     feet = nominal.project(moved)
     if seen is not None:
         feet = feet_on_own_face(moved, seen, nominal, feet, farthest_mm)
     rejection = rejections(feet, farthest_mm, seen)
-    judged = zone.verdicts(feet.distance_mm, feet.error_mm)
+    error = feet.error_mm + reserve_mm
+    judged = zone.verdicts(feet.distance_mm, error)
     if not nominal.sides_known:  # what holds for one side only is not proven
-        judged = np.where(judged == zone.verdicts(-feet.distance_mm, feet.error_mm), judged, np.int8(Verdict.UNCERTAIN))
+        judged = np.where(judged == zone.verdicts(-feet.distance_mm, error), judged, np.int8(Verdict.UNCERTAIN))
     verdicts = np.where(rejection == Rejection.NONE, judged, np.int8(NOT_JUDGED)).astype(np.int8)
     return JudgedPoints(feet, verdicts, rejection)
 

@@ -46,7 +46,8 @@ class SurfaceUpdate:
     whole        : every point so far is judged anew, so that `first` is 0
     points_mm    : (k, 3) in the coordinates of the nominal at the pose of this moment; as scanned while it is sought
     deviation_mm : (k,) positive out of material
-    verdicts     : (k,) codes of `Verdict`; provisional ones are no proof
+    verdicts     : (k,) codes of `Verdict`; provisional ones are UNCERTAIN where the pose, as far as it moved a deviation last, could change
+                   them. They are no proof: form that is still to come may move the pose farther
     rejection    : (k,) codes of `Rejection`
     registration : how the pose of this moment was fitted; None while it is sought, and where it is known
     """
@@ -78,6 +79,7 @@ class LiveSurface:
         self._received = 0
         self._known_pose = terms.known_pose
         self._registration: SurfaceRegistration | None = None
+        self._reserve_mm = 0.0  # how far the pose is expected to move a deviation yet
         self._next_fit = BLOCK  # received points at which the pose is sought, or fitted anew
 
     @property
@@ -170,7 +172,8 @@ class LiveSurface:
 
     def _judged_at(self, pose: RigidMotion, rows: slice) -> JudgedPoints:
         normals = self._rows["normals"][rows] if self._has_normals else None
-        return judge_points(self._rows["points"][rows], normals, self._nominal, pose, self._terms.zone, self._farthest_mm)
+        held = normals, self._nominal, pose, self._terms.zone, self._farthest_mm
+        return judge_points(self._rows["points"][rows], *held, self._reserve_mm)
 
     def _advance(self) -> bool:
         """Seek the pose, or fit it anew, at a block's end; True when every verdict given so far is replaced."""
@@ -185,12 +188,24 @@ class LiveSurface:
         except RegistrationError:
             found = None
         if found is not None and (self._registration is not None or start is not None or self._is_clear(found)):
+            self._reserve_mm = self._moved_by(found, few)
             self._registration = found
         self._next_fit = int(self._received * (_SEEK_GROWTH if self._registration is None else _REFIT_GROWTH))
         if self._registration is None:
             return False
         self._judge(0, self._received)
         return True
+
+    def _moved_by(self, found: SurfaceRegistration, points: Array) -> float:
+        """How far a new pose moves the deviations of points (k, 3) at most: the next ones are expected to move them less, as scans grow.
+
+        Infinite for the first pose, of which nothing is known.
+        """
+        if self._registration is None:
+            return np.inf
+        poses = self._registration.nominal_from_scan, found.nominal_from_scan
+        before, after = (self._nominal.project(pose.apply(points)).distance_mm for pose in poses)
+        return float(np.abs(after - before)[found.used].max(initial=0.0))
 
     def _is_clear(self, found: SurfaceRegistration) -> bool:
         """Whether one pose fits the points so far clearly better than any other, and they fix it."""
