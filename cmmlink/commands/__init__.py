@@ -32,6 +32,7 @@ from cmmlink.commands.registers import registers
 from cmmlink.commands.rejudge import rejudge
 from cmmlink.commands.report import report
 from cmmlink.commands.setup import doctor, list_ports, nominal, prepare, simulate
+from cmmlink.commands.study import study
 from cmmlink.commands.surfaces import ManyHeights, ct
 from cmmlink.commands.verify import verify
 from cmmlink.commands.whole_surfaces import surface
@@ -75,6 +76,7 @@ app.command(short_help="Judge a whole archive again with another plan.")(rejudge
 app.command(short_help="Show whether a record was altered, and who signed it.")(verify)
 app.add_typer(key, name="key", short_help="Show or change the key that signs the runs.")
 app.add_typer(plant, name="plant", short_help="Push results to a database that many stations share.")
+app.add_typer(study, name="study", short_help="Study the measuring system by repeated scans.")
 app.command("verify-zone", short_help="Check the proofs of minimum zones and least consumptions.")(verify_zone)
 app.command(short_help="Write points and nominals whose truth is known.")(reference)
 app.command(short_help="Copy all records to one checked file.")(backup)

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from cmmlink.plant.profile_strip import STRIP_PARTS, ProfileStrip, strip_of
     from cmmlink.plant.result_rows import PartCharacteristic, ProfileStrips, ResultSeries, RunFound, StoredEvent, StoredRun, StoredValue
     from cmmlink.plant.results_database import ResultsDatabase, month_of
+    from cmmlink.plant.study_file import Reference, StudiedCharacteristic, Study, StudyRun, read_study, study_text
+    from cmmlink.plant.study_findings import BudgetOfU, SourceOfU, StudyFinding, StudyFindings, budget_of, findings_of
     from cmmlink.plant.trend import FORM_TYPES, Trend, alarm_words, new_violations, trend_of
     from cmmlink.plant.western_electric import ControlLimits, RuleViolation
 else:
@@ -68,6 +70,8 @@ else:
             "ResultsDatabase",
             "month_of",
         ),
+        "cmmlink.plant.study_file": ("Reference", "StudiedCharacteristic", "Study", "StudyRun", "read_study", "study_text"),
+        "cmmlink.plant.study_findings": ("BudgetOfU", "SourceOfU", "StudyFinding", "StudyFindings", "budget_of", "findings_of"),
         "cmmlink.plant.trend": (
             "FORM_TYPES",
             "Trend",
@@ -87,6 +91,7 @@ else:
 __all__ = [
     "FORM_TYPES",
     "STRIP_PARTS",
+    "BudgetOfU",
     "Capability",
     "CapabilityIndex",
     "ControlChart",
@@ -98,28 +103,39 @@ __all__ = [
     "PartCharacteristic",
     "ProfileStrip",
     "ProfileStrips",
+    "Reference",
     "ResultSeries",
     "ResultsDatabase",
     "RuleViolation",
     "RunFound",
+    "SourceOfU",
     "StationStudy",
     "StoredEvent",
     "StoredRun",
     "StoredValue",
+    "StudiedCharacteristic",
+    "Study",
+    "StudyFinding",
+    "StudyFindings",
+    "StudyRun",
     "Trend",
     "TypeOneStudy",
     "address_of",
     "alarm_words",
+    "budget_of",
     "capability",
     "crossed_study",
     "drift_of",
+    "findings_of",
     "individuals_charts",
     "is_server",
     "mean_range_charts",
     "month_of",
     "new_violations",
+    "read_study",
     "station_study",
     "strip_of",
+    "study_text",
     "trend_of",
     "type_one_study",
     "without_password",

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from cmmlink.report.speech import Speech
     from cmmlink.report.stack_folder import write_stack
     from cmmlink.report.stack_pdf import write_stack_report
+    from cmmlink.report.study_pdf import write_study
+    from cmmlink.report.study_text import study_document, study_lines
     from cmmlink.report.surface_folder import write_surface
     from cmmlink.report.surface_terminal import print_surface_summary
     from cmmlink.report.terminal import STYLE_OF, STYLES, print_characteristics, print_summary
@@ -52,6 +54,8 @@ else:
         "cmmlink.report.stack_folder": ("write_stack",),
         "cmmlink.report.stack_pdf": ("write_stack_report",),
         "cmmlink.report.speech": ("Speech",),
+        "cmmlink.report.study_pdf": ("write_study",),
+        "cmmlink.report.study_text": ("study_document", "study_lines"),
         "cmmlink.report.surface_folder": ("write_surface",),
         "cmmlink.report.surface_terminal": ("print_surface_summary",),
         "cmmlink.report.terminal": ("STYLE_OF", "STYLES", "print_characteristics", "print_summary"),
@@ -83,6 +87,8 @@ __all__ = [
     "scan_of",
     "scan_on_record",
     "stack_on_record",
+    "study_document",
+    "study_lines",
     "text_picture",
     "with_settings",
     "write_certificate",
@@ -94,6 +100,7 @@ __all__ = [
     "write_run",
     "write_stack",
     "write_stack_report",
+    "write_study",
     "write_surface",
     "write_trend_picture",
     "zone_in",
