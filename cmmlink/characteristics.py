@@ -82,12 +82,13 @@ def base_row(plan: Plan | CtPlan) -> int | None:
     return None if first.filter is not None or elsewhere else plan.characteristics.index(first)
 
 
-def notes_on_zone(plan: Plan | CtPlan) -> tuple[str, ...]:
-    """What the reader has to know where the points are judged by another zone or pose than the first line-profile as they arrive."""
-    if plan.tolerance is not None or _is_run_itself(plan.first_profile):
-        return ()
+def notes_on_characteristics(plan: Plan | CtPlan) -> tuple[str, ...]:
+    """What the reader has to know: where a U comes from, and by which zone or pose points are judged as they arrive, if it is another."""
+    sources = tuple(f"U of {asked.name} is from {asked.uncertainty_from}" for asked in plan.characteristics if asked.uncertainty_from)
+    if plan.tolerance is not None or _is_run_itself(plan.first_profile, plan):
+        return sources
     name = plan.first_profile.name
-    return (f"the points are shown against the envelope of {name} at a free fit; for the verdict {name} itself counts",)
+    return (*sources, f"the points are shown against the envelope of {name} at a free fit; for the verdict {name} itself counts")
 
 
 def is_short_form(found: Sequence[CharacteristicResult]) -> bool:
@@ -115,7 +116,7 @@ class Builder:
             return self._value(asked)
         if asked.fit == "datum" and self._known_pose is None and asked.datum is None:
             raise ValueError("fit datum needs a known pose or features: give registration.datum, or a datum of its own")
-        if self._plan.tolerance is None and asked is self._plan.first_profile and _is_run_itself(asked):
+        if self._plan.tolerance is None and asked is self._plan.first_profile and _is_run_itself(asked, self._plan):
             return WholeProfile(asked.name)
         return self._line_profile(asked)
 
@@ -237,8 +238,10 @@ class Builder:
         return self._outline
 
 
-def _is_run_itself(asked: AskedProfile) -> bool:
-    """Whether a line-profile of the whole profile is what the run itself judges."""
+def _is_run_itself(asked: AskedProfile, plan: Plan | CtPlan) -> bool:
+    """Whether a line-profile of the whole profile is what the run itself judges, by the same U: a budget is that of the run."""
+    if asked.uncertainty_mm is not None and plan.uncertainty is not None:
+        return False
     constant = asked.zone.stations_mm is None
     placed = asked.fit in ("none", "datum") or (asked.fit != "tolerance" and asked.is_all_free)
     return constant and placed and asked.filter is None and asked.datum is None

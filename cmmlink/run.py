@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from cmmlink.answer import MachineAnswer
-from cmmlink.characteristics import notes_on_zone
+from cmmlink.characteristics import notes_on_characteristics
 from cmmlink.conduct import conduct
 from cmmlink.devices import Connected
 from cmmlink.events import Answered, Event, RunStarted, Sink
@@ -134,7 +134,7 @@ def carry_out(
     scratch = scratch_in(records)
     _log.info("%s", words_of_room(scratch.folder))
     live = inspection_of(plan, profile, scratch, provisional=followed)
-    notes = (*assumed, *notes_on_zone(plan), *_notes_on_end(plan), *device.notes)
+    notes = (*assumed, *notes_on_characteristics(plan), *_notes_on_end(plan), *device.notes)
     on_ready()
     conducted = conduct(
         plan,

@@ -13,7 +13,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from cmmlink.characteristics import notes_on_zone
+from cmmlink.characteristics import notes_on_characteristics
 from cmmlink.devices import words_of
 from cmmlink.errors import PlanError, RunError
 from cmmlink.exports import document_on_record, judged_rows, sound_run
@@ -159,7 +159,7 @@ def _judge(plan: Plan, curve: NominalFile | NominalProfile | None, source: Point
         profile, assumed = discretize_file(curve, _NOMINAL, plan.nominal, plan.discretisation), curve.notes
     else:
         profile, assumed, plan = profile_of(plan), notes_on_nominal(plan), with_section(plan)
-    assumed = (*assumed, *notes_on_datum(plan), *notes_on_temperature(plan), *notes_on_zone(plan), *notes)
+    assumed = (*assumed, *notes_on_datum(plan), *notes_on_temperature(plan), *notes_on_characteristics(plan), *notes)
     try:
         live = inspection_of(plan, profile, provisional=False)
     except ValueError as error:

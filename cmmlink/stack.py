@@ -13,7 +13,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from cmmlink.characteristics import notes_on_zone
+from cmmlink.characteristics import notes_on_characteristics
 from cmmlink.errors import PlanError
 from cmmlink.events import Ending, RunStarted
 from cmmlink.foresight import Foresight, look_ahead
@@ -224,7 +224,7 @@ def inspect_stack(
         on_start(len(heights))
         foresight.expect(len(heights), len(plan.characteristics) + max(numbers))
         read_in = [f"{plan.mesh.file.name}: read in {plan.mesh.unit}, as asked"] if plan.mesh.unit else []
-        notes = [*read_in, *mesh.warnings, *profiles.notes, *notes_on_temperature(plan), *notes_on_zone(plan)]
+        notes = [*read_in, *mesh.warnings, *profiles.notes, *notes_on_temperature(plan), *notes_on_characteristics(plan)]
         notes += [*filter(None, [qualification_here()[1]]), *(record.seal.notes if record else ())]
         sections: list[SectionOutcome] = []
         slices: Iterator[SurfaceSection] = opened.enter_context(closing(_slices(plan, mesh, heights, open3d, notes, profiles.shortest_mm)))

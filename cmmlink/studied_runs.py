@@ -62,8 +62,8 @@ def _lacks(run: str, option: str, what: str) -> str:
 
 def _studied(found: Mapping[str, object], stated: Mapping[str, float]) -> StudiedCharacteristic:
     name, kind, unit, lower, upper = (found[key] for key in ("name", "type", "unit", "lower", "upper"))
-    limits = [float(limit) if isinstance(limit, int | float) else None for limit in (lower, upper)]
-    return StudiedCharacteristic(str(name), str(kind), str(unit), *limits, stated=dict(stated))
+    low, high = (float(limit) if isinstance(limit, int | float) else None for limit in (lower, upper))
+    return StudiedCharacteristic(str(name), str(kind), str(unit), low, high, dict(stated))
 
 
 def _check(study: Study, run: str, found: Mapping[str, Mapping[str, object]], length_mm: float) -> None:

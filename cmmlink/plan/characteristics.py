@@ -166,6 +166,10 @@ class AskedFilter(Settings):
 
 class _Named(Settings):
     name: Text = Field(description="the name of the characteristic, which no other one of the plan has")
+    uncertainty_from: Text | None = Field(
+        default=None,
+        description="where its U comes from, such as the study of a measuring system whose report spells this key; a note tells it",
+    )
 
 
 class AskedProfile(_Named):
@@ -208,6 +212,8 @@ class AskedProfile(_Named):
             raise ValueError("within_mm with region LE or TE, and with nothing else")
         if self.datum is not None and self.fit != "datum":
             raise ValueError(f"fit datum beside a datum, not fit {self.fit}")
+        if self.uncertainty_from is not None and self.uncertainty_mm is None:
+            raise ValueError("uncertainty_mm beside uncertainty_from, which says where it comes from")
         if self.zone.stations_mm is not None and self.fit == "minimum-zone":
             raise ValueError("fit tolerance for a zone that varies along the profile: a minimum zone has one width")
         return self
@@ -238,6 +244,8 @@ class Limited(_Named):
             raise ValueError("a lower limit, an upper one, or both")
         if not low < high:
             raise ValueError(f"an upper limit above the lower one, {low:g}")
+        if self.uncertainty_from is not None and not self.expanded_uncertainty:
+            raise ValueError("an uncertainty beside uncertainty_from, which says where it comes from")
         if 2 * self.expanded_uncertainty >= high - low:
             raise ValueError(f"an uncertainty of less than half the {high - low:g} between the limits: more leaves nothing provable")
         return self

@@ -86,6 +86,7 @@ characteristics:
     filter: {cutoff_mm: 0.8, order: 2, robust: false}
     rule: best-fit
     uncertainty_mm: 0.004
+    uncertainty_from: the study nose of 2026-11-02
   - {name: root, type: line-profile, from: {station_mm: 10}, to: {station_mm: 40}, zone: {width_mm: 0.1, outward_mm: 0.04}}
   - {name: smooth chord, type: chord, lower_mm: -0.1, filter: {cutoff_mm: 0.8}}
 """

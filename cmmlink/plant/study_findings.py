@@ -18,6 +18,8 @@ from scipy.stats import t as t_distribution
 from cmmlink.plant.gauge_studies import CrossedStudy, StationStudy, TypeOneStudy, crossed_study, station_study, type_one_study
 from cmmlink.plant.study_file import StudiedCharacteristic, Study, StudyRun
 
+Stated = tuple[str, str, float, int | None]  # a source, its type, its standard uncertainty and its degrees of freedom
+
 _COVERED = float(norm.cdf(2) - norm.cdf(-2))  # 95.45 %: what k = 2 covers where the degrees of freedom are many
 _FEWEST_REPEATS = 5  # of one part; fewer tell nothing of a spread
 
@@ -105,9 +107,11 @@ def _type_one(study: Study) -> StudyFindings:
             notes.append(f"{one.name} is left out: {lacks}.")
             continue
         found = type_one_study([run.values[one.name] for run in study.runs], reference.value, tolerance)
-        sources = [("repeatability, each time with a registration of its own", "A", found.sigma, found.values - 1)]
-        sources.append(("bias, not corrected", "B", abs(found.bias) / math.sqrt(3), None))
-        sources.append(("reference value", "B", reference.expanded / 2, None))
+        sources: list[Stated] = [
+            ("repeatability, each time with a registration of its own", "A", found.sigma, found.values - 1),
+            ("bias, not corrected", "B", abs(found.bias) / math.sqrt(3), None),
+            ("reference value", "B", reference.expanded / 2, None),
+        ]
         findings.append(StudyFinding(one, found, None, budget_of([*sources, *_stated(one)]), (*found.notes, *_notes(one))))
     if not findings:
         raise ValueError(f"no characteristic can be studied: {' '.join(notes)} `cmmlink study new --reference NAME=VALUE` states one")
@@ -128,8 +132,10 @@ def _crossed(study: Study) -> StudyFindings:
         values = [[[run.values[one.name] for run in cells[part, operator]] for operator in operators] for part in parts]
         found = crossed_study(values, one.tolerance)
         reproducibility = found.line("reproducibility")
-        sources = [("repeatability, each time with a registration of its own", "A", found.line("repeatability").sigma, found.freedom)]
-        sources.append(("reproducibility, of operators", "A", reproducibility.sigma, len(operators) - 1))
+        sources: list[Stated] = [
+            ("repeatability, each time with a registration of its own", "A", found.line("repeatability").sigma, found.freedom),
+            ("reproducibility, of operators", "A", reproducibility.sigma, len(operators) - 1),
+        ]
         findings.append(StudyFinding(one, None, found, budget_of([*sources, *_stated(one)]), (*found.notes, *_notes(one))))
     runs = [run for part in parts for operator in operators for run in cells[part, operator]]
     repeats = len(runs) // (len(parts) * len(operators))
@@ -170,7 +176,7 @@ def _strips(runs: Sequence[StudyRun]) -> NDArray[np.float64]:
 # --- the budget ------------------------------------------------------------------------------------------------------
 
 
-def budget_of(sources: Sequence[tuple[str, str, float, int | None]]) -> BudgetOfU:
+def budget_of(sources: Sequence[Stated]) -> BudgetOfU:
     """The budget of sources, each with its name, type, standard uncertainty and degrees of freedom (None: infinite)."""
     total = math.hypot(*(standard for _, _, standard, _ in sources))
     lines = tuple(SourceOfU(*one, (one[2] / total) ** 2 if total else 0.0) for one in sources)
@@ -180,7 +186,7 @@ def budget_of(sources: Sequence[tuple[str, str, float, int | None]]) -> BudgetOf
     return BudgetOfU(lines, total, freedom, factor, factor * total)
 
 
-def _stated(one: StudiedCharacteristic) -> Iterator[tuple[str, str, float, None]]:
+def _stated(one: StudiedCharacteristic) -> Iterator[Stated]:
     """What the plan states of sources that repeating does not show."""
     for source, standard in one.stated.items():
         yield source, "B", standard, None

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import TYPE_CHECKING, Any, Protocol
 
-from cmmlink.characteristics import notes_on_zone
+from cmmlink.characteristics import notes_on_characteristics
 from cmmlink.errors import StoreError
 from cmmlink.events import RunStarted, Sink
 from cmmlink.from_plan import inspection_of, notes_on_datum, notes_on_nominal, notes_on_temperature
@@ -203,7 +203,7 @@ def _notes_on(changed: Plan, plan: Plan, noted: Sequence[str], recorded: Recorde
 
 
 def _notes_from(plan: Plan) -> list[str]:
-    return [*notes_on_datum(plan), *notes_on_temperature(plan), *notes_on_zone(plan)]
+    return [*notes_on_datum(plan), *notes_on_temperature(plan), *notes_on_characteristics(plan)]
 
 
 def _doubt_of(recorded: RecordedRun) -> Reason | None:

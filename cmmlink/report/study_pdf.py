@@ -16,7 +16,7 @@ from cmmlink.plant import Study, StudyFinding, StudyFindings
 from cmmlink.report.first_page import moment_words
 from cmmlink.report.page_parts import BODY, BODY_BOLD, COLOURS, GREY, INK, LINE, NUMBER, SMALL, TITLE, grid, headed, text
 from cmmlink.report.pdf_fonts import PLAIN, register_fonts
-from cmmlink.report.study_text import along_words, figures, kind_words, limits_words, middles_mm, result_words
+from cmmlink.report.study_text import along_words, figures, kind_words, limits_words, middles_mm, plan_words, result_words
 
 _MARGIN = 14 * mm
 _WHOLE = 150.0  # points of the page that a characteristic takes at least: it begins on a new one where less is left
@@ -40,7 +40,7 @@ def write_study(study: Study, found: StudyFindings, path: Path) -> None:
     parts: list[Flowable] = [text(f"Study of the measuring system: {study.name}", TITLE.clone("head", fontSize=14, leading=18))]
     parts += [text(f"{kind_words(study, found)[0].upper()}{kind_words(study, found)[1:]}."), _facts(study, found, width)]
     for one in found.findings:
-        parts += [CondPageBreak(_WHOLE), *_characteristic(one, width)]
+        parts += [CondPageBreak(_WHOLE), *_characteristic(study, one, width)]
     parts += [CondPageBreak(_HEIGHT + 60), text("Along the profile", TITLE), *(text(line) for line in along_words(study, found))]
     parts += [Spacer(1, 4), _spread_along(study, found, width), *_runs(study, width)]
     document.build(parts, onFirstPage=draw_foot, onLaterPages=draw_foot)
@@ -54,7 +54,7 @@ def _facts(study: Study, found: StudyFindings, width: float) -> Flowable:
     return grid([[text(name, SMALL), text(told)] for name, told in rows], [80, width - 80], head=0)
 
 
-def _characteristic(one: StudyFinding, width: float) -> Iterator[Flowable]:
+def _characteristic(study: Study, one: StudyFinding, width: float) -> Iterator[Flowable]:
     asked = one.characteristic
     yield text(f"{asked.name}: {asked.type}, {limits_words(asked)}", TITLE)
     yield from (text(line, BODY_BOLD if place == 0 else BODY) for place, line in enumerate(figures(one)))
@@ -63,7 +63,8 @@ def _characteristic(one: StudyFinding, width: float) -> Iterator[Flowable]:
         yield _anova(one, width)
     yield Spacer(1, 3)
     yield _budget(one, width)
-    yield text(result_words(one), BODY_BOLD)
+    yield text(f"{result_words(one)}.", BODY_BOLD)
+    yield text(f"With this characteristic in a plan: {plan_words(study, one)}", SMALL)
     yield from (text(note, SMALL) for note in one.notes)
 
 

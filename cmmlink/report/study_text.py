@@ -1,5 +1,6 @@
 """What a study of the measuring system shows, as lines of text and as JSON."""
 
+import json
 from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Any
@@ -11,6 +12,7 @@ from cmmlink.plant import StudiedCharacteristic, Study, StudyFinding, StudyFindi
 from cmmlink.version import RESULT_SCHEMA
 
 _UNIT_KEYS = {"mm": "uncertainty_mm", "deg": "uncertainty_deg"}
+_TELLING = 0.001  # of u^2: smaller shares stand in the report of the study alone
 _MOST = 3  # stretches along the profile that are named in text
 
 
@@ -27,20 +29,20 @@ def study_document(study: Study, found: StudyFindings) -> dict[str, Any]:
         "parts": list(found.parts),
         "operators": list(found.operators),
         "repeats": found.repeats,
-        "characteristics": [_characteristic(one) for one in found.findings],
+        "characteristics": [_characteristic(study, one) for one in found.findings],
         "along_the_profile": _along(study, found),
         "notes": list(found.notes),
     }
 
 
-def _characteristic(one: StudyFinding) -> dict[str, Any]:
+def _characteristic(study: Study, one: StudyFinding) -> dict[str, Any]:
     asked = one.characteristic
-    told = {"name": asked.name, "type": asked.type, "unit": asked.unit, "lower": asked.lower, "upper": asked.upper}
+    told: dict[str, Any] = {"name": asked.name, "type": asked.type, "unit": asked.unit, "lower": asked.lower, "upper": asked.upper}
     if one.type_one is not None:
         told["type_one"] = asdict(one.type_one)
     if one.crossed is not None:
         told["crossed"] = asdict(one.crossed)
-    return told | {"budget": asdict(one.budget), "plan_key": plan_key(asked), "notes": list(one.notes)}
+    return told | {"budget": asdict(one.budget), "plan": plan_words(study, one), "notes": list(one.notes)}
 
 
 def plan_key(asked: StudiedCharacteristic) -> str:
@@ -60,7 +62,7 @@ def _or_null(value: float) -> float | None:
 
 def middles_mm(study: Study, count: int) -> NDArray[np.float64]:
     """The middles (count,) of the even parts of the profile."""
-    return (np.arange(count) + 0.5) * (study.length_mm / count)
+    return np.asarray((np.arange(count) + 0.5) * (study.length_mm / count), dtype=np.float64)
 
 
 # --- text ------------------------------------------------------------------------------------------------------------
@@ -79,6 +81,7 @@ def study_lines(study: Study, found: StudyFindings) -> Iterator[str]:
             freedom = "inf" if line.freedom is None else str(line.freedom)
             yield f"  {line.source:<66}{line.evaluated:>5}{line.standard:>12.6f}{freedom:>7}{line.share:>8.1%}"
         yield f"  {result_words(one)}"
+        yield f"  in a plan: {plan_words(study, one)}"
         yield from (f"  note: {note}" for note in one.notes)
     yield ""
     yield from along_words(study, found)
@@ -118,13 +121,21 @@ def figures(one: StudyFinding) -> Iterator[str]:
 
 
 def result_words(one: StudyFinding) -> str:
-    """U with its factor, and the line of a plan that states it."""
+    """U with its factor."""
     budget, asked = one.budget, one.characteristic
     freedom = "many" if budget.freedom is None else f"{budget.freedom:.0f} effective"
     return (
         f"u = {budget.standard:.6f} {asked.unit}, k = {budget.factor:.2f} ({freedom} degrees of freedom), "
-        f"U = {budget.expanded:.6f} {asked.unit}; in a plan with this characteristic: {plan_key(asked)}: {rounded_up(budget.expanded):g}"
+        f"U = {budget.expanded:.6f} {asked.unit}"
     )
+
+
+def plan_words(study: Study, one: StudyFinding) -> str:
+    """The keys that a plan states U by with this characteristic, and where it comes from: its results tell the whole budget then."""
+    asked, day = one.characteristic, max(run.measured_at for run in study.runs)[:10]
+    sources = ", ".join(f"{line.source.partition(',')[0]} {line.standard:.2g}" for line in one.budget.sources if line.share >= _TELLING)
+    told = f"the study {study.name} of {day} ({len(study.runs)} runs): u by {sources} {asked.unit}; k = {one.budget.factor:.2f}"
+    return f"{plan_key(asked)}: {rounded_up(one.budget.expanded):g}, uncertainty_from: {json.dumps(told, ensure_ascii=False)}"
 
 
 def rounded_up(value: float) -> float:
