@@ -263,7 +263,7 @@ def test_the_plans_and_maps_of_a_page_can_be_read(page: str, text: str, tmp_path
 
 def test_pages_call_commands_that_exist_with_options_they_have() -> None:
     text = "".join(text for _, text in blocks("sh"))
-    calls = re.findall(r"\bcmmlink ((?:plan )?[a-z]+) ?([^`#\n]*)", text)
+    calls = re.findall(r"\bcmmlink ((?:(?:plan|plant|study) )?[a-z]+) ?([^`#\n]*)", text)
     assert {"run", "inspect", "ct", "replay"} <= {command for command, _ in calls}
     for command in {command for command, _ in calls}:
         described = cmmlink_command(*command.split(), "--help")
