@@ -7,7 +7,7 @@ INSTALL := $(PIP) --no-build-isolation --editable
 # The tests start a hundred processes; where Python may keep no compiled files, each of them compiles every file anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo install test checks compiled lowest lowest-compiled lowest-drivers platforms upgrade bench slower paper faults powercuts kills fuzz soak damage memory elsewhere proofs mutants stops machines rejudge laws audit surfaces reference uncertainty supply-chain docs bundle page-tools screenshots
+.PHONY: demo install test checks compiled lowest lowest-compiled lowest-drivers platforms upgrade bench slower paper faults powercuts kills fuzz soak damage memory elsewhere proofs mutants stops machines rejudge trends laws audit surfaces reference uncertainty supply-chain docs bundle page-tools screenshots
 demo: .venv/installed
 	$(BIN)/cmmlink demo --out demo-result
 
@@ -145,6 +145,10 @@ mutants: .venv/test-installed
 ARCHIVE ?= 2000
 rejudge: .venv/test-installed
 	$(BIN)/python -m tests.benchmarks.rejudge_benchmark $(ARCHIVE)
+
+# How long the view of trends waits for a PostgreSQL server with 100,000 runs of ten characteristics, which takes a minute to be filled.
+trends: .venv/test-installed
+	$(BIN)/python -m tests.benchmarks.trends_benchmark
 
 # How soon a measuring machine is told to stop, and how much of the scans of 100 bad parts stop_when_failed saves.
 stops: .venv/test-installed

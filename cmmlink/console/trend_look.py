@@ -15,7 +15,6 @@ from cmmlink.console.trend_words import (
     TrendChart,
     TrendChoices,
     TrendIndex,
-    TrendPart,
     TrendRun,
     TrendShown,
     TrendStrip,
@@ -68,17 +67,15 @@ class TrendLook:
     def choices(self) -> TrendChoices:
         """What trends there are. Raises Refused."""
         with self._results() as results:
-            names = results.parts()
-            parts = tuple(TrendPart(name, tuple(dict.fromkeys(one.name for one in results.characteristics(name)))) for name in names)
-            return TrendChoices(parts, tuple(results.stations()))
+            return TrendChoices(tuple(results.parts()), tuple(results.stations()))
 
     def trend(self, asked: AskedTrend) -> TrendShown:
-        """The trend of a characteristic. Raises Refused."""
+        """The trend of a characteristic, of the first one where the part has none of that name. Raises Refused."""
         with self._results() as results:
-            found = look_at_trend(
-                results, asked.part, asked.characteristic, station=asked.station, last=asked.last, subgroup=asked.subgroup
-            )
-        return _shown(found)
+            names = tuple(dict.fromkeys(one.name for one in results.characteristics(asked.part)))
+            name = asked.characteristic if asked.characteristic in names or not names else names[0]
+            found = look_at_trend(results, asked.part, name, station=asked.station, last=asked.last, subgroup=asked.subgroup)
+        return _shown(found, names)
 
     def write(self, asked: AskedTrend, folder: Path, suffix: str, language: str) -> Path:
         """Write the trend as a drawing or a workbook into a folder. Raises Refused."""
@@ -106,7 +103,7 @@ def _count(given: str, name: str, most: int) -> int:
     raise Refused(f"{name} {given!r}: expected a whole number from 1 to {most}")
 
 
-def _shown(found: PartTrend) -> TrendShown:
+def _shown(found: PartTrend, names: tuple[str, ...]) -> TrendShown:
     series, trend = found.series, found.trend
     runs = tuple(
         TrendRun(
@@ -125,6 +122,7 @@ def _shown(found: PartTrend) -> TrendShown:
     return TrendShown(
         series.part,
         series.name,
+        names,
         series.unit,
         trend.is_form,
         trend.subgroup,

@@ -4,18 +4,10 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class TrendPart:
-    """A part with results, and the names of its characteristics."""
-
-    name: str
-    characteristics: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
 class TrendChoices:
-    """What trends there are."""
+    """Which parts have results, and of which stations."""
 
-    parts: tuple[TrendPart, ...]
+    parts: tuple[str, ...]
     stations: tuple[str, ...]
 
 
@@ -87,6 +79,7 @@ class TrendStrip:
 class TrendShown:
     """The trend of one characteristic over the newest runs, oldest first.
 
+    characteristics : the names of all that the part has
     rows   : of each plotted value the run that it ends with
     basis  : mean, standard deviation and distribution of the indices, in words; empty without any
     drifts : where the profile drifts, in words
@@ -94,6 +87,7 @@ class TrendShown:
 
     part: str
     characteristic: str
+    characteristics: tuple[str, ...]
     unit: str
     is_form: bool
     subgroup: int

@@ -487,15 +487,9 @@ export interface MapSaved {
   readonly taken: boolean;
 }
 
-/** A part with results, and the names of its characteristics. */
-export interface TrendPart {
-  readonly name: string;
-  readonly characteristics: readonly string[];
-}
-
-/** What trends there are. */
+/** Which parts have results, and of which stations. */
 export interface TrendChoices {
-  readonly parts: readonly TrendPart[];
+  readonly parts: readonly string[];
   readonly stations: readonly string[];
 }
 
@@ -546,10 +540,11 @@ export interface TrendStrip {
   readonly stretches: readonly (readonly [number, number])[];
 }
 
-/** The trend of one characteristic over the newest runs, oldest first. rows : of each plotted value the run that it ends with basis : mean, standard deviation and distribution of the indices, in words; empty without any drifts : where the profile drifts, in words */
+/** The trend of one characteristic over the newest runs, oldest first. characteristics : the names of all that the part has rows : of each plotted value the run that it ends with basis : mean, standard deviation and distribution of the indices, in words; empty without any drifts : where the profile drifts, in words */
 export interface TrendShown {
   readonly part: string;
   readonly characteristic: string;
+  readonly characteristics: readonly string[];
   readonly unit: string;
   readonly is_form: boolean;
   readonly subgroup: number;

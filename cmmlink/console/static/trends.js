@@ -28,7 +28,7 @@ export class TrendsView {
     const point = (/** @type {number | null} */ place) => this.point(place);
     this.charts = [new ControlChart(byId("trend-location"), point), new ControlChart(byId("trend-spread"), point)];
     this.strip = new HeatStrip(byId("trend-strip"), (words) => put("trend-strip-words", words || gettext("arrows read out")));
-    for (const name of CHOSEN) selectOf(`trend-${name}`).addEventListener("change", () => this.choose(name));
+    for (const name of CHOSEN) selectOf(`trend-${name}`).addEventListener("change", () => this.look());
     for (const kind of ["pdf", "xlsx"]) buttonOf(`trend-${kind}`).addEventListener("click", () => this.save(kind, download));
   }
 
@@ -46,22 +46,10 @@ export class TrendsView {
     if (!got.ok) return this.tell(got.message);
     this.choices = /** @type {TrendChoices} */ (got.given);
     const { parts, stations } = this.choices;
-    fill("trend-part", parts.map(({ name }) => name));
+    fill("trend-part", parts);
     fill("trend-station", stations, gettext("all stations"));
-    this.fillCharacteristics();
     if (!parts.length) return this.tell(gettext("There are no results yet. They come with the runs that are pushed."));
     await this.look();
-  }
-
-  fillCharacteristics() {
-    const part = this.choices.parts.find(({ name }) => name === selectOf("trend-part").value);
-    fill("trend-characteristic", part?.characteristics ?? []);
-  }
-
-  /** @param {typeof CHOSEN[number]} name */
-  choose(name) {
-    if (name === "part") this.fillCharacteristics();
-    this.look();
   }
 
   /** @returns {Record<string, string>} */
@@ -98,6 +86,8 @@ export class TrendsView {
   /** @param {TrendShown} trend */
   show(trend) {
     this.trend = trend;
+    fill("trend-characteristic", trend.characteristics);
+    selectOf("trend-characteristic").value = trend.characteristic;
     const runs = trend.rows.map((row) => trend.runs[row]), isSingle = trend.subgroup === 1;
     [trend.location, trend.spread].forEach((chart, k) => {
       const isLocation = k === 0;

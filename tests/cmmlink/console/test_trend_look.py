@@ -23,8 +23,9 @@ def look(tmp_path_factory: pytest.TempPathFactory) -> TrendLook:
 
 def test_parts_stations_and_characteristics_are_offered(look: TrendLook) -> None:
     choices = look.choices()
-    assert [(part.name, part.characteristics) for part in choices.parts] == [("blade", ("contour", "chord"))]
-    assert choices.stations == ("hall-1", "hall-2")
+    assert (choices.parts, choices.stations) == (("blade",), ("hall-1", "hall-2"))
+    first = look.trend(AskedTrend.of({**ASKED, "characteristic": ""}))
+    assert (first.characteristic, first.characteristics) == ("contour", ("contour", "chord"))
 
 
 def test_a_trend_is_told_with_its_heat_strip(look: TrendLook) -> None:
