@@ -18,9 +18,10 @@ if TYPE_CHECKING:
     from cmmlink.report.picture import ProfilePictures
     from cmmlink.report.picture_content import content_of
     from cmmlink.report.picture_processes import Pictures
-    from cmmlink.report.recorded_report import input_of_replay, input_on_record, zone_in
+    from cmmlink.report.recorded_report import input_of_replay, input_on_record
+    from cmmlink.report.recorded_surface_report import picture_on_record, surface_on_record
     from cmmlink.report.recorded_stack import stack_on_record
-    from cmmlink.report.report_input import ReportInput, places_in, regions_in, with_settings
+    from cmmlink.report.report_input import ReportInput, input_of_surface, places_in, regions_in, with_settings, zone_in
     from cmmlink.report.section_pictures import SectionPictures
     from cmmlink.report.speech import Speech
     from cmmlink.report.stack_folder import write_stack
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from cmmlink.report.study_pdf import write_study
     from cmmlink.report.study_text import study_document, study_lines
     from cmmlink.report.surface_folder import write_surface
+    from cmmlink.report.surface_pdf import write_surface_report
     from cmmlink.report.surface_terminal import print_surface_summary
     from cmmlink.report.terminal import STYLE_OF, STYLES, print_characteristics, print_summary
     from cmmlink.report.trend_picture import write_trend_picture
@@ -47,7 +49,8 @@ else:
         "cmmlink.report.nominal_picture": ("write_nominal_picture",),
         "cmmlink.report.nominal_text": ("text_picture",),
         "cmmlink.report.pdf": ("write_report",),
-        "cmmlink.report.recorded_report": ("input_of_replay", "input_on_record", "zone_in"),
+        "cmmlink.report.recorded_report": ("input_of_replay", "input_on_record"),
+        "cmmlink.report.recorded_surface_report": ("picture_on_record", "surface_on_record"),
         "cmmlink.report.recorded_stack": ("stack_on_record",),
         "cmmlink.report.report_input": ("ReportInput", "places_in", "regions_in", "with_settings"),
         "cmmlink.report.section_pictures": ("SectionPictures",),

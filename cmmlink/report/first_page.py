@@ -43,7 +43,7 @@ def identity_block(report: ReportInput, say: Speech, width: float) -> Table:
     left = [
         (say("Part"), document.get("part")),
         (say("Serial number"), document.get("serial_number")),
-        (say("Nominal"), report.plan.nominal.file.name),
+        (say("Nominal"), report.nominal_name),
         (say("Device"), document.get("device")),
     ]
     run = document.get("run") or document.get("replay_of")

@@ -190,7 +190,7 @@ def _conditions(report: ReportInput, say: Speech) -> Iterator[tuple[str, str]]:
     yield say("Software"), ", ".join(f"{name} {version}" for name, version in sorted((document.get("software") or {}).items()) if version)
     for name, key in (("Record (SHA-256)", "chain_sha256"), ("Plan (SHA-256)", "plan_sha256"), ("Nominal (SHA-256)", "nominal_sha256")):
         yield say(name), document.get(key) or ""
-    yield from _signature_words(document, say)
+    yield from signature_words(document, say)
     if say.language != "en":
         yield say("Language"), say("Sentences of the inspection that are not translated stand as the record has them.")
 
@@ -204,7 +204,7 @@ def qualification_words(document: Mapping[str, Any], say: Speech) -> str:
     return say("{words}; certificate {sha256}", words=words, sha256=named["certificate_sha256"])
 
 
-def _signature_words(document: Mapping[str, Any], say: Speech) -> Iterator[tuple[str, str]]:
+def signature_words(document: Mapping[str, Any], say: Speech) -> Iterator[tuple[str, str]]:
     """Who signed the record, and which places outside were told of it."""
     if not document.get("chain_sha256") or "signature" not in document:  # not recorded, or judged again
         return

@@ -2,16 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, get_args
+from typing import Any
 
 from cmmlink.events import RunStarted
 from cmmlink.exports import document_on_record, judged_rows, sound_run
 from cmmlink.record import RecordedRun, Replay, Store, end_missing, recorded_plan, recorded_profile, software
 from cmmlink.report.judged_scan import scan_on_record
 from cmmlink.report.picture_content import content_of
-from cmmlink.report.report_input import ReportInput, places_in, regions_in
+from cmmlink.report.report_input import ReportInput, places_in, regions_in, zone_in
 from cmmlink.result_json import identity_json
-from inspection import DecisionRule, ToleranceZone
 
 
 def input_on_record(store: Store, run: str) -> ReportInput:
@@ -30,13 +29,6 @@ def input_on_record(store: Store, run: str) -> ReportInput:
     scan = scan_on_record(document, zone_in(document["tolerance"]), lambda: judged_rows(store, run))
     regions, places = regions_in(document), places_in(document)
     return replace(report, content=content_of(scan, profile, report.title, end["state"], regions=regions, places_mm=places))
-
-
-def zone_in(tolerance: Mapping[str, Any]) -> ToleranceZone:
-    """The zone of a result, whose decision rule JSON holds in words."""
-    limits = tolerance["lower_mm"], tolerance["upper_mm"], tolerance["uncertainty_mm"]
-    zones = [ToleranceZone(*limits, rule, provable=False) for rule in get_args(DecisionRule)]
-    return next((zone for zone in zones if zone.decision_rule == tolerance["decision_rule"]), zones[0])
 
 
 def input_of_replay(again: Replay, document: Mapping[str, Any], recorded: RecordedRun) -> ReportInput:

@@ -2,15 +2,16 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
-from cmmlink.plan import CtPlan, Plan, ReportSettings
+from cmmlink.plan import CtPlan, Plan, ReportSettings, SurfacePlan
 from cmmlink.report.picture_content import NamedRegion, PictureContent
 from cmmlink.words import Headline, headline_of
-from inspection import Verdict
+from inspection import DecisionRule, ToleranceZone, Verdict
 
 if TYPE_CHECKING:  # a process that only draws loads nothing of what judges
     from cmmlink.run import FinishedRun
+    from cmmlink.surface_run import FinishedSurface
 
 _VERDICTS = {verdict.word: verdict for verdict in Verdict}
 
@@ -25,7 +26,7 @@ class ReportInput:
     """
 
     document: Mapping[str, Any]
-    plan: Plan | CtPlan
+    plan: Plan | CtPlan | SurfacePlan
     message: str = ""
     content: PictureContent | None = None
 
@@ -42,6 +43,12 @@ class ReportInput:
         return headline_of(verdict if document["rule"] is not None else None, ending, document["coverage"])
 
     @property
+    def nominal_name(self) -> str:
+        """The name of the nominal's file."""
+        plan = self.plan
+        return (plan.surface if isinstance(plan, SurfacePlan) else plan.nominal).file.name
+
+    @property
     def title(self) -> str:
         """The part and its serial number."""
         return " ".join(filter(None, [self.document.get("part"), self.document.get("serial_number")]))
@@ -49,6 +56,12 @@ class ReportInput:
 
 def input_of(run: "FinishedRun") -> ReportInput:
     """What the report of a run that has just ended is made of, without what its drawings show."""
+    outcome = run.outcome
+    return ReportInput(run.result_json(), run.plan, str(outcome.failure or outcome.refusal or ""))
+
+
+def input_of_surface(run: "FinishedSurface") -> ReportInput:
+    """What the report of a run of a whole surface that has just ended is made of."""
     outcome = run.outcome
     return ReportInput(run.result_json(), run.plan, str(outcome.failure or outcome.refusal or ""))
 
@@ -68,3 +81,10 @@ def regions_in(document: Mapping[str, Any]) -> tuple[NamedRegion, ...]:
     """The named regions of the characteristics of a result."""
     found = [(one["name"], one["region"]) for one in document.get("characteristics", ()) if one["region"] is not None]
     return tuple(NamedRegion(name, region["from_mm"], region["to_mm"]) for name, region in found)
+
+
+def zone_in(tolerance: Mapping[str, Any]) -> ToleranceZone:
+    """The zone of a result, whose decision rule JSON holds in words."""
+    limits = tolerance["lower_mm"], tolerance["upper_mm"], tolerance["uncertainty_mm"]
+    zones = [ToleranceZone(*limits, rule, provable=False) for rule in get_args(DecisionRule)]
+    return next((zone for zone in zones if zone.decision_rule == tolerance["decision_rule"]), zones[0])
