@@ -223,7 +223,7 @@ def _past_runs(folder: Path | None) -> "PastRuns":
 
 def _write_for(out: Path | None = None) -> "Callable[[FinishedRun | FinishedSurface], None]":
     """Return the function that writes the results of each run: into `out`, or else into the folder that its plan names."""
-    from cmmlink.report import write_run, write_surface
+    from cmmlink.report import write_run, write_surface_run
     from cmmlink.run import FinishedRun
 
     def write(run: "FinishedRun | FinishedSurface") -> None:
@@ -233,7 +233,7 @@ def _write_for(out: Path | None = None) -> "Callable[[FinishedRun | FinishedSurf
         if isinstance(run, FinishedRun):
             write_run(run.folder_of(folder), run)
         else:
-            write_surface(run.folder_of(folder), run.result_json(), run.outcome.result)
+            write_surface_run(run.folder_of(folder), run)
 
     return write
 

@@ -213,15 +213,17 @@ def replay(
 
 
 def _write_replay(out: Path, again: "Replay | SurfaceReplay", document: dict[str, Any], recorded: "RecordedRun") -> None:
+    from cmmlink.from_surface_plan import held_against
     from cmmlink.record import Replay
     from cmmlink.report import input_of_replay, write_results, write_surface
 
+    report = input_of_replay(again, document, recorded)
     with progress(f"writing results to {out}"):
         if isinstance(again, Replay):
-            title, report = f"{recorded.header['part']}, run {recorded.run} replayed", input_of_replay(again, document, recorded)
+            title = f"{recorded.header['part']}, run {recorded.run} replayed"
             write_results(out, document, again.outcome.result, again.profile, title, report=report)
         else:
-            write_surface(out, document, again.outcome.result)
+            write_surface(out, report, again.outcome.result, held_against(again.plan, again.file))
 
 
 def _run_or_evidence(opened: ExitStack, name: str, folder: Path) -> tuple["Store", str, "Evidence | None"]:

@@ -85,9 +85,14 @@ def _names_a_stack(store: "Store", name: str) -> bool:
 
 
 def _write_run(store: "Store", run: str, look: Mapping[str, Any], file: Path) -> None:
-    from cmmlink.report import input_on_record, with_settings, write_report
+    from cmmlink.record import recorded_run
+    from cmmlink.report import input_on_record, picture_on_record, surface_on_record, with_settings, write_report, write_surface_report
 
-    write_report(with_settings(input_on_record(store, run), look), file)
+    if recorded_run(store, run).is_of_surface:
+        report = with_settings(surface_on_record(store, run), look)
+        write_surface_report(report, picture_on_record(store, run, report), file)
+    else:
+        write_report(with_settings(input_on_record(store, run), look), file)
 
 
 def _write_stack(store: "Store", runs: list[str], look: Mapping[str, Any], file: Path) -> None:

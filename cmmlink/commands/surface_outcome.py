@@ -60,7 +60,7 @@ def report_surface(run: "FinishedSurface", out: Path | None, *, as_json: bool) -
 
     Raises NotMeasured where the set-up contradicts the points, and why there is no result where a file of points gave none.
     """
-    from cmmlink.report import print_surface_summary, write_surface
+    from cmmlink.report import print_surface_summary, write_surface_run
 
     outcome, evidence, refusal = run.outcome, run.evidence, run.refusal
     if isinstance(refusal, NotMeasured) and outcome.failure is None and outcome.ending == "complete":
@@ -77,7 +77,7 @@ def report_surface(run: "FinishedSurface", out: Path | None, *, as_json: bool) -
     try:
         if folder is not None:
             with progress(f"writing results to {folder}"):
-                written = write_surface(folder, document, outcome.result)
+                written = write_surface_run(folder, run)
     finally:
         if as_json:
             print_json(document)

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from cmmlink.report.picture_content import content_of
     from cmmlink.report.picture_processes import Pictures
     from cmmlink.report.recorded_report import input_of_replay, input_on_record
-    from cmmlink.report.recorded_surface_report import picture_on_record, surface_on_record
     from cmmlink.report.recorded_stack import stack_on_record
+    from cmmlink.report.recorded_surface_report import picture_on_record, surface_on_record
     from cmmlink.report.report_input import ReportInput, input_of_surface, places_in, regions_in, with_settings, zone_in
     from cmmlink.report.section_pictures import SectionPictures
     from cmmlink.report.speech import Speech
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from cmmlink.report.stack_pdf import write_stack_report
     from cmmlink.report.study_pdf import write_study
     from cmmlink.report.study_text import study_document, study_lines
-    from cmmlink.report.surface_folder import write_surface
+    from cmmlink.report.surface_folder import write_surface, write_surface_run
     from cmmlink.report.surface_pdf import write_surface_report
     from cmmlink.report.surface_terminal import print_surface_summary
     from cmmlink.report.terminal import STYLE_OF, STYLES, print_characteristics, print_summary
@@ -52,14 +52,15 @@ else:
         "cmmlink.report.recorded_report": ("input_of_replay", "input_on_record"),
         "cmmlink.report.recorded_surface_report": ("picture_on_record", "surface_on_record"),
         "cmmlink.report.recorded_stack": ("stack_on_record",),
-        "cmmlink.report.report_input": ("ReportInput", "places_in", "regions_in", "with_settings"),
+        "cmmlink.report.report_input": ("ReportInput", "input_of_surface", "places_in", "regions_in", "with_settings", "zone_in"),
         "cmmlink.report.section_pictures": ("SectionPictures",),
         "cmmlink.report.stack_folder": ("write_stack",),
         "cmmlink.report.stack_pdf": ("write_stack_report",),
         "cmmlink.report.speech": ("Speech",),
         "cmmlink.report.study_pdf": ("write_study",),
         "cmmlink.report.study_text": ("study_document", "study_lines"),
-        "cmmlink.report.surface_folder": ("write_surface",),
+        "cmmlink.report.surface_folder": ("write_surface", "write_surface_run"),
+        "cmmlink.report.surface_pdf": ("write_surface_report",),
         "cmmlink.report.surface_terminal": ("print_surface_summary",),
         "cmmlink.report.terminal": ("STYLE_OF", "STYLES", "print_characteristics", "print_summary"),
         "cmmlink.report.trend_picture": ("write_trend_picture",),
@@ -80,7 +81,9 @@ __all__ = [
     "Speech",
     "content_of",
     "input_of_replay",
+    "input_of_surface",
     "input_on_record",
+    "picture_on_record",
     "places_in",
     "prepare",
     "print_characteristics",
@@ -92,6 +95,7 @@ __all__ = [
     "stack_on_record",
     "study_document",
     "study_lines",
+    "surface_on_record",
     "text_picture",
     "with_settings",
     "write_certificate",
@@ -105,6 +109,8 @@ __all__ = [
     "write_stack_report",
     "write_study",
     "write_surface",
+    "write_surface_report",
+    "write_surface_run",
     "write_trend_picture",
     "zone_in",
 ]

@@ -6,7 +6,7 @@ from typing import Any
 
 from cmmlink.events import RunStarted
 from cmmlink.exports import document_on_record, judged_rows, sound_run
-from cmmlink.record import RecordedRun, Replay, Store, end_missing, recorded_plan, recorded_profile, software
+from cmmlink.record import RecordedRun, Replay, Store, SurfaceReplay, end_missing, recorded_plan, recorded_profile, software
 from cmmlink.report.judged_scan import scan_on_record
 from cmmlink.report.picture_content import content_of
 from cmmlink.report.report_input import ReportInput, places_in, regions_in, zone_in
@@ -31,7 +31,7 @@ def input_on_record(store: Store, run: str) -> ReportInput:
     return replace(report, content=content_of(scan, profile, report.title, end["state"], regions=regions, places_mm=places))
 
 
-def input_of_replay(again: Replay, document: Mapping[str, Any], recorded: RecordedRun) -> ReportInput:
+def input_of_replay(again: Replay | SurfaceReplay, document: Mapping[str, Any], recorded: RecordedRun) -> ReportInput:
     """What the report of a run that was judged again is made of, without its drawings; `document` is what is printed of it."""
     known = {**identity_json(RunStarted.from_header(recorded.header)), "software": software(), **document}
     return ReportInput(known, again.plan, str(again.outcome.failure or again.outcome.refusal or ""))

@@ -18,8 +18,7 @@ from cmmlink.plan import CtPlan, read_model
 from cmmlink.record import Nominals, RecordedRun, Store, end_missing, recorded_plan, recorded_run, replay_run, unpack_judged
 from cmmlink.report.judged_scan import JudgedScan, scan_on_record
 from cmmlink.report.picture_content import PictureContent, content_of
-from cmmlink.report.report_input import zone_in
-from cmmlink.report.report_input import places_in, regions_in
+from cmmlink.report.report_input import places_in, regions_in, zone_in
 from cmmlink.report.stack_input import MAP_COLUMNS, MapRow, SectionSheet, StackInput, map_row, runs_words
 from cmmlink.result_json import result_json
 from cmmlink.stack_characteristics import JudgedSection, StackQuestions, stack_characteristic_json

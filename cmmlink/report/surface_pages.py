@@ -62,12 +62,17 @@ def _facts_of_result(document: Mapping[str, Any], say: Speech) -> Iterator[tuple
     if worst is not None:
         place = _place([worst[key] for key in ("x_mm", "y_mm", "z_mm")], say)
         told = say("{deviation} mm at {place} mm", deviation=n(worst["deviation_mm"], "+.4f"), place=place)
-        out = say("{count} points out of tolerance, in {regions} regions", count=document["out_of_tolerance"], regions=len(document["regions"]))
+        out = say(
+            "{count} points out of tolerance, in {regions} regions", count=document["out_of_tolerance"], regions=len(document["regions"])
+        )
         yield say("Worst point"), f"{told}; {out}"
     error, rms = n(document["profile_error_mm"]), n(document["rms_mm"])
     yield say("Surface error"), say("{error} mm (2 x the largest |deviation|); rms {rms} mm", error=error, rms=rms)
     yield say("Decision rule and U"), say.sentence(document["tolerance"]["decision_rule"])
-    yield say("Error of the nominal"), say("{error} mm, added to U", error=n(nominal["error_mm"], ".2g")) if nominal["error_mm"] else say("none")
+    yield (
+        say("Error of the nominal"),
+        say("{error} mm, added to U", error=n(nominal["error_mm"], ".2g")) if nominal["error_mm"] else say("none"),
+    )
     yield say("Fit"), say("{fit}, rule {rule}", fit=say.sentence(document["fit"]), rule=say.sentence(document["rule"]))
     yield say("Weakest direction"), weakest_words(document["registration"], say)
     yield (
@@ -105,7 +110,13 @@ def _regions(document: Mapping[str, Any], say: Speech, width: float) -> list[Flo
     rows = []
     for number, one in enumerate(regions[:_MOST_LISTED], start=1):
         out = max(zone["lower_mm"] - one["worst_mm"], one["worst_mm"] - zone["upper_mm"])
-        told = [say.number(one["worst_mm"], "+.4f"), say.number(out), say.number(one["area_mm2"], ".3f"), str(one["points"]), str(one["face"])]
+        told = [
+            say.number(one["worst_mm"], "+.4f"),
+            say.number(out),
+            say.number(one["area_mm2"], ".3f"),
+            str(one["points"]),
+            str(one["face"]),
+        ]
         rows.append([text(number), *(text(value, NUMBER) for value in told), text(_place(one["worst_at_mm"], say))])
     table = grid([headed([say(name) for name in names], range(1, 6)), *rows], [30, 68, 68, 68, 55, 40, width - 329])
     title = text(say("Regions out of tolerance, the worst first"), TITLE)

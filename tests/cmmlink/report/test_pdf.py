@@ -12,7 +12,7 @@ from pypdf import PdfReader
 
 from cmmlink.errors import PlanError
 from cmmlink.events import Counts
-from cmmlink.plan import ReportSettings
+from cmmlink.plan import Plan, ReportSettings
 from cmmlink.report.further_pages import out_by
 from cmmlink.report.judged_scan import scan_of
 from cmmlink.report.pdf import write_report
@@ -121,6 +121,7 @@ def test_the_same_run_gives_the_same_bytes_without_clock_or_path_and_with_its_fo
     streams = [stream for page in reader.pages if (stream := page.get_contents()) is not None]
     everything = written + b"".join(stream.get_data() for stream in streams)
     assert str(tmp_path).encode() not in everything
+    assert isinstance(bad.plan, Plan)
     assert str(bad.plan.nominal.file.parent).encode() not in everything
     assert not re.search(rb"/BaseFont /(?!\w{6}\+DejaVuSans|Helvetica)", written)
     assert written.count(b"/FontFile2") >= 2  # the plain and the bold one
