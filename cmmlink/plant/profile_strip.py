@@ -16,7 +16,7 @@ class ProfileStrip:
     length_mm : of the nominal
     lower_mm, upper_mm : the zone of the run; None where there is no such limit
     mean_mm   : (120,) float32, mean deviation of the points of each part; NaN where none was judged
-    worst_mm  : (120,) float32, the deviation that is largest without its sign; NaN where none was judged
+    worst_mm  : (120,) float32, the deviation farthest from the middle of the zone, or from zero where a limit is missing; NaN likewise
     """
 
     length_mm: float
@@ -47,5 +47,6 @@ def strip_of(
         np.minimum.at(lowest, part, deviation_mm[known])
     seen = count > 0
     mean = np.divide(total, count, out=np.full(STRIP_PARTS, np.nan), where=seen)
-    worst = np.where(seen, np.where(highest >= -lowest, highest, lowest), np.nan)
+    middle = 0.0 if lower_mm is None or upper_mm is None else (lower_mm + upper_mm) / 2  # what is out is farther from it than what is not
+    worst = np.where(seen, np.where(highest - middle >= middle - lowest, highest, lowest), np.nan)
     return ProfileStrip(length_mm, lower_mm, upper_mm, mean.astype(np.float32), worst.astype(np.float32))

@@ -175,5 +175,7 @@ def test_a_strip_holds_the_mean_and_the_worst_of_each_even_part_in_any_order() -
     np.testing.assert_allclose(strip.mean_mm[[0, 59, 119]], [0.0, 0.5, 0.0], atol=1e-7)
     np.testing.assert_allclose(strip.worst_mm[[0, 59, 119]], [-0.3, 0.5, 0.25], rtol=1e-6)
     assert np.isnan(strip.mean_mm).sum() == np.isnan(strip.worst_mm).sum() == 117
+    one_sided = strip_of([(station, deviation)], 120.0, -0.1, 0.7)  # around 0.3: -0.3 lies out of it, and stays the worst
+    np.testing.assert_allclose(one_sided.worst_mm[[0, 119]], [-0.3, -0.25], rtol=1e-6)
     cut = strip_of([(station[::-1][:3], deviation[::-1][:3]), (station[::-1][3:], deviation[::-1][3:])], 120.0, -1.0, 1.0)
     np.testing.assert_array_equal(cut.worst_mm, strip.worst_mm)
