@@ -7,8 +7,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cmmlink.commands.options import Invalid, Json, NoRecord, Out, Records, RejectOutliers, Uncertainty, Unit, columns_from, records_folder
-from cmmlink.commands.output import now, stop_on_ctrl_c
+from cmmlink.commands.options import (
+    Invalid,
+    Json,
+    NoRecord,
+    Out,
+    Records,
+    RejectOutliers,
+    Uncertainty,
+    Unit,
+    columns_from,
+    records_folder,
+    section_in,
+)
+from cmmlink.commands.output import Output, now, report_outcome, stop_on_ctrl_c
 from cmmlink.commands.progress import progress
 from cmmlink.commands.surface_outcome import report_surface
 from cmmlink.errors import PlanError
@@ -98,6 +110,16 @@ def surface(
         ),
     ] = None,
     reject_outliers: RejectOutliers = False,
+    section: Annotated[
+        tuple[float, float, float, float, float, float] | None,
+        typer.Option(
+            "--section", metavar="X Y Z I J K", help="Inspect the section through a place of the nominal with a normal, as `inspect` does."
+        ),
+    ] = None,
+    slab: Annotated[
+        float | None,
+        typer.Option(min=0, metavar="MM", help="How far from the section points are taken.", show_default="1/200 of the nominal's size"),
+    ] = None,
     out: Out = None,
     records: Records = None,
     no_record: NoRecord = False,
@@ -131,6 +153,10 @@ def surface(
         "out": None,
     }
     plan = plan_given_by(SurfacePlan, settings, _OPTION_OF)
+    if section is not None:
+        return _inspect_section(plan, section, slab, out, None if no_record else records_folder(records), as_json=as_json)
+    if slab is not None:
+        raise PlanError("--slab is for a section; expected --section beside it")
     finished = _inspect(plan, out, None if no_record else records_folder(records))
     return report_surface(finished, out, as_json=as_json)
 
@@ -148,6 +174,25 @@ def _inspect(plan: "SurfacePlan", out: Path | None, records: Path | None) -> "Fi
     with progress(f"inspecting {plan.part.name}"), stop_on_ctrl_c() as stop, connect(plan, scratch_in(records)) as source:
         prepare(out)
         return carry_out_surface(plan, file, source, records=records, clock=time.monotonic, now=now, stop=stop)
+
+
+def _inspect_section(
+    plan: "SurfacePlan", numbers: tuple[float, ...], slab_mm: float | None, out: Path | None, records: Path | None, *, as_json: bool
+) -> int:
+    """Inspect a plane section of a scan against that of its nominal, and report it as `inspect` does."""
+    from cmmlink.from_plan import profile_of
+    from cmmlink.plan import Section
+    from cmmlink.report import prepare
+    from cmmlink.run import carry_out
+    from cmmlink.surface_section import section_of_scan
+
+    plane = Section.model_validate(section_in("xy", numbers))
+    with stop_on_ctrl_c() as stop:
+        with progress(f"inspecting {plan.part.name}"), section_of_scan(plan, plane, slab_mm) as cut:
+            prepare(out)
+            profile = profile_of(cut.plan)
+            finished = carry_out(cut.plan, profile, cut.device, records=records, clock=time.monotonic, now=now, stop=stop)
+        return report_outcome(finished, Output(headless=True, as_json=as_json, out=out))
 
 
 def _pose_in(path: Path) -> dict[str, Any]:

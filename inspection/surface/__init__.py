@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from inspection.surface.live_surface import LiveSurface, SurfaceUpdate
     from inspection.surface.patches import PatchSurface
     from inspection.surface.rigid_motion import RigidMotion
+    from inspection.surface.section_course import SectionCourse, course_of_section, into_plane
     from inspection.surface.spline_face import SplineFace
     from inspection.surface.surface_fit import SurfaceFreedom, SurfaceRegistration, register_surface
     from inspection.surface.surface_result import Defect, SurfaceResult, Unmeasured
@@ -34,6 +35,7 @@ else:
         "inspection.surface.surface_result": ("Defect", "SurfaceResult", "Unmeasured"),
         "inspection.surface.surface_terms": ("SurfaceTerms",),
         "inspection.surface.rigid_motion": ("RigidMotion",),
+        "inspection.surface.section_course": ("SectionCourse", "course_of_section", "into_plane"),
         "inspection.surface.spline_face": ("SplineFace",),
         "inspection.surface.triangles": ("TriangleSurface",),
         "inspection.surface.trimmed_surface": ("TrimmedFace", "TrimmedSurface"),
@@ -52,6 +54,7 @@ __all__ = [
     "NominalSurface",
     "PatchSurface",
     "RigidMotion",
+    "SectionCourse",
     "SplineFace",
     "SurfaceFeet",
     "SurfaceFreedom",
@@ -64,6 +67,8 @@ __all__ = [
     "TrimmedSurface",
     "Unmeasured",
     "Weakness",
+    "course_of_section",
+    "into_plane",
     "judge_surface",
     "register_surface",
     "rejections",

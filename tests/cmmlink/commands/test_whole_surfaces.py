@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cmmlink.result_keys import Recorded
 from cmmlink.surface_csv import SURFACE_COLUMNS
 from cmmlink.surface_keys import SurfaceMeasured, SurfaceRecorded, SurfaceReplayed
 from tests.cmmlink.command import Ended, cmmlink
@@ -190,3 +191,21 @@ def test_a_mistake_in_a_plan_is_told_with_its_line(files: Path, line: str, told:
     wrong.write_text("\n".join([lines[0], line, *lines[1:]]) + "\n", encoding="utf-8")
     assert told in cmmlink("check", wrong).refused()
     assert told in cmmlink("run", wrong, "--headless").refused()
+
+
+def test_a_section_of_a_scan_is_judged_and_recorded_like_any_section(files: Path, tmp_path: Path) -> None:
+    cut = ("--section", 0, 0, 1, 0, 0, 1, "--slab", 1, "--json", "--records", tmp_path)
+    good = surface(files, "good.csv", *cut)
+    found = good.json()
+    Recorded.model_validate(found)
+    assert (good.code, found["verdict"], found["rule"]) == (0, "conform", "minimum-zone"), found["reasons"]
+    assert abs(found["max_deviation_mm"]) < 1e-3
+    assert any("moved along the surface" in note for note in found["notes"])
+    centres, _ = egg_scan(out_mm=0.5)
+    write_scan(tmp_path / "centres.csv", centres)
+    write_egg(tmp_path / "egg.stl")
+    of_ball = surface(tmp_path, "centres.csv", "--tip-radius", 0.5, *cut[:-2], "--no-record")
+    assert of_ball.code == 0, of_ball.out
+    missed = surface(files, "good.csv", "--section", 0, 0, 90, 0, 0, 1, "--no-record")
+    assert "too few for one" in missed.refused()
+    assert "expected --section beside it" in surface(files, "good.csv", "--slab", 1, "--no-record").refused()
