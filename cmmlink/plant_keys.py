@@ -19,6 +19,7 @@ class PlantOutbox(JsonObject):
     added: int = Field(description="the runs that were added to the database")
     waiting: int = Field(description="the runs that wait to be pushed")
     since: str | None = Field(description="since when the oldest waits, at most since the first attempt; null where nothing does")
+    late: bool = Field(description="whether it has waited for more than a day, at which the console raises an alarm")
     problem: str | None = Field(description="why they wait; null where the last attempt did not fail")
     away: bool = Field(description="whether the database could not be reached, so that a later attempt may succeed by itself")
     pushed: str | None = Field(description="when runs were pushed last, in UTC; null: never")

@@ -76,6 +76,7 @@ def serve_console(
     setup = StationSetup(
         scans, open_device, serial_ports, past, time.monotonic, now, surfaces, inspect, _write_for(), folder, plan_file(), trends
     )
+    setup = replace(setup, push_from=_push_from(past.folder))
     if key is not None and certificate is None:
         raise PlanError("--key belongs to a certificate; give that with --certificate")
     access = Access(host, port, certificate, key, unencrypted)
@@ -143,6 +144,7 @@ def run_on_page(
     setup = StationSetup(
         lambda: {plan_file.name: plan_file}, connect, serial_ports, past, time.monotonic, now, write=write, trends=_trends_of(past.folder)
     )
+    setup = replace(setup, push_from=_push_from(past.folder))
     with stop_on_ctrl_c() as stop, serve(setup, __version__) as server:
         station = server.station
         _show(server, output.no_browser)
@@ -212,6 +214,15 @@ def _section(plan: "CtPlan", outcome: "SectionOutcome", plan_name: str) -> "Sect
     context = RunContext(title, plan_name, outcome.profile, zone, coverage_min, CAPACITY_POINTS, now(), "section")
     ended = Ended(run.ending, str(run.refusal or ""), outcome.result_json(), run.result.blocks if run.result is not None else None)
     return Section(height_mm, context, outcome.started, ended, outcome.warnings)
+
+
+def _push_from(records: Path) -> Path | None:
+    """The folder whose results are pushed; None where the extra for that is missing and nobody has asked for it."""
+    from importlib.util import find_spec
+
+    from cmmlink.plant_push import SETTINGS_FILE
+
+    return records if find_spec("sqlalchemy") or (records / SETTINGS_FILE).exists() else None
 
 
 def _past_runs(folder: Path | None) -> "PastRuns":

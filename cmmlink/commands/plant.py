@@ -149,6 +149,7 @@ def outbox_json(outbox: "Outbox") -> dict[str, Any]:
         "added": outbox.added,
         "waiting": outbox.waiting,
         "since": since,
+        "late": outbox.late,
         "problem": outbox.problem or None,
         "away": outbox.away,
         "pushed": outbox.pushed or None,

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from cmmlink.console.listening import Access
+from cmmlink.console.results_push import pushing
 from cmmlink.console.station import Station
 from cmmlink.console.station_setup import StationSetup
 from cmmlink.errors import PlanError
@@ -30,7 +31,8 @@ def serve(setup: StationSetup, version: str, access: Access | None = None) -> It
         raise PlanError(f"the console cannot be served at {place} ({error.strerror}); choose another with --host and --port") from None
     server.start()
     try:
-        yield server
+        with pushing(setup.push_from, station.pushed):
+            yield server
     finally:
         if station.job is not None:
             station.job.abort()

@@ -9,10 +9,10 @@ from pathlib import Path
 
 from cmmlink.errors import RunError
 
-_CHILD = (
+CHILD = (
     "import os, sys; sys.path.append(sys.argv.pop(1)); getattr(os, 'nice', int)(10); from cmmlink.__main__ import main; sys.exit(main())"
 )
-_BELOW_NORMAL = getattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0)  # Windows has no `nice`
+BELOW_NORMAL = getattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0)  # Windows has no `nice`
 _LONGEST_S = 300.0  # a report of a million points takes a few seconds
 
 
@@ -38,10 +38,10 @@ def make_trend(records: Path, part: str, file: Path, options: Sequence[str]) -> 
 
 def _make(command: list[str], records: Path, file: Path, options: list[str]) -> None:
     words = [*command, "--records", str(records), "--out", str(file), "--json", *options]
-    child = [sys.executable, "-P", "-c", _CHILD, str(Path(__file__).resolve().parents[2]), *words]
+    child = [sys.executable, "-P", "-c", CHILD, str(Path(__file__).resolve().parents[2]), *words]
     try:
         ended = subprocess.run(
-            child, stdin=subprocess.DEVNULL, capture_output=True, timeout=_LONGEST_S, creationflags=_BELOW_NORMAL, check=False
+            child, stdin=subprocess.DEVNULL, capture_output=True, timeout=_LONGEST_S, creationflags=BELOW_NORMAL, check=False
         )
     except subprocess.TimeoutExpired:
         raise RunError(f"it was not made within {_LONGEST_S:g} s") from None

@@ -131,6 +131,17 @@ class StationState:
 
 
 @dataclass(frozen=True, slots=True)
+class ResultsState:
+    """Where the results of runs are pushed to, and how many runs wait since when, and why; empty address: nowhere."""
+
+    address: str
+    waiting: int
+    since: str
+    problem: str
+    type: Literal["results"] = "results"
+
+
+@dataclass(frozen=True, slots=True)
 class AlarmRow:
     """One thing that went wrong: how often, since when, whether it still is so, whether somebody has seen it.
 
@@ -358,6 +369,7 @@ Message = (
     | Answer
     | Control
     | StationState
+    | ResultsState
     | AlarmList
     | ShownRun
     | CharacteristicList

@@ -350,6 +350,7 @@ class ConsoleServer:
         station, view = self.station, page.opened or self.station.view
         yield Control(self._controller is page, self._controller is not None, len(self._pages))
         yield station.state
+        yield station.pushed.state
         yield station.alarms.shown
         state, shown = (view.state(), view.characteristics) if view else (None, Characteristics())
         yield ShownRun(_for_page(state) if state else None, page.opened is not None)

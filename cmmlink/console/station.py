@@ -22,6 +22,7 @@ from cmmlink.console.protocol import DeviceTest, FoundRuns, History, StationStat
 from cmmlink.console.refused import Refused, answer_errors
 from cmmlink.console.register_look import RegisterLook
 from cmmlink.console.register_words import KeepMap, LookAtRegisters, MapSaved
+from cmmlink.console.results_push import PushedResults
 from cmmlink.console.run_job import measure, raise_alarms, sink_of
 from cmmlink.console.station_setup import Records, StationSetup
 from cmmlink.devices import words_of
@@ -47,6 +48,7 @@ class Station:
     def __init__(self, setup: StationSetup) -> None:
         self._setup = setup
         self.alarms = Alarms(setup.now)
+        self.pushed = PushedResults(self.alarms)
         self.ct, self.trends = CtImport(setup.clock), setup.trends
         self.registers = RegisterLook(setup.clock)
         self._lock = threading.RLock()

@@ -63,6 +63,7 @@ class StationSetup:
     write   : writes the results of a run where its plan wants them
     folder  : of the plans, where new ones are saved; None where the page makes none
     trends  : looks into the results of the plant; None where the station has no results database
+    push_from : the folder of the records whose results are pushed to the plant's database; None: they are not
     demo    : the plan of the demonstration, whose simulated device `connect` opens as well; None where there is none
     """
 
@@ -77,4 +78,5 @@ class StationSetup:
     write: Callable[[FinishedRun | FinishedSurface], None] = lambda _: None
     folder: Path | None = None
     demo: Path | None = None
+    push_from: Path | None = None
     trends: TrendLook | None = None

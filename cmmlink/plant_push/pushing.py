@@ -18,6 +18,7 @@ from cmmlink.words import utc_words
 from inspection import InspectionError
 
 _MOST_NOMINALS = 4
+_LATE_S = 86_400.0
 _CANNOT_BE_READ = (StoreError, PlanError, RunError, InspectionError, KeyError)
 
 
@@ -28,6 +29,7 @@ class Outbox:
     address : where to, in words
     added   : runs that this attempt added to the database
     waiting, since_s : runs that wait, and since when, in seconds since 1970
+    late    : they have waited for more than a day
     problem : why they wait; empty where nothing keeps them
     away    : whether another attempt may succeed by itself
     pushed  : when something was pushed last, in UTC; empty: never
@@ -38,6 +40,7 @@ class Outbox:
     added: int
     waiting: int
     since_s: float | None
+    late: bool
     problem: str
     away: bool
     pushed: str
@@ -56,12 +59,12 @@ def push(folder: Path, now: Callable[[], datetime], *, again: bool = False, tell
     address = address_for(folder)
     state = read_state(folder, address, now())
     if not has_records(folder):
-        return _outbox(address, state, Waiting(0, None))
+        return _outbox(address, state, Waiting(0, None), now())
     with _reading(folder, now) as store:
         begun = in_these_records(replace(state, number=0) if again else state, store)
         pushing = _Pushing(folder, store, begun, now, tell)
         away = pushing.push_all(address)
-        return _outbox(address, pushing.state, waiting(store, pushing.state), pushing.added, away)
+        return _outbox(address, pushing.state, waiting(store, pushing.state), now(), pushing.added, away)
 
 
 def outbox_of(folder: Path, now: Callable[[], datetime]) -> Outbox:
@@ -69,9 +72,9 @@ def outbox_of(folder: Path, now: Callable[[], datetime]) -> Outbox:
     address = address_for(folder)
     state = read_state(folder, address, now())
     if not has_records(folder):
-        return _outbox(address, state, Waiting(0, None))
+        return _outbox(address, state, Waiting(0, None), now())
     with _reading(folder, now) as store:
-        return _outbox(address, state, waiting(store, state))
+        return _outbox(address, state, waiting(store, state), now())
 
 
 def _reading(folder: Path, now: Callable[[], datetime]) -> Store:
@@ -127,8 +130,16 @@ class _Pushing:
         keep_state(self._folder, self.state)
 
 
-def _outbox(address: str, state: OutboxState, left: Waiting, added: int = 0, away: bool = False) -> Outbox:
+def _outbox(address: str, state: OutboxState, left: Waiting, now: datetime, added: int = 0, away: bool = False) -> Outbox:
     return Outbox(
-        words_of(address), added, left.runs, left.since_s, state.problem if left.runs else "", away, state.pushed,
-        dict(state.unreadable), state.others,
-    )  # fmt: skip
+        address=words_of(address),
+        added=added,
+        waiting=left.runs,
+        since_s=left.since_s,
+        late=left.since_s is not None and now.timestamp() - left.since_s > _LATE_S,
+        problem=state.problem if left.runs else "",
+        away=away,
+        pushed=state.pushed,
+        unreadable=dict(state.unreadable),
+        others=state.others,
+    )

@@ -7,7 +7,7 @@ import { Order, RunSearch } from "./run_search.js";
 import { Table, cell, verdictCell, worstCells } from "./table.js";
 import { dated, gettext, ngettext, translate } from "./words.js";
 
-/** @import { Command, FoundRuns, RunRow } from "./protocol.js" */
+/** @import { Command, FoundRuns, ResultsState, RunRow } from "./protocol.js" */
 /** @typedef {"open" | "replay" | "export" | "report" | "compare"} Act */
 
 const SHOWN = 20;
@@ -50,10 +50,22 @@ export class History {
     this.showChart();
   }
 
+  /** @param {FoundRuns | ResultsState} message */
+  hear(message) {
+    if (message.type === "found") this.showFound(message);
+    else this.showResults(message);
+  }
+
   /** @param {FoundRuns} found */
   showFound(found) {
     this.found = found;
     this.showRows();
+  }
+
+  /** One line on where results go and what waits. @param {ResultsState} results */
+  showResults(results) {
+    byId("results-line").hidden = !results.address && !results.problem;
+    put("results-line", resultsWords(results));
   }
 
   /** Only parts of the chosen plan make a trend. @param {string} plan */
@@ -86,6 +98,14 @@ export class History {
     }
     put("chart-words", last.length ? chartWords(last) : "");
   }
+}
+
+/** @param {ResultsState} results */
+function resultsWords({ address, waiting, since, problem }) {
+  if (!waiting) return problem ? translate(problem) : gettext("Results go to {address}; nothing waits", { address });
+  const told = { address, since };
+  const words = ngettext("{count} run waits for {address} since {since}", "{count} runs wait for {address} since {since}", waiting, told);
+  return problem ? `${words}: ${translate(problem)}` : words;
 }
 
 /** @param {FoundRuns} found */

@@ -92,7 +92,7 @@ function onMessage(message) {
   else if (message.type === "control") heard.control = message;
   else if (message.type === "alarms") [alarms, heard.hasFault] = [message.alarms, message.fault];
   else if (message.type === "history") takeHistory(message);
-  else if (message.type === "found") history.showFound(message);
+  else if (message.type === "found" || message.type === "results") history.hear(message);
   else if (message.type === "ct") ctView.show((heard.surface = message));
   else if (message.type === "registers") registersView.show(message);
   else if (message.type === "alive") clock = { nowMs: message.now_ms, at: performance.now() };

@@ -97,6 +97,15 @@ export interface StationState {
   readonly type: "station";
 }
 
+/** Where the results of runs are pushed to, and how many runs wait since when, and why; empty address: nowhere. */
+export interface ResultsState {
+  readonly address: string;
+  readonly waiting: number;
+  readonly since: string;
+  readonly problem: string;
+  readonly type: "results";
+}
+
 /** One thing that went wrong: how often, since when, whether it still is so, whether somebody has seen it. since : date and time of day at this place run : the serial number, or the part, of the run it belongs to; empty before the first current : it belongs to the run that is on, or was the last; an earlier one says nothing about the part in front */
 export interface AlarmRow {
   readonly number: number;
@@ -559,6 +568,6 @@ export interface TrendShown {
   readonly notes: readonly string[];
 }
 
-export type Message = Admitted | Hello | Alive | Answer | Control | StationState | AlarmList | ShownRun | CharacteristicList | History | FoundRuns | SurfaceState | RegisterTable;
+export type Message = Admitted | Hello | Alive | Answer | Control | StationState | ResultsState | AlarmList | ShownRun | CharacteristicList | History | FoundRuns | SurfaceState | RegisterTable;
 
 export type Command = Choose | Enter | Acknowledge | OfRun | Search | OpenSection | ImportSurface | LookAtRegisters | KeepMap | Plain;

@@ -6,10 +6,14 @@ import shutil
 import threading
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from cmmlink.console.alarms import Alarms
+from cmmlink.console.protocol import ResultsState
+from cmmlink.console.results_push import PushedResults, pushing
 from cmmlink.errors import PlantError
 from cmmlink.plant import ResultsDatabase, StoredRun
 from cmmlink.plant_push import address_for, follow, keep_address, outbox_of, push
@@ -28,6 +32,11 @@ from tests.cmmlink.recorded import today
 def stored(address: str, station: str) -> list[StoredRun]:
     with ResultsDatabase(address) as database:
         return list(database.stored_runs(station))
+
+
+def file_of(folder: Path) -> str:
+    """Where results go while nothing else was said."""
+    return str(folder / "plant.sqlite")
 
 
 def station_of(folder: Path) -> str:
@@ -52,10 +61,9 @@ def test_a_pushed_run_is_what_its_result_says(measured: Path, records: Path, add
         assert value.upper == pytest.approx(0.1), "of a form the width of its zone"
 
 
-def test_the_strip_of_a_pushed_run_shows_the_bump_where_it_was_made(records: Path, address: str) -> None:
-    keep_address(records, address)
+def test_the_strip_of_a_pushed_run_shows_the_bump_where_it_was_made(records: Path) -> None:
     push(records, today)
-    run = stored(address, station_of(records))[0]
+    run = stored(file_of(records), station_of(records))[0]
     deviation = np.zeros(COUNT)
     deviation[100:110] = 0.06
     part = np.floor([120 * station_mm(index) / LENGTH_MM for index in range(COUNT)]).astype(int)
@@ -69,25 +77,23 @@ def test_the_strip_of_a_pushed_run_shows_the_bump_where_it_was_made(records: Pat
         assert strip.mean_mm[place] == pytest.approx(inside.mean(), abs=1e-5)
 
 
-def test_a_judgement_that_was_made_later_comes_as_an_event(records: Path, address: str) -> None:
-    keep_address(records, address)
+def test_a_judgement_that_was_made_later_comes_as_an_event(records: Path) -> None:
     push(records, today)
     push(records, today, again=True)
-    with ResultsDatabase(address) as database:
+    with ResultsDatabase(file_of(records)) as database:
         (event,) = database.events(kind="judged again")
     assert (event.who, event.station) == ("Ada", station_of(records))
     assert event.words == "conform: tolerance.upper_mm 0.05 -> 0.08; concession 4711"
 
 
-def test_whatever_is_lost_of_what_was_pushed_nothing_is_there_twice(records: Path, address: str) -> None:
-    keep_address(records, address)
+def test_whatever_is_lost_of_what_was_pushed_nothing_is_there_twice(records: Path) -> None:
     push(records, today)
     (records / STATE_FILE).write_text("{", encoding="utf-8")
     assert push(records, today).added == 0, "all of it was there"
     state = json.loads((records / STATE_FILE).read_text(encoding="utf-8"))
     (records / STATE_FILE).write_text(json.dumps({**state, "sha256": "0" * 64}), encoding="utf-8")
     assert push(records, today).waiting == 0, "records that are others than before are pushed from the beginning"
-    assert len(stored(address, station_of(records))) == 2
+    assert len(stored(file_of(records), station_of(records))) == 2
 
 
 def test_a_server_that_is_killed_in_the_middle_loses_nothing(records: Path, server: PostgresServer) -> None:
@@ -109,8 +115,7 @@ def test_a_server_that_is_killed_in_the_middle_loses_nothing(records: Path, serv
     assert cmmlink("plant", "verify", "--records", records, "--json").json()["agree"] == 47
 
 
-def test_to_push_neither_waits_for_who_records_nor_writes_to_the_records(records: Path, address: str) -> None:
-    keep_address(records, address)
+def test_to_push_neither_waits_for_who_records_nor_writes_to_the_records(records: Path) -> None:
     with open_to_record(records, today) as store:
         before = hashlib.sha256((records / "station.sqlite").read_bytes()).hexdigest()
         assert push(records, today).added == 2, "the station is locked by who records"
@@ -118,8 +123,7 @@ def test_to_push_neither_waits_for_who_records_nor_writes_to_the_records(records
         assert store.first_alteration()[0] is None
 
 
-def test_a_run_that_cannot_be_read_is_named_and_keeps_no_other_back(records: Path, address: str) -> None:
-    keep_address(records, address)
+def test_a_run_that_cannot_be_read_is_named_and_keeps_no_other_back(records: Path) -> None:
     with open_to_record(records, today) as store:
         names = [begin.run for begin, _ in store.begins_and_ends()]
         store._connection.execute("UPDATE record SET body = x'00' WHERE run = ? AND kind = 'result'", (names[0],))
@@ -128,8 +132,7 @@ def test_a_run_that_cannot_be_read_is_named_and_keeps_no_other_back(records: Pat
     assert "is damaged" in outbox.unreadable[names[0]]
 
 
-def test_two_stations_of_one_name_are_told_and_neither_overwrites_the_other(records: Path, tmp_path: Path, address: str) -> None:
-    keep_address(records, address)
+def test_two_stations_of_one_name_are_told_and_neither_overwrites_the_other(records: Path, tmp_path: Path) -> None:
     push(records, today)
     other = Path(shutil.copytree(records, tmp_path / "other"))
     (other / STATE_FILE).unlink()
@@ -140,15 +143,14 @@ def test_two_stations_of_one_name_are_told_and_neither_overwrites_the_other(reco
     assert "has each station its own name" in cmmlink("plant", "status", "--records", other).out
 
 
-def test_a_run_that_was_merged_is_pushed_as_its_station_pushed_it(records: Path, tmp_path: Path, address: str) -> None:
-    keep_address(records, address)
+def test_a_run_that_was_merged_is_pushed_as_its_station_pushed_it(records: Path, tmp_path: Path) -> None:
     push(records, today)
-    mine = stored(address, station_of(records))
+    mine = stored(file_of(records), station_of(records))
     assert cmmlink("merge", records, "--records", tmp_path / "hall").code == 0
-    keep_address(tmp_path / "hall", address)
+    keep_address(tmp_path / "hall", file_of(records))
     outbox = push(tmp_path / "hall", today)
     assert (outbox.added, outbox.others) == (0, ())
-    assert [plain(run) for run in stored(address, station_of(records))] == [plain(run) for run in mine]
+    assert [plain(run) for run in stored(file_of(records), station_of(records))] == [plain(run) for run in mine]
 
 
 class Clock:
@@ -165,8 +167,7 @@ class Clock:
         return self._left < 0
 
 
-def test_who_follows_the_records_pushes_when_they_grow_and_else_not(records: Path, address: str) -> None:
-    keep_address(records, address)
+def test_who_follows_the_records_pushes_when_they_grow_and_else_not(records: Path) -> None:
     told, clock = list[Outbox](), Clock(6)
 
     def wait(seconds: float) -> bool:
@@ -216,18 +217,23 @@ def test_settings_that_cannot_be_used_are_refused_with_their_place(records: Path
     assert "geheim" not in str(told.value)
 
 
-def test_to_end_the_input_ends_a_pusher(records: Path) -> None:
-    """`cmmlink plant push --stay` in a process of its own, which ends with who started it."""
-    import subprocess
-    import sys
+class Heard(PushedResults):
+    """What was heard, and the moment at which something was."""
 
-    command = [sys.executable, "-m", "cmmlink", "plant", "push", "--stay", "--records", str(records)]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as child:
-        assert child.stdin is not None
-        assert child.stdout is not None
-        timer = threading.Timer(60, child.kill)
-        timer.start()
-        assert json.loads(child.stdout.readline())["added"] == 2
-        child.stdin.close()
-        assert child.wait() == 0
-        timer.cancel()
+    def __init__(self) -> None:
+        self.told, self.come = list[Any](), threading.Event()
+        super().__init__(Alarms(today))
+
+    def hear(self, told: Any) -> None:
+        super().hear(told)
+        self.told.append(told)
+        self.come.set()
+
+
+def test_the_console_pushes_by_another_process_that_ends_with_it(records: Path) -> None:
+    heard = Heard()
+    with pushing(records, heard):
+        assert heard.come.wait(60)
+    assert not [thread for thread in threading.enumerate() if thread.name == "results"], "it has ended, and its process with it"
+    assert heard.state == ResultsState("plant.sqlite", 0, "", "")
+    assert len(stored(file_of(records), station_of(records))) == heard.told[0]["added"] == 2
