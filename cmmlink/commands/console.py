@@ -74,9 +74,9 @@ def serve_console(
     open_device = or_demo(connect)
     trends = _trends_of(past.folder)
     setup = StationSetup(
-        scans, open_device, serial_ports, past, time.monotonic, now, surfaces, inspect, _write_for(), folder, plan_file(), trends
-    )
-    setup = replace(setup, push_from=_push_from(past.folder))
+        scans, open_device, serial_ports, past, time.monotonic, now, surfaces, inspect, _write_for(), folder, plan_file(), trends,
+        push_from=_push_from(past.folder),
+    )  # fmt: skip
     if key is not None and certificate is None:
         raise PlanError("--key belongs to a certificate; give that with --certificate")
     access = Access(host, port, certificate, key, unencrypted)
@@ -142,9 +142,9 @@ def run_on_page(
     past = _past_runs(output.records)
     write = _write_for(output.out)
     setup = StationSetup(
-        lambda: {plan_file.name: plan_file}, connect, serial_ports, past, time.monotonic, now, write=write, trends=_trends_of(past.folder)
-    )
-    setup = replace(setup, push_from=_push_from(past.folder))
+        lambda: {plan_file.name: plan_file}, connect, serial_ports, past, time.monotonic, now, write=write, trends=_trends_of(past.folder),
+        push_from=_push_from(past.folder),
+    )  # fmt: skip
     with stop_on_ctrl_c() as stop, serve(setup, __version__) as server:
         station = server.station
         _show(server, output.no_browser)
