@@ -74,7 +74,7 @@ def serve_console(
     open_device = or_demo(connect)
     trends = _trends_of(past.folder)
     setup = StationSetup(
-        scans, open_device, serial_ports, past, time.monotonic, now, surfaces, inspect, _write_for(), folder, plan_file(), trends,
+        scans, open_device, serial_ports, past, time.monotonic, now, surfaces, inspect, _write_for(), folder, plan_file(), trends=trends,
         push_from=_push_from(past.folder),
     )  # fmt: skip
     if key is not None and certificate is None:
