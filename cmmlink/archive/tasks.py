@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from cmmlink.record import Judgement
 
 MOST_RUNS = 25  # of a task: what a cluster needs for a task is then small beside the work
-MOST_POINTS = 2_000_000  # of a task, some two seconds of work: so long may the operator who stops it have to wait
+MOST_POINTS = 2_000_000  # of a task, some seconds of work: so long may the operator who stops it have to wait
 _POINTS_OF_A_RUN = 50_000  # where the record does not tell
 
 

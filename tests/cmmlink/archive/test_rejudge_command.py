@@ -21,6 +21,7 @@ from cmmlink.record import RunSearch, judged_by_means, open_archive, open_to_rec
 from tests.cmmlink.command import cmmlink
 from tests.cmmlink.oval_part import oval_points, write_nominal, write_points
 from tests.cmmlink.recorded import today
+from tests.drivers.surface.meshes import binary_stl, tube, write
 
 BUMPS_MM = (0.03, 0.06, 0.07, 0.12)  # against a limit of 0.05, and then of 0.08
 WIDER = ("--set", "tolerance.upper_mm=0.08")
@@ -170,6 +171,21 @@ def test_an_exported_run_is_an_archive_of_one(archive: Path, tmp_path: Path) -> 
     cmmlink("export", 2, "--records", archive, "--out", tmp_path / "evidence")
     told = again(tmp_path / "evidence", *WIDER)
     assert [(run["part"], run["recorded"], run["again"]) for run in told["runs"]] == [("part-b", "NOT CONFORM", "CONFORM")]
+
+
+def test_sections_of_a_surface_are_judged_like_any_run(tmp_path: Path) -> None:
+    """A bump of 0.06 mm lies within 0.03 mm of the best zone, and within 0.02 mm of none."""
+    deviation_mm = np.zeros(360)
+    deviation_mm[100:110] = 0.06
+    nominal = write_nominal(tmp_path / "oval.yaml")
+    surface = write(tmp_path / "oval.stl", binary_stl(tube(oval_points(deviation_mm), np.array([0.0, 10.0]))))
+    options = ("--nominal", nominal, "--tolerance", -0.05, 0.05, "--heights", 3, 6, "--cutter", "numpy", "--no-pictures")
+    cmmlink("ct", surface, *options, "--records", tmp_path / "records")
+    told = again(tmp_path / "records", "--set", "tolerance.upper_mm=0.02", "--set", "tolerance.lower_mm=-0.02")
+    assert [(run["section"], run["recorded"], run["again"]) for run in told["runs"]] == [
+        ("section 1 of 2 at 3.000 mm", "CONFORM", "NOT CONFORM"),
+        ("section 2 of 2 at 6.000 mm", "CONFORM", "NOT CONFORM"),
+    ]
 
 
 @pytest.mark.parametrize("name", ["table.csv", "table.xlsx"])
