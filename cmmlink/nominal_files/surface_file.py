@@ -11,7 +11,19 @@ from drivers import CadError, MeshError, PointFileError, read_normals, read_poin
 from drivers.cad import CadFace, CadFaces, Kind, read_cad_faces
 from drivers.surface import Open3DMissing, Open3DProcess, SurfaceMesh, is_ply_cloud, read_obj, read_ply_cloud, read_stl
 from inspection import NominalError
-from inspection.surface import CloudSurface, NominalSurface, PatchSurface, SplineFace, TriangleSurface, TrimmedFace, TrimmedSurface
+from inspection.surface import (
+    CloudSurface,
+    NominalSurface,
+    PatchSurface,
+    SingleFace,
+    SplineFace,
+    TriangleSurface,
+    TrimmedFace,
+    TrimmedSurface,
+    have_area,
+    words_on_odd_faces,
+    words_on_odd_triangles,
+)
 
 Array = NDArray[np.float64]
 
@@ -73,7 +85,7 @@ def load_surface(
             "the mesh is taken for the nominal itself: if it was exported from CAD, state the chord tolerance, or bring the STEP file"
         )
     surface = TriangleSurface(triangles, (nominal_error_mm or 0.0) + rounding)
-    return SurfaceFile(surface, mesh.kind, len(surface), (*notes, *surface.notes))
+    return SurfaceFile(surface, mesh.kind, len(surface), (*notes, *surface.notes, *words_on_odd_triangles(triangles)))
 
 
 def _of_points(path: Path, scale: float) -> SurfaceFile:
@@ -133,14 +145,25 @@ def _of_cad(path: Path, kind: Kind, chord_mm: float, read_faces: Callable[[Path,
         whole = [face.spline for face in faces if face is not None and face.loop is None]
         if len(whole) == len(faces):
             patches = PatchSurface(whole)
-            return SurfaceFile(patches, kind, len(whole), patches.notes)
+            odd = words_on_odd_faces([SingleFace.of_spline(face) for face in whole])
+            return SurfaceFile(patches, kind, len(whole), (*patches.notes, *odd))
+        words = (_words_on_triangles(found), *_words_on_odd_cad(found))
         if faces.count(None) == len(faces):
             triangles = TriangleSurface(found.triangles_mm, found.error_mm, found.face)
-            return SurfaceFile(triangles, kind, len(faces), (_words_on_triangles(found), *triangles.notes))
+            return SurfaceFile(triangles, kind, len(faces), (*words, *triangles.notes))
         trimmed = TrimmedSurface(faces, found.triangles_mm, found.face, found.error_mm)
     except (CadError, NominalError) as error:
         raise NominalError(f"{path}: {error}") from None
-    return SurfaceFile(trimmed, kind, len(faces), (_words_on_triangles(found), *trimmed.notes))
+    return SurfaceFile(trimmed, kind, len(faces), (*words, *trimmed.notes))
+
+
+def _words_on_odd_cad(found: CadFaces) -> tuple[str, ...]:
+    """What is odd about faces that come as triangles."""
+    each = [found.triangles_mm[found.face == number] for number in range(len(found.faces))]
+    if not all(have_area(triangles).any() for triangles in each):
+        return ()  # what is left out of the surface is said there, and numbers would not be those of the file
+    odd = words_on_odd_faces([SingleFace.of_triangles(triangles) for triangles in each], found.error_mm)
+    return (*odd, *words_on_odd_triangles(found.triangles_mm, found.face))
 
 
 def _words_on_triangles(found: CadFaces) -> str:

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from inspection.surface.feet import FootKind, NominalSurface, SurfaceFeet, rejections
     from inspection.surface.judged_surface import judge_surface
     from inspection.surface.live_surface import LiveSurface, SurfaceUpdate
+    from inspection.surface.odd_faces import SingleFace, words_on_odd_faces, words_on_odd_triangles
     from inspection.surface.patches import PatchSurface
     from inspection.surface.rigid_motion import RigidMotion
     from inspection.surface.section_course import SectionCourse, course_of_section, into_plane
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from inspection.surface.triangles import TriangleSurface
     from inspection.surface.trimmed_surface import TrimmedFace, TrimmedSurface
     from inspection.surface.weakness import Weakness
+    from inspection.surface.welding import have_area
 else:
     from inspection.front_door import load_on_use
 
@@ -30,6 +32,7 @@ else:
         "inspection.surface.feet": ("FootKind", "NominalSurface", "SurfaceFeet", "rejections"),
         "inspection.surface.judged_surface": ("judge_surface",),
         "inspection.surface.live_surface": ("LiveSurface", "SurfaceUpdate"),
+        "inspection.surface.odd_faces": ("SingleFace", "words_on_odd_faces", "words_on_odd_triangles"),
         "inspection.surface.patches": ("PatchSurface",),
         "inspection.surface.surface_fit": ("SurfaceFreedom", "SurfaceRegistration", "register_surface"),
         "inspection.surface.surface_result": ("Defect", "SurfaceResult", "Unmeasured"),
@@ -40,6 +43,7 @@ else:
         "inspection.surface.triangles": ("TriangleSurface",),
         "inspection.surface.trimmed_surface": ("TrimmedFace", "TrimmedSurface"),
         "inspection.surface.weakness": ("Weakness",),
+        "inspection.surface.welding": ("have_area",),
     }
 
     __getattr__ = load_on_use(__name__, _PLACES)
@@ -55,6 +59,7 @@ __all__ = [
     "PatchSurface",
     "RigidMotion",
     "SectionCourse",
+    "SingleFace",
     "SplineFace",
     "SurfaceFeet",
     "SurfaceFreedom",
@@ -68,8 +73,11 @@ __all__ = [
     "Unmeasured",
     "Weakness",
     "course_of_section",
+    "have_area",
     "into_plane",
     "judge_surface",
     "register_surface",
     "rejections",
+    "words_on_odd_faces",
+    "words_on_odd_triangles",
 ]

@@ -17,6 +17,7 @@ from inspection.surface.patches import PatchSurface
 from inspection.surface.spline_face import SplineFace
 from inspection.surface.triangles import TriangleSurface
 from inspection.surface.trim_loop import TrimLoop, trim_loop
+from inspection.surface.welding import have_area
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -69,13 +70,17 @@ class TrimmedSurface:
         self.area_mm2, self.is_closed, self.size_mm = mesh.area_mm2, mesh.is_closed, mesh.size_mm
         self.sides_known = True
         self.nominal_error_mm, self.notes = mesh.nominal_error_mm, mesh.notes
-        self._parts = [_part(i, face, triangles[number == i], mesh) for i, face in enumerate(faces) if (number == i).any()]
+        has_area = have_area(triangles)
+        flat = sorted(set(range(len(faces))) - set(number[has_area].tolist()))
+        if flat:
+            self.notes = (*self.notes, f"faces without area were left out: {', '.join(str(i + 1) for i in flat)}")
+        self._parts = [_part(i, face, triangles[has_area & (number == i)], mesh) for i, face in enumerate(faces) if i not in flat]
         known = [part for part in self._parts if part.spline is not None]
         if not known:
             raise NominalError("no face is an exact spline")
         self._numbers = np.array([part.number for part in known], dtype=np.int32)
         self._splines = PatchSurface([part.spline.faces[0] for part in known if part.spline is not None], joined=False)
-        hidden = ~np.isin(number, self._numbers)
+        hidden = has_area & ~np.isin(number, self._numbers)
         self._hidden = TriangleSurface(triangles[hidden]) if hidden.any() else None
 
     def __len__(self) -> int:

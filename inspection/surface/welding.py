@@ -98,11 +98,16 @@ def _unique_rows(points: Array) -> tuple[Array, Index]:
     return plain[order[is_new]], number
 
 
-def _without_area(corners: Array, triangles: Index, given: Index, notes: list[str]) -> tuple[Index, Index]:
-    a, b, c = (corners[triangles[:, i]] for i in range(3))
+def have_area(triangles: Array) -> NDArray[np.bool_]:
+    """Whether triangles (n, 3, 3) have an area, and so a normal."""
+    a, b, c = (triangles[:, i] for i in range(3))
     twice = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     longest = np.max([((p - q) ** 2).sum(axis=1) for p, q in ((a, b), (b, c), (c, a))], axis=0)
-    good = twice > _FLAT * longest
+    return np.asarray(twice > _FLAT * longest)
+
+
+def _without_area(corners: Array, triangles: Index, given: Index, notes: list[str]) -> tuple[Index, Index]:
+    good = have_area(corners[triangles])
     if not good.any():
         raise NominalError("the surface has no triangle with an area: export it again")
     if not good.all():

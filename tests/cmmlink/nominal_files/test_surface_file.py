@@ -38,7 +38,7 @@ def test_trimmed_faces_are_exact_inside_their_loops_and_state_a_bound_elsewhere(
     cad_files: Path, occt_process: OcctProcess, tmp_path: Path
 ) -> None:
     """Against Open CASCADE's extrema on trimmed faces. Walls of the prism meet smoothly; faces of IGES know nothing of each other."""
-    points = np.random.default_rng(2).uniform((-4, -4, -4), (44, 34, 24), (500, 3))
+    points = np.random.default_rng(2).uniform((-4, -4, -4), (44, 34, 24), (300, 3))
     np.save(tmp_path / "points.npy", points)
     names = ("part.step", "part.igs", "prism.step")
     asked = [

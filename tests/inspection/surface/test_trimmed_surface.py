@@ -95,6 +95,16 @@ def test_a_loop_knows_what_lies_inside_it_by_more_than_it_may_be_off() -> None:
     assert not held[inward < 0.01 - sagitta].any()
 
 
+def test_a_face_without_area_is_left_out_with_its_number() -> None:
+    triangles = meshes.prism(meshes.NOTCHED, HEIGHT)
+    flat = np.repeat(triangles[:1, :1], 3, axis=1)
+    wall = TrimmedFace(faces.plane(np.array([0.0, 0, 0]), np.array([4.0, 0, 0]), np.array([0, 0, HEIGHT])))
+    made = [*[None] * 5, wall, *[None] * 3]
+    surface = TrimmedSurface(made, np.concatenate([triangles, flat]), np.append(owners(triangles), 8), BOUND_MM)
+    assert surface.notes[-1] == "faces without area were left out: 9"
+    assert surface.project([(2.0, 0.2, 1.0)]).error_mm.tolist() == [0.0]
+
+
 def test_faces_that_are_no_splines_alone_are_refused() -> None:
     triangles = meshes.prism(meshes.NOTCHED, HEIGHT)
     with pytest.raises(NominalError, match="no face is an exact spline"):
