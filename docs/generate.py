@@ -90,7 +90,8 @@ SURFACE_PLAN = """
 
 A plan with a `surface` in place of a `nominal` holds points in space against a whole surface: CAD, a mesh or a cloud of points.
 `cmmlink run plan.yaml` carries it out with any device that gives points in space, and `cmmlink surface` does the same for a file of
-points, with options in place of a plan. Relative paths are relative to the plan's own folder.
+points, with options in place of a plan. [Whole surfaces](surfaces.md) says what is judged. Relative paths are relative to the plan's own
+folder.
 
 ```yaml
 part: {name: blade}
