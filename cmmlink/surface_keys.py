@@ -114,3 +114,45 @@ class SurfaceRecorded(OfRecord, SurfaceMeasured):
 
 class SurfaceReplayed(OfReplay, SurfaceInspected):
     """The result of `replay` of a run of a surface: also how it compares with the recorded one."""
+
+
+class ComparedRun(JsonObject):
+    """One of two runs of a surface."""
+
+    run: str = Field(description="its id")
+    part: str = Field(description="the name of its part")
+    serial_number: str | None = Field(description="the serial number of its part")
+    measured_at: str = Field(description="when it began, in UTC")
+    judged: int = Field(description="its points with a verdict")
+    verdict: VerdictName = Field(description="its verdict")
+    fit: str = Field(description="how its pose was found")
+    rule: str = Field(description="what decided: best-fit, or datum where the pose was known")
+    coverage: float = Field(description="the share of the area that it measured")
+    max_deviation_mm: float | None = Field(description="its largest deviation")
+    min_deviation_mm: float | None = Field(description="its smallest deviation")
+    rms_mm: float | None = Field(description="the root mean square of its deviations")
+
+
+class PlaceCompared(JsonObject):
+    """A place of the surface, and what both runs have there."""
+
+    place_mm: list[float] = Field(min_length=3, max_length=3, description="the place on the nominal, [x, y, z]")
+    face: int = Field(description="the number of the face or triangle there, from 1")
+    first_mm: float = Field(description="the deviation of the first run")
+    second_mm: float = Field(description="the deviation of the second run")
+    difference_mm: float = Field(description="the second less the first")
+
+
+class SurfacesCompared(JsonObject):
+    """The answer of `compare` for two runs of a surface. Differences are the second run less the first."""
+
+    first: ComparedRun = Field(description="the run that the other one is held against")
+    second: ComparedRun = Field(description="the other run")
+    nominal: str = Field(description="the name of the nominal's file")
+    area_mm2: float = Field(description="the area of the nominal")
+    compared: float = Field(description="the share of that area that both measured")
+    largest: PlaceCompared = Field(description="where the two differ most, whatever the sign")
+    mean_mm: float | None = Field(description="the mean difference over that area, whatever the density of points")
+    rms_mm: float | None = Field(description="the root mean square of the difference, likewise")
+    places: list[PlaceCompared] = Field(description="places far from each other where the two differ most, up to ten")
+    notes: list[str] = Field(description="how the poses were found")

@@ -43,7 +43,7 @@ from cmmlink.result_keys import (
     Understood,
     ZonesVerified,
 )
-from cmmlink.surface_keys import SurfaceInspected, SurfaceMeasured, SurfaceRecorded, SurfaceReplayed
+from cmmlink.surface_keys import SurfaceInspected, SurfaceMeasured, SurfaceRecorded, SurfaceReplayed, SurfacesCompared
 from cmmlink.trend_keys import PlantTrend
 from cmmlink.version import RESULT_SCHEMA
 from drivers.codecs import decoders
@@ -183,6 +183,7 @@ OBJECTS: tuple[tuple[str, type[BaseModel], type[BaseModel] | None], ...] = (
     ("`export`", Exported, None),
     ("`report`", Reported, None),
     ("`compare`", Compared, None),
+    ("`compare` of two runs of a surface", SurfacesCompared, None),
     ("`verify`", Verified, None),
     ("`verify-zone`", ZonesVerified, None),
     ("`qualify`, and its certificate", Qualified, None),

@@ -31,6 +31,7 @@ from inspection import FitName, Material
 if TYPE_CHECKING:
     from cmmlink.comparison import ComparedScan, Comparison
     from cmmlink.record import Store
+    from cmmlink.surface_comparison import SurfaceComparison
 
 _PICTURES = (".png", ".svg", ".pdf")
 _NO_LIMITS = (-1.0, 1.0)  # an inspection needs some: the fit aims at their middle, and nothing that is compared depends on their width
@@ -78,6 +79,8 @@ def compare(
     if out is not None and out.suffix.lower() not in _PICTURES:
         raise PlanError(f"{out}: no drawing is known by the suffix '{out.suffix}'; expected .png, .svg or .pdf")
     files = [Path(name) for name in (first, second) if Path(name).is_file()]
+    if nominal is None and not files and (found := _surfaces_compared(first, second, records_folder(records))) is not None:
+        return _report_surfaces(found, out, as_json=as_json)
     if nominal is None and len(files) == 2:
         raise PlanError(f"{first} and {second} are files of points: --nominal FILE says what both are compared with")
     if nominal is not None and len(files) < 2:
@@ -105,6 +108,49 @@ def compare(
         print_json(comparison.to_json() | {"file": None if out is None else str(out)})
     else:
         _print(comparison, out)
+    return 0
+
+
+def _surfaces_compared(first: str, second: str, records: Path) -> "SurfaceComparison | None":
+    """Two runs of whole surfaces compared; None where neither is one. Raises PlanError where one is and the other is not."""
+    from cmmlink.record import find_run, open_to_read, recorded_run
+
+    with open_to_read(records, now) as store:
+        try:
+            runs = [find_run(store, name) for name in (first, second)]
+        except RunError:  # what is meant is told by who looks for files as well
+            return None
+        of_surface = [recorded_run(store, run).is_of_surface for run in runs]
+        if not any(of_surface):
+            return None
+        if not all(of_surface):
+            raise PlanError(f"{first} and {second}: one is a run of a whole surface and the other of a section; expected two of a kind")
+        from cmmlink.surface_comparison import compare_surfaces
+
+        with progress("comparing"):
+            return compare_surfaces(store, runs)
+
+
+def _report_surfaces(found: "SurfaceComparison", out: Path | None, *, as_json: bool) -> int:
+    if out is not None:
+        raise PlanError(f"--out {out}: there is no drawing of two surfaces; leave it out")
+    told = found.to_json()
+    if as_json:
+        print_json(told)
+        return 0
+    for name in ("first", "second"):
+        run = told[name]
+        who = " ".join(filter(None, [run["part"], run["serial_number"]]))
+        _say(f"{name:<6}  run {run['run']}, {who}, measured {run['measured_at']}: {run['judged']} points judged, fit {run['fit']}")
+    _say(f"nominal {told['nominal']}, {told['area_mm2']:.6g} mm2, compared over {told['compared']:.1%} of it")
+    _say(f"second - first: mean {told['mean_mm']:+.4f} mm, rms {told['rms_mm']:.4f} mm, whatever the density of points")
+    _say("\n         x         y         z      face     first    second  difference")
+    for place in told["places"]:
+        x, y, z = place["place_mm"]
+        values = f"{place['first_mm']:+8.4f}  {place['second_mm']:+8.4f}    {place['difference_mm']:+8.4f}"
+        _say(f"{x:10.3f}{y:10.3f}{z:10.3f}{place['face']:10d}  {values}")
+    for note in told["notes"]:
+        _say(f"note: {note}")
     return 0
 
 

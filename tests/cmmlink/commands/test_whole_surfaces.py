@@ -9,7 +9,7 @@ import pytest
 
 from cmmlink.result_keys import Recorded
 from cmmlink.surface_csv import SURFACE_COLUMNS
-from cmmlink.surface_keys import SurfaceMeasured, SurfaceRecorded, SurfaceReplayed
+from cmmlink.surface_keys import SurfaceMeasured, SurfaceRecorded, SurfaceReplayed, SurfacesCompared
 from tests.cmmlink.command import Ended, cmmlink
 from tests.cmmlink.egg import MOVED_MM, ROTATION, egg_scan, with_bump, write_egg, write_scan
 
@@ -162,6 +162,34 @@ def test_a_recorded_run_is_replayed_judged_again_and_exported(files: Path, tmp_p
     assert "expected json or csv" in cmmlink("export", "last", "--format", "qif", *records).refused()
     assert cmmlink("export", "last", "--out", tmp_path / "all", *records).code == 0
     assert cmmlink("replay", tmp_path / "all", "--json").json()["identical"] is True
+
+
+def test_two_runs_of_a_surface_are_compared_place_by_place(files: Path, tmp_path: Path) -> None:
+    records = ("--records", tmp_path)
+    for scan in ("good.csv", "bump.csv"):
+        surface(files, scan, "--json", "--fit", "none", "--start", pose_file(tmp_path), *records)
+    done = cmmlink("compare", "last~1", "last", "--json", *records)
+    found, (_, nominal) = done.json(), egg_scan()
+    SurfacesCompared.model_validate(found)
+    assert (done.code, found["compared"]) == (0, 1.0)
+    largest = found["largest"]
+    assert 0.2 < largest["difference_mm"] < 0.31
+    assert largest["difference_mm"] == pytest.approx(largest["second_mm"] - largest["first_mm"])
+    assert np.linalg.norm(np.array(largest["place_mm"]) - nominal[len(nominal) // 3]) < 3.5
+    away = [place for place in found["places"] if np.linalg.norm(np.array(place["place_mm"]) - nominal[len(nominal) // 3]) > 12.0]
+    assert away
+    assert all(abs(place["difference_mm"]) < 1e-6 for place in away)
+    told = cmmlink("compare", "last~1", "last", *records).out
+    assert "second - first: mean" in told
+    assert "no drawing" in cmmlink("compare", "last~1", "last", "--out", tmp_path / "a.png", *records).refused()
+
+
+def pose_file(folder: Path) -> Path:
+    """The pose at which the part lies on the machine, as a person writes it down."""
+    pose = folder / "pose.json"
+    turned = {"rotation": ROTATION.T.tolist(), "translation_mm": (-ROTATION.T @ MOVED_MM).tolist()}
+    pose.write_text(json.dumps(turned), encoding="utf-8")
+    return pose
 
 
 def test_a_plan_is_checked_and_run(files: Path) -> None:
