@@ -169,12 +169,38 @@ def instructions(function: Callable[..., Any]) -> Any:
 
 @instructions
 def fma(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
-    """The value a b + c with one rounding."""
+    """The value a b + c with one rounding, in single precision where all three are."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.fma(*args)
 
-    return types.float64(types.float64, types.float64, types.float64), generate
+    kind = types.float32 if a == b == c == types.float32 else types.float64
+    return kind(kind, kind, kind), generate
+
+
+@instructions
+def bits_of(typing_context: Any, value: Any) -> Any:
+    """The bits of a real of single precision as a whole number, which rises with it where it is not negative."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.bitcast(args[0], ir.IntType(32))
+
+    return types.int32(types.float32), generate
+
+
+def _prefer_widest(builder: Any) -> None:
+    set.add(builder.function.attributes, _WIDEST)  # by the set that it is, since llvmlite knows no attributes that are texts
+
+
+@instructions
+def as_wide_as_can_be(typing_context: Any) -> Any:
+    """Vectorise the loops of this function as wide as the processor can."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        _prefer_widest(builder)
+        return context.get_dummy_value()
+
+    return types.void(), generate
 
 
 @instructions
@@ -185,7 +211,7 @@ def stack_reals(typing_context: Any) -> Any:
     """
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        set.add(builder.function.attributes, _WIDEST)  # by the set that it is, since llvmlite knows no attributes that are texts
+        _prefer_widest(builder)
         place = _stack_memory(builder, ir.DoubleType(), REALS)
         place.align = 64
         return builder.bitcast(place, ir.DoubleType().as_pointer())

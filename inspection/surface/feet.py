@@ -136,7 +136,9 @@ def with_rows(feet: SurfaceFeet, rows: Index, which: NDArray[np.bool_], others: 
 def surface_feet(found: SpaceFeet, error_mm: float, face: NDArray[np.int32] | None = None) -> SurfaceFeet:
     """Feet as the loops fill them in, as a record. The face of an item (n,) stands in for its number, where there is more than one item."""
     error = np.full(len(found.kind), error_mm)
-    items = found.item if face is None else np.where(found.item >= 0, face[found.item], np.int32(-1))
+    items = found.item if face is None else face[found.item]
+    if len(items) and found.item.min() < 0:
+        items = np.where(found.item >= 0, items, np.int32(-1))
     return SurfaceFeet(found.foot_mm, found.distance_mm, found.normal, items, found.parameter, found.kind, error)
 
 
@@ -145,5 +147,7 @@ def points_in_space(points_mm: ArrayLike) -> Array:
     points = np.asarray(points_mm, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 3:
         raise ValueError(f"points must have shape (m, 3), got {points.shape}")
+    if not len(points) or (points.max() <= KILOMETRE_MM and points.min() >= -KILOMETRE_MM):  # not so where one is NaN
+        return points
     near = np.asarray((np.abs(points) <= KILOMETRE_MM).all(axis=1))
-    return points if near.all() else np.where(near[:, None], points, np.nan)
+    return np.where(near[:, None], points, np.nan)

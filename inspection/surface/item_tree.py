@@ -19,7 +19,7 @@ class ItemTree:
     """A search tree over n items, whose leaves are numbered from 0.
 
     nodes, links : (k * 6 * 8,) the boxes of the children in columns, and (k * 8,) what they are: see `layout`. Node 0 is the root
-    members      : (l, leaf size) the items of each leaf, and -1 where a leaf is not full
+    members      : (l, leaf size) the items of each leaf, and -1 where a leaf is not full: only the last one may be
     """
 
     nodes: Array
@@ -38,9 +38,10 @@ def item_tree(place: Array, low_mm: Array, high_mm: Array, leaf_size: int) -> It
     links: list[Index] = []
     members: list[Index] = []
     begun, leaves = 1, 0
+    halvings = (-(-len(place) // leaf_size) - 1).bit_length() % _HALVINGS or _HALVINGS  # fewer at the root: below it nodes are full then
     while len(start):
         parent = np.arange(len(start))
-        for _ in range(_HALVINGS):
+        for _ in range(halvings):
             start, count, parent = _halve(place, order, start, count, parent, leaf_size)
         slot = np.arange(len(parent)) - np.searchsorted(parent, parent)
         boxes, link = np.full((parent[-1] + 1, BOX_SIDES, WAYS), np.inf), np.full((parent[-1] + 1, WAYS), NO_CHILD)
@@ -54,9 +55,19 @@ def item_tree(place: Array, low_mm: Array, high_mm: Array, leaf_size: int) -> It
         members.append(_members(order, start[~goes_on], count[~goes_on], leaf_size))
         nodes.append(boxes.ravel())
         links.append(link.ravel())
-        begun, leaves = begun + made, leaves + ended
+        begun, leaves, halvings = begun + made, leaves + ended, _HALVINGS
         start, count = start[goes_on], count[goes_on]
-    return ItemTree(np.concatenate(nodes), np.concatenate(links).astype(np.int32), np.concatenate(members))
+    return _with_full_leaves_first(ItemTree(np.concatenate(nodes), np.concatenate(links).astype(np.int32), np.concatenate(members)))
+
+
+def _with_full_leaves_first(tree: ItemTree) -> ItemTree:
+    """The tree with the leaf that is not full, where there is one, as its last."""
+    last = len(tree.members) - 1
+    for leaf in np.flatnonzero(tree.members[:, -1] < 0).tolist():
+        tree.members[[leaf, last]] = tree.members[[last, leaf]]
+        one, other = tree.links == LEAF - leaf, tree.links == LEAF - last
+        tree.links[one], tree.links[other] = LEAF - last, LEAF - leaf
+    return tree
 
 
 def _halve(place: Array, order: Index, start: Index, count: Index, parent: Index, leaf_size: int) -> tuple[Index, Index, Index]:

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from inspection.kernels.surfaces.on_patches import PatchTables, project_on_patches
     from inspection.kernels.surfaces.on_triangles import TriangleTables, project_on_triangles
     from inspection.kernels.surfaces.space_feet import SpaceFeet
+    from inspection.kernels.surfaces.triangle_cells import CellMemory, fill_cells
 else:
     from inspection.front_door import load_on_use
 
@@ -17,9 +18,10 @@ else:
         "inspection.kernels.surfaces.on_patches": ("PatchTables", "project_on_patches"),
         "inspection.kernels.surfaces.on_triangles": ("TriangleTables", "project_on_triangles"),
         "inspection.kernels.surfaces.space_feet": ("SpaceFeet",),
+        "inspection.kernels.surfaces.triangle_cells": ("CellMemory", "fill_cells"),
     }
 
     __getattr__ = load_on_use(__name__, _PLACES)
 
 
-__all__ = ["PatchTables", "SpaceFeet", "TriangleTables", "project_on_patches", "project_on_triangles"]
+__all__ = ["CellMemory", "PatchTables", "SpaceFeet", "TriangleTables", "fill_cells", "project_on_patches", "project_on_triangles"]

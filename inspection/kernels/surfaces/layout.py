@@ -15,12 +15,26 @@ STACK = 256  # nodes that may wait: seven of each level, and a tree has less tha
 SQUARES_OF_EIGHT = STACK  # in the memory of reals: behind the squares of what waits those of eight boxes or items
 SCRATCH = STACK + WAYS
 
-# --- a cluster of triangles: columns of eight -----------------------------------------------------------------------------
+# --- a cluster of triangles: columns of sixteen, in single precision, which only say where not to look ---------------------
 
-# Corner A, the edges AB and AC, their square lengths' reciprocals, that of BC, and the reciprocal of |AB x AC|^2; 0 stands for none.
-CORNER_A, EDGE_AB, EDGE_AC, PER_AB, PER_AC, PER_BC, PER_NORMAL, CLUSTER_ROWS = 0, 3, 6, 9, 10, 11, 12, 13
-CLUSTER = WAYS * CLUSTER_ROWS
-NOTHING = -1  # in place of a triangle, where a cluster is not full; of a face beyond an edge, where there is none
+LANES = 16  # triangles of a cluster; that of lane j of cluster c has the number c * LANES + j
+# Four planes of each triangle, as nx, ny, nz, offset: its own, and those along its edges AB, AC, BC that stand upright on it, outward.
+OWN_PLANE, PLANE_AB, PLANE_AC, PLANE_BC, PLANE_WIDTH, CLUSTER_ROWS = 0, 4, 8, 12, 4, 16
+CLUSTER = LANES * CLUSTER_ROWS
+REACH, ORIGIN_WIDTH = 3, 4  # the place that the planes are seen from, and the distance of the farthest corner from it
+NOT_THERE = 1e18  # the offset of the plane of a lane without a triangle
+# A box along the mean normal: the middle, three axes (the last is the normal), half the sides; then the tangents of the most that a normal
+# around a corner leans from that mean, and from the normal of a triangle with the corner.
+HULL_MIDDLE, HULL_AXES, HULL_HALF, HULL_TANGENT, HULL_OWN_TANGENT, HULL_WIDTH = 0, 3, 12, 15, 16, 17
+
+# --- cells of space with the clusters that may hold the closest point of a place in them -----------------------------------
+
+GRID_LOW, GRID_PER_MM, GRID_BLOCK_MM, GRID_WIDTH = 0, 3, 4, 5  # the lowest corner of the grid of blocks, blocks in a mm, a block in mm
+FAR = -1  # a block or cell has the place of its eight parts, or LISTED - (place of its list), or FAR: nothing is known of it
+LISTED = -2
+MOST_LISTED = 16  # clusters in a list
+LANE_BITS = MOST_LISTED * LANES - 1  # the last bits of a bound, which hold its lane
+NOTHING = -1  # in place of a triangle beyond an edge, where there is none
 
 # What a foot lies on in its triangle: its inside, the edges AB, AC, BC, the corners A, B, C.
 IN_TRIANGLE, EDGE_1, EDGE_2, EDGE_3, CORNER_1, CORNER_2, CORNER_3 = range(7)

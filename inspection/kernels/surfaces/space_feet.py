@@ -56,15 +56,19 @@ def nearby_first(points_mm: Array) -> NDArray[np.int64] | None:
 
     It changes no result, only how far a search has to look, and how often tables come from the cache.
     """
-    finite = np.asarray(np.isfinite(points_mm).all(axis=1))
-    if np.count_nonzero(finite) < AT_ONCE:
+    if len(points_mm) < AT_ONCE:
         return None
+    some = np.linspace(0, len(points_mm) - 2, AT_ONCE).astype(np.int64)
+    here, following = points_mm[some], points_mm[some + 1]
+    known = np.isfinite(here).all(axis=1) & np.isfinite(following).all(axis=1)
+    if not known.any():
+        return None
+    steps = np.abs(following[known] - here[known]).max(axis=1)
+    if np.median(steps) <= _SCATTERED * float(np.ptp(here[known], axis=0).max()):
+        return None
+    finite = np.asarray(np.isfinite(points_mm).all(axis=1))
     low, high = points_mm[finite].min(axis=0), points_mm[finite].max(axis=0)
     size = float((high - low).max())
-    some = np.linspace(0, len(points_mm) - 2, AT_ONCE).astype(np.int64)
-    some = some[finite[some] & finite[some + 1]]
-    if not len(some) or not np.median(np.abs(points_mm[some + 1] - points_mm[some]).max(axis=1)) > _SCATTERED * size:
-        return None
     cell = (np.where(finite[:, None], points_mm - low, 0.0) / size * _CELLS).astype(np.int64)
     key = np.zeros(len(cell), dtype=np.int64)
     for bit in range(_CELLS.bit_length() - 1):  # the bits of the three cells in turn: Morton's order
