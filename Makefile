@@ -173,9 +173,11 @@ airfoils: .venv/test-installed
 audit: .venv/test-installed
 	$(BIN)/python -m tests.benchmarks.verdict_audit
 
-# Whole surfaces: poses found without a start, of whole scans and of parts, and how many points the stated error of clouds covers.
+# Whole surfaces: poses found without a start, of whole scans and of parts, how many points the stated error of clouds covers, and a
+# small defect among a million points.
 surfaces: .venv/test-installed
 	$(BIN)/python -m tests.benchmarks.surface_poses
+	$(BIN)/python -m tests.benchmarks.surface_verdicts
 
 # Every point of every case of the reference set, and every number that is stated of it, found anew by mpmath; takes some minutes.
 reference: .venv/test-installed

@@ -141,11 +141,13 @@ class _Scan:
         return replace(found, nominal_from_scan=found.nominal_from_scan.snap_to_grid())
 
     def _refuse_far(self, found: JudgedPoints) -> None:
-        """Raise NotMeasured where most points lie off the surface."""
+        """Raise NotMeasured where most points lie off the surface, or off its edge by more than is allowed there as well."""
         there = np.count_nonzero(found.rejection != Rejection.NOT_FINITE)
-        off = np.count_nonzero(found.rejection == Rejection.OFF_SURFACE)
+        away = self.terms.farthest_on(self.nominal)
+        far = np.abs(found.feet.distance_mm) > max(away, self.terms.limits_on(self.nominal).end_allowance_mm)
+        beyond = np.count_nonzero((found.rejection == Rejection.BEYOND_EDGE) & far)
+        off = np.count_nonzero(found.rejection == Rejection.OFF_SURFACE) + beyond
         if off > _FAR_OFF * there:
-            away = self.terms.farthest_on(self.nominal)
             raise NotMeasured(
                 f"{off} of {there} points lie more than {away:.4g} mm off the surface: is it the right part, the right unit, and do the "
                 "points lie in the coordinates of the nominal? Else let the pose be fitted, or give a start nearer to it"
@@ -225,6 +227,9 @@ class _Scan:
             if not self.at(rival.snap_to_grid()).count_of(Verdict.NONCONFORM):
                 words = "The part fits the nominal in another pose as well, and there no point is out: only a datum can tell."
                 return Verdict.UNCERTAIN, Reason("placement", words)
+        if not registration.converged or registration.weakest.slides:
+            words = "The points do not place the part at one best fit: elsewhere less may be out."
+            return Verdict.UNCERTAIN, Reason("placement", words)
         enough = self.terms.coverage_min or _PLACED
         if not self.complete or coverage < enough:
             words = f"Too little of the surface was measured ({coverage:.1%}) to place the part: in another placement less may be out."

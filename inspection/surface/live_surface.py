@@ -69,10 +69,13 @@ class LiveSurface:
     nominal : what the points are held against
     terms   : and how
     provisional : False seeks no pose before `finish`, for points that are all there from the start; the result is the same
+
+    Raises InspectionError for terms on which this surface cannot be judged.
     """
 
     def __init__(self, nominal: NominalSurface, terms: SurfaceTerms, provisional: bool = True) -> None:
         self._nominal, self._terms, self._provisional = nominal, terms, provisional
+        terms.limits_on(nominal)  # refused now, not when the scan is over
         self._farthest_mm = terms.farthest_on(nominal)
         self._rows: dict[str, NDArray[Any]] = {name: np.empty((0, *shape), dtype) for name, (shape, dtype) in _COLUMNS.items()}
         self._has_normals = False

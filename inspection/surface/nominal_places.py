@@ -16,6 +16,7 @@ Index = NDArray[np.int64]
 
 _SHARE = 8.0  # spacings in the widest gap that counts as measured
 _FEWEST, _MOST = 4000, 400_000  # places
+_TOLD = 4.0  # spacings in the narrowest gap that can be told
 _OTHERS = 0.7  # times as many places of another pattern show how far these are apart
 _SIDE = 0.67  # of how near a foot must be: what a difference of 1 between unit normals counts for, so that a right angle is too far
 _BETWEEN = 1.1  # for what lies between those
@@ -39,6 +40,11 @@ class NominalPlaces:
 
     def __len__(self) -> int:
         return len(self.places_mm)
+
+
+def finest_gap_mm(nominal: NominalSurface) -> float:
+    """The widest place without points that can be told on a surface of this size is not narrower than this."""
+    return _TOLD * float(np.sqrt(nominal.area_mm2 / _MOST))
 
 
 def spread_places(nominal: NominalSurface, gap_max_mm: float) -> NominalPlaces:

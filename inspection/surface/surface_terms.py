@@ -4,7 +4,9 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 from inspection.conclusion import Limits
+from inspection.errors import InspectionError
 from inspection.surface.feet import NominalSurface
+from inspection.surface.nominal_places import finest_gap_mm
 from inspection.surface.rigid_motion import RigidMotion
 from inspection.surface.surface_fit import SurfaceFreedom
 from inspection.tolerance import ToleranceZone
@@ -84,7 +86,13 @@ class SurfaceTerms:
         return replace(self.zone, uncertainty_mm=self.zone.uncertainty_mm + error, provable=False)
 
     def limits_on(self, nominal: NominalSurface) -> Limits:
-        """What may be missing before conformity is not proven any more."""
+        """What may be missing before conformity is not proven any more. Raises InspectionError where such a gap cannot be told."""
+        finest = finest_gap_mm(nominal)
+        if self.gap_max_mm is not None and self.gap_max_mm < finest:
+            raise InspectionError(
+                f"gap_max_mm is {self.gap_max_mm:g}: on a surface of {nominal.area_mm2:.4g} mm2 no gap below {finest:.2g} mm can be told. "
+                "Allow a wider one"
+            )
         gap = self.gap_max_mm if self.gap_max_mm is not None else max(_GAP * nominal.size_mm, self.allow_unseen_mm or 0.0)
         edge = self.width_mm / 2 if self.edge_allowance_mm is None else self.edge_allowance_mm
         return Limits(self.coverage_min, gap, edge, self.allow_unseen_mm)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from inspection import InspectionError, Missing, NotMeasured, ToleranceZone, Verdict
-from inspection.surface import PatchSurface, RigidMotion, SurfaceTerms, TriangleSurface, judge_surface
+from inspection.surface import LiveSurface, PatchSurface, RigidMotion, SurfaceTerms, TriangleSurface, judge_surface
 from inspection.verdict import NOT_JUDGED, Rejection
 from tests.inspection.surface import faces, meshes
 from tests.inspection.surface.surface_scans import MOTION, NEAR, NOTCHED, WHERE_IT_IS, ZONE, kinds, scan
@@ -110,6 +110,9 @@ def test_what_slides_does_not_conform_unless_the_part_is_round() -> None:
     words = top.reasons[kinds(top).index("pose")].words
     assert "slides" in words
     assert "datum" in words
+    dented = points - 0.3 * (np.linalg.norm(points - (20, 15, 20), axis=1) < 3)[:, None] * normals
+    out = judge_surface(dented[normals[:, 2] > 0.9], plate, replace(wide, coverage_min=0.1))
+    assert (out.verdict, kinds(out)) == (Verdict.UNCERTAIN, ["placement", "pose"])
     held = judge_surface(points[normals[:, 2] > 0.9], plate, replace(wide, locked=("x", "y", "rz")))
     assert "pose" not in kinds(held)
     datum = judge_surface(points[normals[:, 2] > 0.9], plate, replace(wide, locked=("x", "y", "z", "rx", "ry", "rz")))
@@ -222,6 +225,11 @@ def test_a_set_up_that_contradicts_the_points_is_no_verdict() -> None:
         judge_surface(25.4 * points, NOTCHED, WHERE_IT_IS)
     with pytest.raises(InspectionError, match="too few"):
         judge_surface(points[:3], NOTCHED, NEAR)
+    sheet = TriangleSurface(meshes.wave(10))
+    with pytest.raises(NotMeasured, match="coordinates of the nominal"):
+        judge_surface(sheet.sample(500)[0] + 100.0, sheet, WHERE_IT_IS)
+    with pytest.raises(InspectionError, match=r"no gap below 0\.4 mm can be told"):
+        LiveSurface(NOTCHED, replace(NEAR, gap_max_mm=0.1))
     empty = judge_surface(np.empty((0, 3)), NOTCHED, WHERE_IT_IS)
     assert (empty.verdict, kinds(empty)) == (Verdict.UNCERTAIN, ["nothing-judged", "gap"])
     for wrong, told in (
