@@ -24,7 +24,7 @@ export class Rows {
     /** The rows that changed since they were last fetched: from, up to. @type {[number, number]} */
     this.changed = [0, 0];
     this.version = 0; // counts changes
-    /** The worst rows of larger voxels, by their size. @type {Map<number, { version: number, rows: Uint32Array }>} */
+    /** The worst rows of larger voxels, by their size. @type {Map<number, { version: number, middle: number, rows: Uint32Array }>} */
     this.fewer = new Map();
   }
 
@@ -61,7 +61,7 @@ export class Rows {
    */
   few(size, middle) {
     const known = this.fewer.get(size);
-    if (known?.version === this.version) return known.rows;
+    if (known?.version === this.version && known.middle === middle) return known.rows;
     /** @type {Map<number, number>} */
     const worst = new Map();
     for (let row = 0; row < this.count; row++) {
@@ -71,7 +71,7 @@ export class Rows {
       if (isWorse) worst.set(key, row);
     }
     const rows = Uint32Array.from(worst.values());
-    this.fewer.set(size, { version: this.version, rows });
+    this.fewer.set(size, { version: this.version, middle, rows });
     return rows;
   }
 

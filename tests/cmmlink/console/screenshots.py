@@ -34,6 +34,7 @@ from tests.inspection.profiles import AIRFOILS
 from tests.integration.simulated import simulated
 
 from . import test_browser_characteristics as characteristics
+from . import test_browser_surface as whole
 from .conftest import FLAGS, TOKEN
 from .played import CLOSED, Device, batches, measured, opened, setup_of, write_plan
 from .seen import fill_new_plan, look_at_registers
@@ -42,13 +43,15 @@ from .test_browser_records import CT_PLAN
 SIZES = ((1920, 1080), (1366, 768), (800, 600), (360, 740))
 LANGUAGES = ("en-GB", "de-DE")
 THEMES = ("light", "dark")
-VIEWS = ("part", "live", "history", "ct", "trends", "new-plan", "registers", "wall")
+VIEWS = ("part", "live", "history", "ct", "trends", "new-plan", "registers", "surface", "wall")
 
 
 @contextmanager
 def measured_station(folder: Path) -> Iterator[tuple[Station, ConsoleServer, Device]]:
-    """A station at which seven parts were measured, the last with twelve characteristics, and a surface was inspected."""
+    """A station at which eight parts were measured, one as a whole surface and the last with twelve characteristics, and a CT import done."""
     files = {"blade.yaml": write_plan(folder), "vane.yaml": write_plan(folder, "vane.yaml", characteristics.PLAN)}
+    files["block.yaml"] = write(folder / "block.yaml", whole.PLAN)
+    write(folder / "block.stl", binary_stl(whole.BLOCK))
     shutil.copy(AIRFOILS / "goe404.dat", folder)
     surface = folder / "ct.yaml"
     surface.write_text(CT_PLAN, encoding="utf-8")
@@ -71,6 +74,10 @@ def measured_station(folder: Path) -> Iterator[tuple[Station, ConsoleServer, Dev
     server = ConsoleServer(station, "screenshots", token=TOKEN)
     server.start()
     station.list_plans()
+    station.choose("block.yaml")
+    device.source.put(opened(30_000), *batches(whole.scanned(40_000, 0.2), 2000), CLOSED)
+    station.start()
+    assert station.wait(120.0)
     station.choose("blade.yaml")
     for seed, defect_mm in enumerate((0.0, 0.02, 0.12, 0.0, -0.15, 0.01)):
         device.renew()
@@ -114,6 +121,11 @@ def show(page: Page, station: Station, view: str, modbus: str) -> None:
         page.keyboard.press("2")
         page.locator("#open-new-plan").click()
         fill_new_plan(page)
+    elif view == "surface":
+        page.keyboard.press("3")
+        page.locator("#runs tbody tr", has_text="block 4").click()
+        page.keyboard.press("o")
+        page.locator("#surface-regions tbody tr").first.wait_for()
     elif view == "registers":
         page.keyboard.press("2")
         page.locator("#new-device").click()
