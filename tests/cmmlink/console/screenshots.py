@@ -48,7 +48,7 @@ VIEWS = ("part", "live", "history", "ct", "trends", "new-plan", "registers", "su
 
 @contextmanager
 def measured_station(folder: Path) -> Iterator[tuple[Station, ConsoleServer, Device]]:
-    """A station at which eight parts were measured, one as a whole surface and the last with twelve characteristics, and a CT import done."""
+    """A station at which eight parts were measured, one as a whole surface, the last with twelve characteristics, and a CT import."""
     files = {"blade.yaml": write_plan(folder), "vane.yaml": write_plan(folder, "vane.yaml", characteristics.PLAN)}
     files["block.yaml"] = write(folder / "block.yaml", whole.PLAN)
     write(folder / "block.stl", binary_stl(whole.BLOCK))
