@@ -3,6 +3,7 @@
 
 import { fixed, niceStep, signed } from "./numbers.js";
 import { INK, Sheet } from "./sheet.js";
+import { drawNothing } from "./trend_chart.js";
 import { gettext } from "./words.js";
 
 /** @import { TrendStrip } from "./protocol.js" */
@@ -21,6 +22,7 @@ export class HeatStrip {
     this.onPoint = onPoint;
     /** @type {TrendStrip | null} */
     this.strip = null;
+    this.nothing = "";
     /** @type {Cell | null} */
     this.cursor = null;
     this.left = this.right = this.top = this.middle = this.bottom = 0;
@@ -31,9 +33,13 @@ export class HeatStrip {
     element.addEventListener("pointerleave", () => this.point(null));
   }
 
-  /** @param {TrendStrip | null} strip */
-  show(strip) {
+  /**
+   * @param {TrendStrip | null} strip
+   * @param {string} nothing what is said in its place
+   */
+  show(strip, nothing) {
     this.strip = strip;
+    this.nothing = nothing;
     this.cursor = null;
     this.draw();
   }
@@ -83,7 +89,7 @@ export class HeatStrip {
     if (!this.sheet.width) return;
     const { sheet, strip } = this, { text, width, height } = sheet, pen = sheet.pen("ground");
     sheet.pen("cursor");
-    if (!strip) return this.drawNothing(pen);
+    if (!strip) return drawNothing(pen, sheet, this.nothing);
     [this.left, this.right, this.top, this.bottom] = [text * 6.5, width - text, text * 0.3, height - text * 1.9];
     this.middle = this.bottom - (this.bottom - this.top) * DRIFT_SHARE - text * 0.8;
     this.drawCells(pen, strip);
@@ -91,14 +97,6 @@ export class HeatStrip {
     this.drawDrift(pen, strip);
     this.drawStations(pen, strip);
     this.point(this.cursor);
-  }
-
-  /** @param {Pen} pen */
-  drawNothing(pen) {
-    pen.fillStyle = INK.soft;
-    pen.textAlign = "center";
-    pen.textBaseline = "middle";
-    pen.fillText(gettext("no profile on record"), this.sheet.width / 2, this.sheet.height / 2);
   }
 
   /**

@@ -2,7 +2,7 @@
 
 import { fixed, niceStep } from "./numbers.js";
 import { INK, Sheet, label, mark, ring } from "./sheet.js";
-import { gettext, translate } from "./words.js";
+import { translate } from "./words.js";
 
 /** @import { TrendChart, TrendRun } from "./protocol.js" */
 /** @import { Pen } from "./sheet.js" */
@@ -26,6 +26,7 @@ export class ControlChart {
   constructor(element, onPoint) {
     /** @type {Drawn | null} */
     this.drawn = null;
+    this.nothing = "";
     /** @type {number | null} */
     this.cursor = null;
     this.low = this.high = 0;
@@ -37,9 +38,13 @@ export class ControlChart {
     element.addEventListener("pointerleave", () => onPoint(null));
   }
 
-  /** @param {Drawn | null} drawn */
-  show(drawn) {
+  /**
+   * @param {Drawn | null} drawn
+   * @param {string} nothing what is said in its place
+   */
+  show(drawn, nothing) {
     this.drawn = drawn;
+    this.nothing = nothing;
     this.draw();
   }
 
@@ -79,7 +84,7 @@ export class ControlChart {
     if (!this.sheet.width) return;
     const { drawn, sheet } = this, pen = sheet.pen("ground");
     sheet.pen("cursor");
-    if (!drawn) return drawNothing(pen, sheet);
+    if (!drawn) return drawNothing(pen, sheet, this.nothing);
     this.rescale(drawn);
     this.drawTolerance(pen, drawn);
     this.drawAxis(pen);
@@ -209,14 +214,16 @@ export class ControlChart {
 }
 
 /**
+ * Words in place of a drawing.
  * @param {Pen} pen
  * @param {Sheet} sheet
+ * @param {string} words
  */
-function drawNothing(pen, sheet) {
+export function drawNothing(pen, sheet, words) {
   pen.fillStyle = INK.soft;
   pen.textAlign = "center";
   pen.textBaseline = "middle";
-  pen.fillText(gettext("too few values"), sheet.width / 2, sheet.height / 2);
+  pen.fillText(words, sheet.width / 2, sheet.height / 2);
 }
 
 /**

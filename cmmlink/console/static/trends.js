@@ -42,6 +42,7 @@ export class TrendsView {
   /** Ask anew which trends there are, and for the chosen one: a run may have been added. */
   async renew() {
     if (!this.isShown) return;
+    if (!this.trend) this.tell(gettext("looking \u2026"));
     const got = await this.get("/trends", {});
     if (!got.ok) return this.tell(got.message);
     this.choices = /** @type {TrendChoices} */ (got.given);
@@ -78,8 +79,8 @@ export class TrendsView {
   /** Say why there is nothing to be seen. @param {string} problem */
   tell(problem) {
     this.trend = null;
-    for (const chart of this.charts) chart.show(null);
-    this.strip.show(null);
+    for (const chart of this.charts) chart.show(null, "");
+    this.strip.show(null, "");
     this.fill(problem, [], []);
   }
 
@@ -91,9 +92,10 @@ export class TrendsView {
     const runs = trend.rows.map((row) => trend.runs[row]), isSingle = trend.subgroup === 1;
     [trend.location, trend.spread].forEach((chart, k) => {
       const isLocation = k === 0;
-      this.charts[k].show(chart && { chart, runs, hasVerdicts: isLocation && isSingle, isForm: trend.is_form || !isLocation });
+      this.charts[k].show(chart && { chart, runs, hasVerdicts: isLocation && isSingle, isForm: trend.is_form || !isLocation },
+        gettext("too few values"));
     });
-    this.strip.show(trend.strip);
+    this.strip.show(trend.strip, gettext("no profile on record"));
     this.fill(wordsOf(trend), trend.indices, [...trend.drifts, ...trend.notes]);
     put("trend-basis", translate(trend.basis));
     this.point(null);

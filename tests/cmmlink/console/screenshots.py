@@ -131,6 +131,9 @@ def show(page: Page, station: Station, view: str, modbus: str) -> None:
         page.locator("#new-device").click()
         look_at_registers(page, modbus)
     else:
+        if view == "trends":
+            page.keyboard.press("5")
+            page.locator("#trend-notes li").first.wait_for()
         page.keyboard.press(str(("live", "part", "history", "ct", "trends").index(view) + 1))
 
 
