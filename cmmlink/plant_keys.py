@@ -12,6 +12,16 @@ class RunUnreadable(JsonObject):
     problem: str = Field(description="why it cannot be read")
 
 
+class PlantAlarm(JsonObject):
+    """A run that breaks a rule of Western Electric in the trend of a characteristic."""
+
+    run: str = Field(description="its id")
+    part: str = Field(description="the name of the part")
+    serial_number: str = Field(description="the serial number of the part")
+    characteristic: str = Field(description="the name of the characteristic")
+    rule: str = Field(description="the rule in words, and which way it is broken")
+
+
 class PlantOutbox(JsonObject):
     """The answer of `plant push` and `plant status`; with `plant push --stay` there is one a line, whenever something is new."""
 
@@ -27,6 +37,7 @@ class PlantOutbox(JsonObject):
     others: list[str] = Field(
         description="station and id of runs in whose place the database holds others: as where two stations have the same name"
     )
+    alarms: list[PlantAlarm] = Field(description="what the runs that were pushed now have changed in the trends of their parts")
 
 
 class PlantAddress(JsonObject):

@@ -15,7 +15,10 @@ _JUST_AFTER = timedelta(microseconds=1)
 
 
 def trend_alarms(results: "ResultsDatabase", run: "StoredRun") -> Iterator[StoredEvent]:
-    """The alarms of a run that is in the database, held against the runs of its station before it; none of one that ended early."""
+    """The alarms of a run that is in the database, held against the runs of its station before it; none of one that ended early.
+
+    They are the same events each time, so that none is in the database twice.
+    """
     if run.state != "complete":
         return
     for value in run.values:

@@ -3,6 +3,7 @@
 import sys
 import threading
 import time
+from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -155,6 +156,7 @@ def outbox_json(outbox: "Outbox") -> dict[str, Any]:
         "pushed": outbox.pushed or None,
         "unreadable": [{"run": run, "problem": problem} for run, problem in outbox.unreadable.items()],
         "others": list(outbox.others),
+        "alarms": [asdict(alarm) for alarm in outbox.alarms],
     }
 
 
@@ -170,6 +172,9 @@ def _tell(outbox: "Outbox", as_json: bool) -> None:
     typer.echo(printable(f"{added} {outbox.address}; {waits}"))
     for run, problem in outbox.unreadable.items():
         typer.echo(printable(f"not pushed, for it cannot be read: run {run}: {problem}"))
+    for alarm in outbox.alarms:
+        whose = alarm.serial_number or alarm.run
+        typer.echo(printable(f"the process has changed: {alarm.part} {whose}, {alarm.characteristic}: {alarm.rule}"))
     for run in outbox.others:
         typer.echo(
             printable(f"not pushed, for the database has another run of that name and station: {run}; has each station its own name?")

@@ -132,12 +132,16 @@ class StationState:
 
 @dataclass(frozen=True, slots=True)
 class ResultsState:
-    """Where the results of runs are pushed to, and how many runs wait since when, and why; empty address: nowhere."""
+    """Where the results of runs are pushed to, and how many runs wait since when, and why; empty address: nowhere.
+
+    added : how many were pushed since the console was started
+    """
 
     address: str
     waiting: int
     since: str
     problem: str
+    added: int
     type: Literal["results"] = "results"
 
 

@@ -31,7 +31,7 @@ class PushedResults:
     def __init__(self, alarms: Alarms) -> None:
         self._alarms = alarms
         self._is_late, self._known = False, set[str]()
-        self.state = ResultsState("", 0, "", "")
+        self.state = ResultsState("", 0, "", "", 0)
 
     def hear(self, told: Mapping[str, Any]) -> None:
         """Take an answer of the process: an outbox, or why it cannot work."""
@@ -40,7 +40,10 @@ class PushedResults:
             return
         since = local_words(datetime.fromisoformat(told["since"])) if told["since"] else ""
         problem = without_folders(told["problem"] or "")
-        self.state = ResultsState(_without_folder(told["address"]), told["waiting"], since, problem)
+        self.state = ResultsState(_without_folder(told["address"]), told["waiting"], since, problem, self.state.added + told["added"])
+        for one in told["alarms"]:
+            whose = one["serial_number"] or one["run"]
+            self._alarms.raise_alarm("warning", "The process has changed", f"{one['characteristic']} ({whose}): {one['rule']}")
         if told["late"] and not self._is_late:
             self._alarms.raise_alarm("warning", "Results wait to be pushed", f"since {since}: {problem}")
         self._is_late = told["late"]
@@ -53,7 +56,7 @@ class PushedResults:
         problem = without_folders(problem)
         if self.state.problem != problem:
             self._alarms.raise_alarm("warning", "Results cannot be pushed", problem)
-        self.state = ResultsState(self.state.address, self.state.waiting, self.state.since, problem)
+        self.state = ResultsState(self.state.address, self.state.waiting, self.state.since, problem, self.state.added)
 
 
 def _without_folder(address: str) -> str:

@@ -14,12 +14,24 @@ from cmmlink.plant_push.outbox import OutboxState, Waiting, due, in_these_record
 from cmmlink.plant_push.plant_settings import address_for
 from cmmlink.plant_push.recorded_results import judged_again, stored_run
 from cmmlink.record import Nominals, Record, Store, has_records
+from cmmlink.trend_alarms import trend_alarms
 from cmmlink.words import utc_words
 from inspection import InspectionError
 
 _MOST_NOMINALS = 4
-_LATE_S = 86_400.0
+_LATE_S = _ALARMING_S = 86_400.0
 _CANNOT_BE_READ = (StoreError, PlanError, RunError, InspectionError, KeyError)
+
+
+@dataclass(frozen=True, slots=True)
+class TrendAlarm:
+    """A run that breaks a rule of Western Electric in the trend of a characteristic; `rule` in words, and which way."""
+
+    run: str
+    part: str
+    serial_number: str
+    characteristic: str
+    rule: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +46,7 @@ class Outbox:
     away    : whether another attempt may succeed by itself
     pushed  : when something was pushed last, in UTC; empty: never
     unreadable, others : see OutboxState
+    alarms  : what the runs that this attempt pushed have changed in the trends of their parts; of runs of the last day
     """
 
     address: str
@@ -46,6 +59,7 @@ class Outbox:
     pushed: str
     unreadable: dict[str, str]
     others: tuple[str, ...]
+    alarms: tuple[TrendAlarm, ...] = ()
 
 
 def push(folder: Path, now: Callable[[], datetime], *, again: bool = False, tell: Callable[[float], None] = lambda share: None) -> Outbox:
@@ -64,7 +78,8 @@ def push(folder: Path, now: Callable[[], datetime], *, again: bool = False, tell
         begun = in_these_records(replace(state, number=0) if again else state, store)
         pushing = _Pushing(folder, store, begun, now, tell)
         away = pushing.push_all(address)
-        return _outbox(address, pushing.state, waiting(store, pushing.state), now(), pushing.added, away)
+        outbox = _outbox(address, pushing.state, waiting(store, pushing.state), now(), pushing.added, away)
+        return replace(outbox, alarms=tuple(pushing.alarms))
 
 
 def outbox_of(folder: Path, now: Callable[[], datetime]) -> Outbox:
@@ -87,6 +102,7 @@ class _Pushing:
 
     def __init__(self, folder: Path, store: Store, state: OutboxState, now: Callable[[], datetime], tell: Callable[[float], None]) -> None:
         self.state, self.added = state, 0
+        self.alarms: list[TrendAlarm] = []
         self._folder, self._store, self._now, self._tell = folder, store, now, tell
         self._nominals = Nominals(_MOST_NOMINALS)
 
@@ -123,11 +139,22 @@ class _Pushing:
                 unreadable[str(record.run)] = f"{error}"[:200]
         added = database.add_runs(runs) if runs else []
         self.added += added.count("added")
+        self._look_at_trends(database, [run for run, how in zip(runs, added, strict=True) if how != "another"])
         others = (f"{run.station} {run.run}" for run, how in zip(runs, added, strict=True) if how == "another")
         last = records[-1]
         pushed = utc_words(self._now()) if runs else self.state.pushed
         self.state = replace(self.state, number=last.number, sha256=last.sha256.hex(), pushed=pushed).with_trouble(unreadable, others)
         keep_state(self._folder, self.state)
+
+    def _look_at_trends(self, database: ResultsDatabase, runs: Sequence[StoredRun]) -> None:
+        """Add what runs have changed in the trends of their parts; that of an older run helps nobody any more."""
+        for run in runs:
+            if (self._now() - run.started).total_seconds() > _ALARMING_S:
+                continue
+            for event in trend_alarms(database, run):
+                database.add_event(event)
+                rule = event.words.removeprefix(f"{event.characteristic}: ")
+                self.alarms.append(TrendAlarm(run.run, run.part, run.serial_number, event.characteristic, rule))
 
 
 def _outbox(address: str, state: OutboxState, left: Waiting, now: datetime, added: int = 0, away: bool = False) -> Outbox:

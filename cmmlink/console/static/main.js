@@ -24,7 +24,7 @@ import { Timing } from "./timing.js";
 import { TrendsView } from "./trends.js";
 import { gettext, translate, translateElements } from "./words.js";
 
-/** @import { AlarmRow, CharacteristicList, Command, Hello, History as RunHistory, Message, PlanSaved, ShownRun } from "./protocol.js" */
+/** @import { AlarmRow, CharacteristicList, Command, Hello, Message, PlanSaved, ShownRun } from "./protocol.js" */
 /** @import { Cursor } from "./drawing.js" */
 /** @import { LinkState, Outcome } from "./link.js" */
 /** @import { Heard } from "./card.js" */
@@ -91,11 +91,12 @@ function onMessage(message) {
   else if (message.type === "station") heard.station = message;
   else if (message.type === "control") heard.control = message;
   else if (message.type === "alarms") [alarms, heard.hasFault] = [message.alarms, message.fault];
-  else if (message.type === "history") takeHistory(message);
+  else if (message.type === "history") history.show(message.runs);
   else if (message.type === "found" || message.type === "results") history.hear(message);
   else if (message.type === "ct") ctView.show((heard.surface = message));
   else if (message.type === "registers") registersView.show(message);
   else if (message.type === "alive") clock = { nowMs: message.now_ms, at: performance.now() };
+  if (message.type === "results") trendsView.renew(); // a run may have been added
   rewrite();
 }
 
@@ -126,12 +127,6 @@ function takeRun({ run, recorded }) {
   heard.isRecorded = recorded;
   if (isNew && heard.view !== "wall") go("live");
   redraw();
-}
-
-/** @param {RunHistory} message */
-function takeHistory({ runs }) {
-  history.show(runs);
-  trendsView.renew();
 }
 
 /** @param {CharacteristicList} message */

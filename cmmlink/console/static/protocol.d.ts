@@ -97,12 +97,13 @@ export interface StationState {
   readonly type: "station";
 }
 
-/** Where the results of runs are pushed to, and how many runs wait since when, and why; empty address: nowhere. */
+/** Where the results of runs are pushed to, and how many runs wait since when, and why; empty address: nowhere. added : how many were pushed since the console was started */
 export interface ResultsState {
   readonly address: string;
   readonly waiting: number;
   readonly since: string;
   readonly problem: string;
+  readonly added: number;
   readonly type: "results";
 }
 

@@ -4,7 +4,8 @@ import hashlib
 import json
 import shutil
 import threading
-from datetime import UTC, datetime
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -230,10 +231,40 @@ class Heard(PushedResults):
         self.come.set()
 
 
+def test_a_run_that_leaves_its_trend_is_an_alarm_once_and_an_event(records: Path) -> None:
+    push(records, today)
+    bad, good = stored(file_of(records), station_of(records))
+    (value,) = good.values
+    assert value.value is not None
+    before = [
+        replace(
+            good,
+            run=f"before-{k}",
+            part=bad.part,
+            started=bad.started - timedelta(hours=k + 1),
+            values=(replace(value, value=value.value + k % 3 * 1e-4),),
+        )
+        for k in range(24)
+    ]
+    other = records / "other.sqlite"
+    with ResultsDatabase(other) as database:
+        database.add_runs(before)
+    keep_address(records, str(other))
+    told = cmmlink("plant", "push", "--records", records)
+    assert told.code == 0
+    rule = "one value beyond three standard deviations, upwards"
+    whose = bad.serial_number or bad.run
+    assert told.out.splitlines()[1:] == [f"the process has changed: {bad.part} {whose}, {value.name}: {rule}"]
+    assert push(records, today, again=True).alarms[0].rule == rule
+    with ResultsDatabase(other) as database:
+        (event,) = database.events(kind="trend alarm")
+    assert (event.run, event.words) == (bad.run, f"{value.name}: {rule}")
+
+
 def test_the_console_pushes_by_another_process_that_ends_with_it(records: Path) -> None:
     heard = Heard()
     with pushing(records, heard):
         assert heard.come.wait(60)
     assert not [thread for thread in threading.enumerate() if thread.name == "results"], "it has ended, and its process with it"
-    assert heard.state == ResultsState("plant.sqlite", 0, "", "")
+    assert heard.state == ResultsState("plant.sqlite", 0, "", "", 2)
     assert len(stored(file_of(records), station_of(records))) == heard.told[0]["added"] == 2
