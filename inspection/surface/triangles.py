@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 _APART = 0.01  # of the size: how far along its normal a triangle is moved before near ones are gathered, so that thin walls come apart
+_SLENDER, _GOLDEN = 0.2, 0.6180339887498949  # of the square of its longest side: twice the area of a slender triangle
 _GRAIN = 1e-14  # of the farthest coordinate: a distance that is round-off
 
 
@@ -73,8 +74,12 @@ class TriangleSurface:
         a, e, g = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
         cross = np.cross(e, g)
         twice = np.linalg.norm(cross, axis=1)
+        twice = np.linalg.norm(np.cross(e, g), axis=1)
         owner = shares_of(twice, count)
         first, second = spread_within(owner)
+        longest = np.maximum((e**2).sum(axis=1), np.maximum((g**2).sum(axis=1), ((g - e) ** 2).sum(axis=1)))
+        phase = np.where(twice < _SLENDER * longest, np.arange(len(twice)) * _GOLDEN % 1.0, 0.0)  # or a fan of slivers shows rings
+        first = (first + phase[owner]) % 1.0
         root = np.sqrt(first)
         places = a[owner] + (root * (1 - second))[:, None] * e[owner] + (root * second)[:, None] * g[owner]
         return places, (cross / twice[:, None])[owner]

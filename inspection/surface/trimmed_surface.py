@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Truth = NDArray[np.bool_]
 
+_DRAWS, _MORE, _FEW = 8, 1.05, 100  # rounds in which places are drawn: so many times as many, and some, where too few lay inside loops
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrimmedFace:
@@ -99,8 +101,23 @@ class TrimmedSurface:
         return _with_rows(feet, rest, self._project_apart(points[rest], threads)) if len(rest) else feet
 
     def sample(self, count: int) -> tuple[Array, Array]:
-        """At least `count` places (n, 3) spread over the area, and the normals (n, 3) there, by the triangles."""
-        return self._mesh.sample(count)
+        """At least `count` places (n, 3) spread over the area, and the outward normals (n, 3) there: on splines inside their loops."""
+        found: list[tuple[Array, Array]] = []
+        hidden = 0
+        if self._hidden is not None:
+            found.append(self._hidden.sample(int(np.ceil(count * self._hidden.area_mm2 / self.area_mm2))))
+            hidden = len(found[0][0])
+        wanted = max(count - hidden, 1)
+        drawn = int(np.ceil(count * self._splines.area_mm2 / self.area_mm2))
+        for _ in range(_DRAWS):
+            feet = self._splines.project(self._splines.sample(drawn)[0])
+            inside = self._are_inside(replace(feet, face=self._numbers[feet.face]))
+            kept = int(np.count_nonzero(inside))
+            if kept >= wanted:
+                found.append((feet.foot_mm[inside], feet.normal[inside]))
+                return np.concatenate([places for places, _ in found]), np.concatenate([normals for _, normals in found])
+            drawn = int(drawn * _MORE * wanted / max(kept, 1)) + _FEW
+        return self._mesh.sample(count)  # loops that hold next to nothing
 
     def _are_inside(self, feet: SurfaceFeet) -> Truth:
         """Whether feet on the splines (m,) lie inside the loops of their faces."""

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from inspection import NominalError, Rejection
 from inspection.kernels.surfaces.space_feet import nearby_first
@@ -171,3 +172,15 @@ def test_what_makes_no_surface_is_refused() -> None:
         TriangleSurface(np.zeros((5, 3, 3)))
     with pytest.raises(NominalError, match="error of the nominal"):
         TriangleSurface(meshes.sphere(4), nominal_error_mm=-1.0)
+
+
+def test_places_on_a_fan_of_slivers_are_spread_evenly() -> None:
+    """Slivers from one corner to a far rim, as CAD systems cut a plane: rows of places in step would leave rings free."""
+    angle = np.linspace(0, 0.5, 400)
+    rim = np.column_stack([50 * np.cos(angle), 50 * np.sin(angle), np.zeros(400)])
+    surface = TriangleSurface(np.stack([np.zeros((399, 3)), rim[:-1], rim[1:]], axis=1))
+    places, _ = surface.sample(3000)
+    spacing = np.sqrt(surface.area_mm2 / len(places))
+    at, turn = 50 * np.sqrt(np.linspace(0.001, 0.999, 80)), np.linspace(0.01, 0.49, 60)
+    everywhere = np.stack([np.outer(at, np.cos(turn)), np.outer(at, np.sin(turn)), np.zeros((80, 60))], axis=-1).reshape(-1, 3)
+    assert np.max(cKDTree(places).query(everywhere)[0]) < 3 * spacing

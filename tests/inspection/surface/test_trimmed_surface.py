@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from inspection import NominalError
 from inspection.surface import FootKind, TriangleSurface, TrimmedFace, TrimmedSurface
@@ -80,6 +81,19 @@ def test_no_bit_depends_on_the_batch_and_what_is_not_finite_has_no_foot() -> Non
         assert np.array_equal(getattr(together, name), np.concatenate([getattr(each, name) for each in apart]), equal_nan=True)
     assert together.kind[7] == FootKind.NONE
     assert (surface.is_closed, len(surface), surface.nominal_error_mm) == (True, 8, BOUND_MM)
+
+
+@pytest.mark.parametrize("hidden", [None, 1])
+def test_places_are_spread_evenly_within_loops(hidden: int | None) -> None:
+    surface = notched(hidden)
+    places, normals = surface.sample(3000)
+    assert 3000 <= len(places) < 3300
+    truth = TriangleSurface(meshes.prism(meshes.NOTCHED, HEIGHT))
+    assert np.abs(truth.project(places).distance_mm).max() < 1e-12
+    assert (truth.project(places + 1e-3 * normals).distance_mm > 5e-4).all()
+    spacing = np.sqrt(surface.area_mm2 / len(places))
+    everywhere, _ = truth.sample(9000)
+    assert np.max(cKDTree(places).query(everywhere)[0]) < 1.8 * spacing
 
 
 def test_a_loop_knows_what_lies_inside_it_by_more_than_it_may_be_off() -> None:
