@@ -27,7 +27,7 @@ def directions(count: int) -> Array:
 
 
 def ball(deviation_mm: Array, at: Array, **more: object) -> JudgedSurface:
-    places = directions(60_000)
+    places = directions(40_000)
     worst = int(np.argmax(np.abs(deviation_mm - ZONE.middle_mm)))
     given = {"reach_mm": 1.0, "worst": worst} | more
     area = 4 * np.pi * RADIUS_MM**2
