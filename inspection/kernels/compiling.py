@@ -82,6 +82,19 @@ def inlined_kernel(function: _Function) -> _Function:
     return inner_kernel(function, forceinline=True)
 
 
+def uncounted_kernel(function: _Function, **options: bool) -> _Function:
+    """Compile for other kernels alone, where arrays are handed on without counting who holds them: counting takes as long as the work.
+
+    It must not make arrays, nor return any.
+    """
+    return inner_kernel(function, _nrt=False, **options)
+
+
+def inlined_uncounted_kernel(function: _Function) -> _Function:
+    """The same with forced inlining."""
+    return uncounted_kernel(function, forceinline=True)
+
+
 def code_of(function: Callable[..., None], *given: types.Type) -> int:
     """Where in memory the code of a kernel is for arguments of these types. It is compiled, or loaded, where that was not done yet."""
     code, described = attrgetter("library", "fndesc")(cast(Any, function).get_compile_result(types.void(*given)))

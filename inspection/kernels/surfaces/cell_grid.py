@@ -4,11 +4,11 @@ from typing import Any
 
 import numpy as np
 
-from inspection.kernels.compiling import inlined_kernel
+from inspection.kernels.compiling import inlined_uncounted_kernel
 from inspection.kernels.surfaces.layout import FAR, GRID_LOW, GRID_PER_MM, LISTED
 
 
-@inlined_kernel
+@inlined_uncounted_kernel
 def list_at(grid: Any, blocks: Any, cells: Any, x: float, y: float, z: float) -> Any:
     """Where the list of the cell of a place begins; FAR for a place off the grid, or in a cell without one."""
     per = grid[GRID_PER_MM]

@@ -5,7 +5,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from inspection.kernels.compiling import array_at, claim_chunk, inlined_kernel, inner_kernel, kernel, stack_integers, stack_reals
+from inspection.kernels.compiling import (
+    array_at,
+    claim_chunk,
+    inlined_uncounted_kernel,
+    kernel,
+    stack_integers,
+    stack_reals,
+    uncounted_kernel,
+)
 from inspection.kernels.layout import CHUNK
 from inspection.kernels.surfaces.layout import (
     BORDER_STEPS,
@@ -116,7 +124,7 @@ def _project_chunks(points: Any, tables: Any, feet: Any, claimed: Any) -> None:
         begin = claim_chunk(claimed) // CHUNK * AT_ONCE
 
 
-@inlined_kernel
+@inlined_uncounted_kernel
 def _square_from_box(rows: Any, row: int, x: float, y: float, z: float) -> float:
     """Square of the distance from the box of a piece."""
     x, y, z = x - rows[row + BOX_MIDDLE], y - rows[row + BOX_MIDDLE + 1], z - rows[row + BOX_MIDDLE + 2]
@@ -129,7 +137,7 @@ def _square_from_box(rows: Any, row: int, x: float, y: float, z: float) -> float
     return square
 
 
-@inlined_kernel
+@inlined_uncounted_kernel
 def _normal(px: Any, py: Any, pz: Any, rows: Any, row: int, width: int, s: float, t: float) -> tuple[float, float, float]:
     """The unit normal out of material at a place of a piece by its derivatives; at a pole that of a place beside it."""
     nx, ny, nz = py[1] * pz[2] - pz[1] * py[2], pz[1] * px[2] - px[1] * pz[2], px[1] * py[2] - py[1] * px[2]
@@ -142,7 +150,7 @@ def _normal(px: Any, py: Any, pz: Any, rows: Any, row: int, width: int, s: float
     return nx * outward, ny * outward, nz * outward
 
 
-@inner_kernel
+@uncounted_kernel
 def _store_foot(x: float, y: float, z: float, tables: Any, piece: int, s: float, t: float, feet: Any, i: int) -> None:
     """Fill in the results for the foot at (s, t) of a piece, or for the edge or corner that holds it back."""
     rows, width = tables.rows, tables.width
@@ -177,7 +185,7 @@ def _store_foot(x: float, y: float, z: float, tables: Any, piece: int, s: float,
     feet.parameter[i, 1] = rows[row + PIECE_V] + t * rows[row + PIECE_DV]
 
 
-@inner_kernel
+@uncounted_kernel
 def _on_border(borders: Any, row: int, along: float) -> tuple[float, float, float, float]:
     """The unit pseudonormal at a place of a border, and a number above 0 where nothing adjoins there."""
     place = (along + HALF) * BORDER_STEPS

@@ -10,7 +10,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from inspection.kernels.compiling import array_at, claim_chunk, inlined_kernel, inner_kernel, kernel, stack_integers, stack_reals
+from inspection.kernels.compiling import (
+    array_at,
+    claim_chunk,
+    inlined_uncounted_kernel,
+    kernel,
+    stack_integers,
+    stack_reals,
+    uncounted_kernel,
+)
 from inspection.kernels.layout import CHUNK
 from inspection.kernels.surfaces.cell_grid import list_at
 from inspection.kernels.surfaces.layout import FAR, IN_TRIANGLE, LANE_BITS, LANES, MOST_LISTED, ON_FACE, SCRATCH, STACK
@@ -111,7 +119,7 @@ def _project_chunks(points: Any, tables: Any, feet: Any, claimed: Any) -> None:
         begin = claim_chunk(claimed) // CHUNK * AT_ONCE
 
 
-@inlined_kernel
+@inlined_uncounted_kernel
 def closest_in_list(
     planes: Any, origins: Any, corners: Any, triangles: Any, lists: Any, at: Any, clusters: Any, x: float, y: float, z: float, bounds: Any
 ) -> tuple[Any, ...]:
@@ -138,7 +146,7 @@ def closest_in_list(
     return best, square, place, p, q
 
 
-@inner_kernel
+@uncounted_kernel
 def closest_in_tree(shape: Any, tree: Any, x: float, y: float, z: float, bounds: Any) -> tuple[Any, ...]:
     """The same of all clusters.
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from inspection.kernels.compiling import fma, inlined_kernel, inner_kernel
+from inspection.kernels.compiling import fma, inlined_uncounted_kernel, uncounted_kernel
 from inspection.kernels.surfaces.layout import (
     COEFFICIENTS,
     HALF,
@@ -38,7 +38,7 @@ _STILL_MM = 1e-12  # a step after which nothing changes; in mm, since the round-
 _UPHILL, _UPHILL_MM2 = 1.0 + 1e-12, 1e-24  # by less a square of a distance grows through round-off alone
 
 
-@inlined_kernel
+@inlined_uncounted_kernel
 def _derivatives(rows: Any, first: int, width: int, s: float, t: float) -> tuple[float, ...]:
     """Value of one coordinate and its derivatives by s, t, ss, st, tt, by Horner's rule in both directions."""
     f = fs = fss = ft = fst = ftt = 0.0
@@ -52,7 +52,7 @@ def _derivatives(rows: Any, first: int, width: int, s: float, t: float) -> tuple
     return f, fs, ft, 2.0 * fss, fst, 2.0 * ftt
 
 
-@inner_kernel
+@uncounted_kernel
 def piece_at(rows: Any, row: int, width: int, s: float, t: float) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
     """Value and derivatives by s, t, ss, st, tt of x, y and z at a place of a piece."""
     first = row + COEFFICIENTS
@@ -67,7 +67,7 @@ def piece_at(rows: Any, row: int, width: int, s: float, t: float) -> tuple[tuple
     return x, y, z
 
 
-@inner_kernel
+@uncounted_kernel
 def _square_at(rows: Any, row: int, width: int, x: float, y: float, z: float, s: float, t: float) -> tuple[float, ...]:
     """Square of the distance, half its gradient (2), half its Hessian (ss, st, tt), and the squares of S_s, S_t, S_ss, S_st, S_tt."""
     px, py, pz = piece_at(rows, row, width, s, t)
@@ -85,7 +85,7 @@ def _square_at(rows: Any, row: int, width: int, x: float, y: float, z: float, s:
     return rx * rx + ry * ry + rz * rz, g, h, a, b, c, e, k, ss, st, tt
 
 
-@inlined_kernel
+@inlined_uncounted_kernel
 def _strays(
     rows: Any, row: int, distance: float, e: float, k: float, ss: float, st: float, tt: float, hs: float, ht: float
 ) -> tuple[float, float, float]:
@@ -101,7 +101,7 @@ def _strays(
     return stray_a, stray_b, stray_c
 
 
-@inner_kernel
+@uncounted_kernel
 def closest_on_piece(rows: Any, row: int, width: int, x: float, y: float, z: float, memory: Any) -> tuple[float, float, float]:
     """Square of the distance of the closest point of a piece, and where it is, (s, t).
 
@@ -144,7 +144,7 @@ def closest_on_piece(rows: Any, row: int, width: int, x: float, y: float, z: flo
     return best, best_s, best_t
 
 
-@inlined_kernel
+@inlined_uncounted_kernel
 def _downhill(gradient: float, bend: float, half: float) -> float:
     """The step to where g x + b x^2 / 2 is least within half a side."""
     if bend * half > abs(gradient):
@@ -152,7 +152,7 @@ def _downhill(gradient: float, bend: float, half: float) -> float:
     return -half if gradient > 0.0 else half
 
 
-@inlined_kernel
+@inlined_uncounted_kernel
 def _gain(gradient: float, bend: float, half: float) -> float:
     """By how much g x + b x^2 / 2 can fall, doubled, within half a side of its middle, for a gradient g and a bend that is b at least."""
     if bend * half > abs(gradient):
@@ -160,7 +160,7 @@ def _gain(gradient: float, bend: float, half: float) -> float:
     return 2.0 * abs(gradient) * half - bend * half * half
 
 
-@inlined_kernel
+@inlined_uncounted_kernel
 def _halve(memory: Any, waiting: int, s: float, t: float, hs: float, ht: float, gradient: float, across_s: bool) -> int:
     """Put the halves of a rectangle on the stack, on top the one that lies downhill. Each halving adds one, and there are few."""
     half_s, half_t = (0.5 * hs, ht) if across_s else (hs, 0.5 * ht)
@@ -174,7 +174,7 @@ def _halve(memory: Any, waiting: int, s: float, t: float, hs: float, ht: float, 
     return waiting + 2
 
 
-@inner_kernel
+@uncounted_kernel
 def _newton(
     rows: Any,
     row: int,

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from inspection.kernels.compiling import inlined_kernel, inner_kernel
+from inspection.kernels.compiling import inlined_uncounted_kernel, uncounted_kernel
 from inspection.kernels.feet import flatten, share_out
 from inspection.kernels.surfaces.layout import BOX_HIGH, BOX_LOW, BOX_SIDES, LEAF, NO_FOOT, SQUARES_OF_EIGHT, WAYS
 
@@ -94,7 +94,7 @@ def _empty_feet(m: int) -> SpaceFeet:
     )
 
 
-@inner_kernel
+@uncounted_kernel
 def store_no_foot(feet: Any, i: int) -> None:
     """Enter that point i has no foot."""
     feet.foot_mm[i, :] = np.nan
@@ -103,7 +103,7 @@ def store_no_foot(feet: Any, i: int) -> None:
     feet.distance_mm[i], feet.item[i], feet.kind[i] = np.nan, -1, NO_FOOT
 
 
-@inlined_kernel
+@inlined_uncounted_kernel
 def square_from_last(foot_mm: Any, i: int, begin: int, x: float, y: float, z: float) -> float:
     """A bound of the square of the distance of point i: that from the foot of the point before, in the order of a scan close by.
 
@@ -115,7 +115,7 @@ def square_from_last(foot_mm: Any, i: int, begin: int, x: float, y: float, z: fl
     return float((dx * dx + dy * dy + dz * dz) * (1.0 + 1e-9) + 1e-18)  # the foot itself is rounded
 
 
-@inlined_kernel
+@inlined_uncounted_kernel
 def next_leaf(nodes: Any, links: Any, x: float, y: float, z: float, least: float, depth: int, waiting: Any, squares: Any) -> Any:
     """The next leaf whose box is not farther than `least` (a square), nearest boxes first, and how many nodes wait then.
 
@@ -134,7 +134,7 @@ def next_leaf(nodes: Any, links: Any, x: float, y: float, z: float, least: float
     return -1, depth
 
 
-@inlined_kernel
+@inlined_uncounted_kernel
 def _push_children(
     nodes: Any, links: Any, node: int, x: float, y: float, z: float, least: float, depth: int, waiting: Any, squares: Any
 ) -> int:

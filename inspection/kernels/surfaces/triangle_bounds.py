@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from inspection.kernels.compiling import as_wide_as_can_be, bits_of, fma, inlined_kernel
+from inspection.kernels.compiling import as_wide_as_can_be, bits_of, fma, inlined_uncounted_kernel
 from inspection.kernels.surfaces.layout import (
     CLUSTER,
     LANE_BITS,
@@ -30,7 +30,7 @@ NEVER: Any = np.int32(0x7FFFFFFF)  # a bound that is no longer asked for
 _ZERO: Any = np.float32(0.0)
 
 
-@inlined_kernel
+@inlined_uncounted_kernel
 def enter_bounds(planes: Any, origins: Any, cluster: Any, x: float, y: float, z: float, bounds: Any, first: int) -> None:
     """Enter the bounds of the triangles of a cluster in places from `first` on; the lane of a bound is its place."""
     as_wide_as_can_be()
@@ -42,7 +42,7 @@ def enter_bounds(planes: Any, origins: Any, cluster: Any, x: float, y: float, z:
         bounds[first + j] = np.int32((bits_of(fma(height, height, beyond * beyond) * _LESS) & ~LANE_BITS) | (first + j))
 
 
-@inlined_kernel
+@inlined_uncounted_kernel
 def may_be_closest(
     planes: Any, origins: Any, cluster: Any, x: float, y: float, z: float, radius: float, tangent: float, within: float
 ) -> bool:
@@ -64,7 +64,7 @@ def may_be_closest(
     return bool(found != 0)
 
 
-@inlined_kernel
+@inlined_uncounted_kernel
 def _from_origin(origins: Any, cluster: Any, x: float, y: float, z: float) -> tuple[Any, ...]:
     """A place from the origin of a cluster, and the round-off of distances from its planes."""
     at = cluster * ORIGIN_WIDTH
@@ -72,20 +72,20 @@ def _from_origin(origins: Any, cluster: Any, x: float, y: float, z: float) -> tu
     return wx, wy, wz, _ROUND_OFF * (abs(wx) + abs(wy) + abs(wz) + np.float32(origins[at + REACH]))
 
 
-@inlined_kernel
+@inlined_uncounted_kernel
 def _height_and_beyond(planes: Any, here: int, wx: Any, wy: Any, wz: Any) -> tuple[Any, Any]:
     """The distance from the plane of a triangle, and how far beyond one of its edges."""
     beyond = max(_off(planes, here + PLANE_AB * LANES, wx, wy, wz), _off(planes, here + PLANE_AC * LANES, wx, wy, wz))
     return abs(_off(planes, here + OWN_PLANE * LANES, wx, wy, wz)), max(beyond, _off(planes, here + PLANE_BC * LANES, wx, wy, wz))
 
 
-@inlined_kernel
+@inlined_uncounted_kernel
 def _off(planes: Any, at: int, wx: Any, wy: Any, wz: Any) -> Any:
     """The distance from a plane, with its side."""
     return fma(planes[at], wx, fma(planes[at + LANES], wy, fma(planes[at + 2 * LANES], wz, planes[at + 3 * LANES])))
 
 
-@inlined_kernel
+@inlined_uncounted_kernel
 def least_bound(bounds: Any, count: int) -> Any:
     """The least of the bounds at the first places."""
     least = bounds[0]
@@ -94,7 +94,7 @@ def least_bound(bounds: Any, count: int) -> Any:
     return least
 
 
-@inlined_kernel
+@inlined_uncounted_kernel
 def bound_of(square: float) -> Any:
     """What no bound of a triangle as near as the root of a square exceeds."""
     return bits_of(np.float32(square * _MORE)) | np.int32(LANE_BITS)

@@ -14,7 +14,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from inspection.kernels.compiling import array_at, inlined_kernel, inner_kernel, kernel, stack_integers, stack_reals
+from inspection.kernels.compiling import (
+    array_at,
+    inlined_uncounted_kernel,
+    inner_kernel,
+    kernel,
+    stack_integers,
+    stack_reals,
+    uncounted_kernel,
+)
 from inspection.kernels.surfaces.layout import (
     FAR,
     GRID_BLOCK_MM,
@@ -88,7 +96,7 @@ def fill_cells(tables: TriangleTables, hulls: Any, near: Any, reach_mm: float, e
                 _cut(shape, hulls, x, y, z, half, reach_mm, enough, deepest, block, count, kept, off, bounds, memory)
 
 
-@inner_kernel
+@uncounted_kernel
 def _gather(tree: Any, within: float, x: float, y: float, z: float, kept: Any) -> int:
     """Enter the clusters whose boxes in the tree lie within a distance; 0 where there are too many."""
     nodes, links, waiting, squares = tree
@@ -154,7 +162,7 @@ def _cut(
             _enter_list(memory, cell, kept, first, count)
 
 
-@inlined_kernel
+@inlined_uncounted_kernel
 def _is_cut(cells: Any, used: Any, cell: int, count: int, enough: int, depth: int, deepest: int) -> bool:
     """Whether a cell is cut: its parts are FAR then, and it holds where they begin."""
     if count <= enough or depth == deepest or used[0] + _PARTS > len(cells):
@@ -166,7 +174,7 @@ def _is_cut(cells: Any, used: Any, cell: int, count: int, enough: int, depth: in
     return True
 
 
-@inlined_kernel
+@inlined_uncounted_kernel
 def _enter_list(memory: Any, cell: int, kept: Any, first: int, count: int) -> None:
     """Enter the list of a cell, unless it is the one before: neighbours often have the same."""
     cells, lists, used = memory
@@ -188,7 +196,7 @@ def _enter_list(memory: Any, cell: int, kept: Any, first: int, count: int) -> No
     cells[cell] = LISTED - at
 
 
-@inner_kernel
+@uncounted_kernel
 def _keep(
     shape: Any,
     hulls: Any,
@@ -235,7 +243,7 @@ def _keep(
     return found, distance
 
 
-@inlined_kernel
+@inlined_uncounted_kernel
 def _from_hull(hulls: Any, row: int, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Square of the distance from a box, how much of it lies across its normal, and the height over its middle."""
     x, y, z = x - hulls[row + HULL_MIDDLE], y - hulls[row + HULL_MIDDLE + 1], z - hulls[row + HULL_MIDDLE + 2]
@@ -247,12 +255,12 @@ def _from_hull(hulls: Any, row: int, x: float, y: float, z: float) -> tuple[floa
     return across + third * third, np.sqrt(across), height
 
 
-@inlined_kernel
+@inlined_uncounted_kernel
 def _along(hulls: Any, at: int, x: float, y: float, z: float) -> float:
     return float(hulls[at] * x + hulls[at + 1] * y + hulls[at + 2] * z)
 
 
-@inner_kernel
+@uncounted_kernel
 def _square_of_cluster(shape: Any, cluster: int, x: float, y: float, z: float, least: float, bounds: Any) -> float:
     """The lesser of a square and that of the distance from the triangles of a cluster."""
     planes, origins, corners, triangles = shape

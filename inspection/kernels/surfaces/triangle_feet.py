@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from inspection.kernels.compiling import inlined_kernel, inner_kernel
+from inspection.kernels.compiling import inlined_uncounted_kernel, uncounted_kernel
 from inspection.kernels.surfaces.layout import (
     CORNER_1,
     CORNER_2,
@@ -23,29 +23,29 @@ from inspection.kernels.surfaces.layout import (
 )
 
 
-@inlined_kernel
+@inlined_uncounted_kernel
 def _dot(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> float:
     return ax * bx + ay * by + az * bz
 
 
-@inlined_kernel
+@inlined_uncounted_kernel
 def _cross(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> tuple[float, float, float]:
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
-@inlined_kernel
+@inlined_uncounted_kernel
 def _held(t: float) -> float:
     return min(max(t, 0.0), 1.0)
 
 
-@inlined_kernel
+@inlined_uncounted_kernel
 def _square_off(wx: float, wy: float, wz: float, t: float, ex: float, ey: float, ez: float) -> float:
     """Square of w - t e."""
     dx, dy, dz = wx - t * ex, wy - t * ey, wz - t * ez
     return dx * dx + dy * dy + dz * dz
 
 
-@inlined_kernel
+@inlined_uncounted_kernel
 def _edges(corners: Any, triangles: Any, triangle: Any) -> tuple[Any, ...]:
     """The corner A of a triangle and its edges AB and AC."""
     a, b, c = 3 * triangles[3 * triangle], 3 * triangles[3 * triangle + 1], 3 * triangles[3 * triangle + 2]
@@ -53,7 +53,7 @@ def _edges(corners: Any, triangles: Any, triangle: Any) -> tuple[Any, ...]:
     return ax, ay, az, corners[b] - ax, corners[b + 1] - ay, corners[b + 2] - az, corners[c] - ax, corners[c + 1] - ay, corners[c + 2] - az
 
 
-@inlined_kernel
+@inlined_uncounted_kernel
 def closest_on_triangle(corners: Any, triangles: Any, triangle: Any, x: float, y: float, z: float) -> tuple[Any, ...]:
     """Square of the distance of the closest point of a triangle, what it lies on, and its weights of B and C."""
     ax, ay, az, ex, ey, ez, gx, gy, gz = _edges(corners, triangles, triangle)
@@ -81,14 +81,14 @@ def closest_on_triangle(corners: Any, triangles: Any, triangle: Any, x: float, y
     return square, place, p, q
 
 
-@inlined_kernel
+@inlined_uncounted_kernel
 def _unit_normal(ex: float, ey: float, ez: float, gx: float, gy: float, gz: float) -> tuple[float, float, float]:
     mx, my, mz = _cross(ex, ey, ez, gx, gy, gz)
     length = np.sqrt(_dot(mx, my, mz, mx, my, mz))
     return mx / length, my / length, mz / length
 
 
-@inlined_kernel
+@inlined_uncounted_kernel
 def foot_in_triangle(corners: Any, triangles: Any, triangle: Any, x: float, y: float, z: float) -> tuple[Any, ...]:
     """The foot (3) inside a triangle, the distance with its side, and the direction (3) in which that grows."""
     ax, ay, az, ex, ey, ez, gx, gy, gz = _edges(corners, triangles, triangle)
@@ -97,7 +97,7 @@ def foot_in_triangle(corners: Any, triangles: Any, triangle: Any, x: float, y: f
     return x - height * nx, y - height * ny, z - height * nz, height, nx, ny, nz
 
 
-@inner_kernel
+@uncounted_kernel
 def foot_on_edge(
     corners: Any,
     triangles: Any,
