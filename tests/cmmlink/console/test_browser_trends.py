@@ -7,10 +7,12 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
+from cmmlink.console import paper_process
 from cmmlink.console.server import ConsoleServer
 from cmmlink.console.station import Station
 from cmmlink.console.trend_look import TrendLook
 from cmmlink.plant import ResultsDatabase
+from tests.cmmlink.command import cmmlink
 from tests.cmmlink.plant.trending import drifting_runs
 
 from .conftest import Bench, MakeBench
@@ -70,6 +72,23 @@ def test_another_part_characteristic_and_subgroup_are_chosen_in_german(trends: B
     page.locator("#trend-spread").focus()
     page.keyboard.press("Home")
     expect(page.locator("#trend-place")).to_contain_text("SN-0004")
+
+
+def made_here(command: list[str], records: Path, file: Path, options: list[str]) -> None:
+    """What another process does for the station, done in this one."""
+    assert cmmlink(*command, "--records", records, "--out", file, "--json", *options).code == 0
+
+
+def test_a_trend_is_taken_away_as_a_workbook(trends: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(paper_process, "_make", made_here)
+    page = trends.page()
+    page.locator("#tab-trends").click()
+    expect(page.locator("#trend-notes li").first).to_be_visible()
+    with page.expect_download() as saved:
+        page.locator("#trend-xlsx").click()
+    assert saved.value.suggested_filename == "blade contour.xlsx"
+    assert saved.value.path().read_bytes().startswith(b"PK")
+    expect(page.locator("#said")).to_contain_text("blade contour.xlsx saved")
 
 
 def test_without_a_results_database_there_is_no_view(bench: Bench) -> None:
