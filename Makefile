@@ -7,7 +7,7 @@ INSTALL := $(PIP) --no-build-isolation --editable
 # The tests start a hundred processes; where Python may keep no compiled files, each of them compiles every file anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo install test checks compiled lowest lowest-compiled lowest-drivers platforms upgrade bench slower paper faults powercuts kills fuzz soak damage memory elsewhere proofs mutants stops machines rejudge trends laws audit surfaces reference uncertainty supply-chain docs bundle page-tools screenshots
+.PHONY: demo install test checks compiled lowest lowest-compiled lowest-drivers platforms upgrade bench slower paper faults powercuts kills fuzz soak damage memory elsewhere proofs mutants stops machines plant rejudge trends laws audit surfaces reference uncertainty supply-chain docs bundle page-tools screenshots
 demo: .venv/installed
 	$(BIN)/cmmlink demo --out demo-result
 
@@ -153,6 +153,10 @@ trends: .venv/test-installed
 # How soon a measuring machine is told to stop, and how much of the scans of 100 bad parts stop_when_failed saves.
 stops: .venv/test-installed
 	$(BIN)/python -m tests.benchmarks.machine_stops 100
+
+# A PostgreSQL server killed twenty times while 200 runs are pushed, and what is asked of 100,000 runs; takes some minutes.
+plant: .venv/test-installed
+	$(BIN)/python -m tests.benchmarks.plant_results 200 100000
 
 # The two laws over every source, format and surface, with thirty times as many random cases as `make test` tries; every rotation, too.
 laws: .venv/test-installed

@@ -1,5 +1,6 @@
 """An open results database: connected, brought to the tables of this program, and what goes wrong told in words without passwords."""
 
+import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -111,6 +112,9 @@ def _is_away(error: DBAPIError, state: str) -> bool:
 
 
 def _server(address: str) -> Engine:
+    for library in ("psycopg", "sqlalchemy"):  # what they say of a lost connection is told in our words, and not on standard error
+        if not logging.getLogger(library).handlers:
+            logging.getLogger(library).addHandler(logging.NullHandler())
     url = make_url(address)
     options = {name: value for name, value in _SERVER_OPTIONS.items() if name not in url.query}
     return create_engine(url, connect_args=options, pool_pre_ping=True, pool_size=2, hide_parameters=True)

@@ -45,6 +45,12 @@ LANGUAGES = ("en-GB", "de-DE")
 THEMES = ("light", "dark")
 VIEWS = ("part", "live", "history", "ct", "trends", "new-plan", "registers", "surface", "wall")
 
+# What the pusher tells while the server of the plant is away.
+WAITING = {
+    "address": "postgresql://cmm@db.example/plant", "added": 0, "waiting": 2, "since": "2026-03-14T12:00:00+00:00", "late": False,
+    "problem": "postgresql://cmm@db.example/plant: connection refused", "away": True, "pushed": None, "unreadable": [], "others": [],
+}  # fmt: skip
+
 
 @contextmanager
 def measured_station(folder: Path) -> Iterator[tuple[Station, ConsoleServer, Device]]:
@@ -73,6 +79,7 @@ def measured_station(folder: Path) -> Iterator[tuple[Station, ConsoleServer, Dev
     station = Station(setup)
     server = ConsoleServer(station, "screenshots", token=TOKEN)
     server.start()
+    station.pushed.hear(WAITING)
     station.list_plans()
     station.choose("block.yaml")
     device.source.put(opened(30_000), *batches(whole.scanned(40_000, 0.2), 2000), CLOSED)

@@ -54,7 +54,7 @@ class PostgresServer:
 
     def start(self) -> None:
         """Start it, and wait until it answers."""
-        settings = [f"port={self.port}", "listen_addresses=127.0.0.1", f"unix_socket_directories={self._folder}"]
+        settings = [f"port={self.port}", "listen_addresses=127.0.0.1", "unix_socket_directories="]
         settings += _QUICK if self._quick else []
         options = [word for setting in settings for word in ("-c", setting)]
         log = (self._folder / "log").open("ab")
@@ -64,16 +64,18 @@ class PostgresServer:
         self._run("pg_isready", "--quiet", "--host=127.0.0.1", f"--port={self.port}", wait=True)
 
     def kill(self) -> None:
-        """End it as a power cut does."""
-        assert self._server is not None
+        """End it without a warning, whichever process started it."""
+        number = int((self._data / "postmaster.pid").read_text().split()[0])
         with suppress(ProcessLookupError):
-            os.killpg(self._server.pid, signal.SIGKILL)
-        self._server.wait()
+            os.kill(number, signal.SIGKILL)
+        if self._server is not None:
+            self._server.wait()
+        (self._data / "postmaster.pid").unlink()  # its parent, if another process, may not have noticed yet
         self._server = None
 
     def close(self) -> None:
         """End it, and remove its data."""
-        if self._server is not None:
+        with suppress(FileNotFoundError):
             self.kill()
         shutil.rmtree(self._folder, ignore_errors=True)
 
