@@ -103,9 +103,9 @@ export class History {
 /** @param {ResultsState} results */
 function resultsWords({ address, waiting, since, problem }) {
   if (!waiting) return problem ? translate(problem) : gettext("Results go to {address}; nothing waits", { address });
-  const told = { address, since };
+  const told = { address, since: dated(since) };
   const words = ngettext("{count} run waits for {address} since {since}", "{count} runs wait for {address} since {since}", waiting, told);
-  return problem ? `${words}: ${translate(problem)}` : words;
+  return problem ? `${words}: ${translate(problem.replace(`${address}: `, ""))}` : words;
 }
 
 /** @param {FoundRuns} found */
