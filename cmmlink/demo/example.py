@@ -27,6 +27,7 @@ _FORM_MM, _FORM_WAVES, _NOISE_MM = 0.015, 5, 0.001
 _BUMP_WIDTH_MM = 3.0
 _ROTATION_RAD, _MOVED_MM = np.radians(30.0), (210.0, 145.0)
 _STL_CHORD_MM, _STL_HEIGHT_MM = 60.0, 10.0
+_SPACING_MM = 0.45  # of points on the whole surface
 
 
 def write_example(folder: Path) -> tuple[Path, ...]:
@@ -101,6 +102,30 @@ def _end(ring: Array) -> Array:
     return np.asarray(ring[strip])
 
 
+def _surface_points(_: NurbsCurve) -> bytes:
+    """Measured points of that whole blade in space, as csv: its walls and both ends, turned and moved on the machine."""
+    outline = nominal_points()[:-1] * (_STL_CHORD_MM / CHORD_MM)
+    heights = np.arange(_SPACING_MM / 2, _STL_HEIGHT_MM, _SPACING_MM)
+    around = _spread(np.vstack([outline, outline[:1]]))
+    walls = np.column_stack([np.repeat(around, len(heights), axis=0), np.tile(heights, len(around))])
+    inside = np.concatenate([_spread(np.stack([one, other])) for one, other in zip(outline, outline[::-1], strict=True)])
+    kept = np.unique(np.floor(inside / (_SPACING_MM / 2)), axis=0, return_index=True)[1]  # ribs lie close together near the nose
+    ends = [np.column_stack([inside[kept], np.full(len(kept), z)]) for z in (0.0, _STL_HEIGHT_MM)]
+    points = np.concatenate([walls, *ends])
+    points = points + np.random.default_rng(_SEED).normal(0.0, _NOISE_MM, points.shape)
+    c, s = np.cos(_ROTATION_RAD), np.sin(_ROTATION_RAD)
+    turned = points @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) @ np.array([[1.0, 0.0, 0.0], [0.0, c, s], [0.0, -s, c]])
+    rows = "".join(f"{x:.5f},{y:.5f},{z:.5f}\n" for x, y, z in turned + np.array((*_MOVED_MM, 80.0)))
+    return f"x_mm,y_mm,z_mm\n{rows}".encode()
+
+
+def _spread(course: Array) -> Array:
+    """Places (m, 2) along a course (k, 2), as far apart as its points in space are."""
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(course, axis=0).T))])
+    stations = np.linspace(0.0, along[-1], max(int(np.ceil(along[-1] / _SPACING_MM)), 1) + 1)
+    return np.column_stack([np.interp(stations, along, column) for column in course.T])
+
+
 def _path(curve: NurbsCurve) -> bytes:
     return path_csv(part_path(curve, _PATH_POINTS)).encode()
 
@@ -112,5 +137,6 @@ _COMPUTED: Mapping[str, Callable[[NurbsCurve], bytes]] = MappingProxyType(
         "points-bad.csv": _points(BUMP_MM),
         "part.stl": _surface,
         "path.csv": _path,
+        "surface-points.csv": _surface_points,
     }
 )
