@@ -27,7 +27,7 @@ _FORM_MM, _FORM_WAVES, _NOISE_MM = 0.015, 5, 0.001
 _BUMP_WIDTH_MM = 3.0
 _ROTATION_RAD, _MOVED_MM = np.radians(30.0), (210.0, 145.0)
 _STL_CHORD_MM, _STL_HEIGHT_MM = 60.0, 10.0
-_SPACING_MM = 0.45  # of points on the whole surface
+_SPACING_MM = 0.6  # of points on the whole surface
 
 
 def write_example(folder: Path) -> tuple[Path, ...]:
