@@ -137,9 +137,9 @@ def test_the_part_turns_by_keys_and_mouse_and_a_region_is_gone_to(station: Bench
     share = coloured(page, Kind.BELOW)
     assert share[0] > 10 * whole, "it is seen from near"
     assert share[1:] == pytest.approx([0.5, 0.5], abs=0.08)
-    expect(page.locator("#surface-words")).to_contain_text("▼ −0.1")
+    expect(page.locator("#surface-words")).to_contain_text("\u25bc −0.1")
     page.mouse.move(x, y)
-    expect(page.locator("#surface-words")).to_contain_text("▼ −0.1")
+    expect(page.locator("#surface-words")).to_contain_text("\u25bc −0.1")
 
 
 def test_a_browser_without_webgl_shows_a_still_picture(station: Bench) -> None:
