@@ -137,7 +137,7 @@ class SurfacePlan(Spelled):
     registration: SurfacePlacing = Field(default=SurfacePlacing(), description="how the scan comes onto the nominal")
     gap_max_mm: Positive | None = Field(
         default=None,
-        description="the diameter of the widest place without a point that counts as measured; null: a fiftieth of the nominal's size",
+        description="the diameter of the widest place without a point that counts as measured; null: a twenty-fifth of the nominal's size",
     )
     edge_allowance_mm: Annotated[float, Field(ge=0)] | None = Field(
         default=None, description="how far points may lie beyond the border of an open surface; null: half the width of the zone"

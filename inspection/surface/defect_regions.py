@@ -19,19 +19,19 @@ Truth = NDArray[np.bool_]
 
 
 def find_defects(
-    places: NominalPlaces, feet: SurfaceFeet, judged: Index, is_out: Truth, nearest: Index, measured: Truth, middle_mm: float
+    places: NominalPlaces, feet: SurfaceFeet, judged: Index, is_out: Truth, nearest: Index, near: Truth, middle_mm: float
 ) -> tuple[Defect, ...]:
     """The parts of the surface out of tolerance, those with the largest excess over the zone first.
 
     judged   : rows (j,) of the feet that have a verdict; is_out : (j,) which of them are out of tolerance
-    nearest  : (n,) which of the judged feet (0 .. j - 1) is nearest to each place; measured : (n,) which places were measured
+    nearest  : (n,) which of the judged feet (0 .. j - 1) is nearest to each place; near : (n,) which of these are near enough for that
     """
     out = np.flatnonzero(is_out)
     if not len(out):
         return ()
     place = _place_of(places, feet, judged[out])
     count = _judged_at(places, feet, judged, np.unique(place))
-    is_lone = measured & (count == 0)  # no point of its own, or none that is out
+    is_lone = near & (count == 0)  # no point of its own, or none that is out
     is_lone[place] = False
     lone = np.flatnonzero(is_lone & is_out[nearest])
     label = _labels(places, np.unique(np.concatenate([place, lone])))

@@ -162,7 +162,7 @@ class _Scan:
         distance, nearest = nearest_of(places, feet.foot_mm[judged], feet.normal[judged])
         covered = measure_area(nominal, places, distance, limits.gap_max_mm)
         is_out = found.verdicts[judged] == Verdict.NONCONFORM
-        regions = find_defects(places, feet, judged, is_out, nearest, covered.measured, zone.middle_mm)
+        regions = find_defects(places, feet, judged, is_out, nearest, 2 * distance <= limits.gap_max_mm, zone.middle_mm)
         points = max((verdict for verdict in Verdict if found.count_of(verdict)), default=Verdict.UNCERTAIN)
         why = word_points(zone, found.count_of(Verdict.NONCONFORM), found.count_of(Verdict.UNCERTAIN))
         if points is Verdict.NONCONFORM and registration is not None:

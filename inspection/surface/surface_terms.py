@@ -13,7 +13,7 @@ from inspection.tolerance import ToleranceZone
 
 SurfaceFitName = Literal["best-fit", "none"]
 
-_GAP = 0.02  # of the size: the widest place without points that counts as measured where nobody says otherwise
+_GAP = 0.04  # of the size: the widest place without points that counts as measured where nobody says otherwise: two cells of 2 %
 _OFF_SURFACE = 0.02  # of the size: a point farther off is dust, a fixture, or what is not nominal
 
 
@@ -27,7 +27,7 @@ class SurfaceTerms:
     locked          : shifts and turns, in the coordinates of the nominal, that stay as they are in `start`; all six make it a datum
     coverage_min    : share of the nominal's area below which conformity is not proven
     gap_max_mm      : the widest place without points (its diameter) that counts as measured, and that conformity allows, whatever
-                      coverage is asked for; None for a fiftieth of the nominal's size
+                      coverage is asked for; None for a twenty-fifth of the nominal's size
     gross_mm        : a point farther off the surface is rejected: dust or a fixture; None for a fiftieth of the nominal's size
     reject_outliers : leave out of the fit, and reject, what deviates more than six times the median and more than half the zone
     edge_allowance_mm : how far a point may lie beyond the border of an open surface; None for half the zone's width
