@@ -15,7 +15,7 @@ from cmmlink.plant.western_electric import RuleViolation
 
 Array = NDArray[np.float64]
 
-FORM_TYPES = ("line-profile", "profile")
+FORM_TYPES = ("line-profile",)
 """Types of characteristics whose value is the width of a zone: never negative, the smaller the better."""
 FEWEST_BEFORE_ALARM = 20  # limits from fewer values are trial limits, which raise no alarm
 _LEAP = "the step from the run before is larger than chance allows"
@@ -61,20 +61,18 @@ def trend_of(
     *,
     is_form: bool = False,
     subgroup: int = 1,
-    limits_from: int | None = None,
     unproven: int = 0,
 ) -> Trend:
     """The trend of a characteristic.
 
     values, lower, upper : (n,) of the runs in the order of time; nan where there is none
     subgroup             : from 1 to 100 runs in a row that were made under the same conditions
-    limits_from          : how many of the first runs, or subgroups, the limits of control are computed from. None: all.
     unproven             : how many of the values belong to a verdict that is not proven
     """
     measured, low, high = (np.array(given, dtype=np.float64) for given in (values, lower, upper))
     size, notes = _size_of(measured, subgroup)
     is_form = is_form and not (measured < 0).any()
-    charts = _charts_of(measured, size, limits_from)
+    charts = _charts_of(measured, size)
     found = None if charts is None else _capability_of(charts, low, high, is_form)
     if charts is None:
         notes = (*notes, f"{int(np.isfinite(measured).sum())} values are too few for a chart of control.")
@@ -123,7 +121,7 @@ def _size_of(measured: Array, subgroup: int) -> tuple[int, tuple[str, ...]]:
     return subgroup, (f"The first {left} runs belong to no whole subgroup and are left out of the charts.",) if left else ()
 
 
-def _charts_of(measured: Array, subgroup: int, limits_from: int | None) -> ControlCharts | None:
+def _charts_of(measured: Array, subgroup: int, limits_from: int | None = None) -> ControlCharts | None:
     """The charts of single values or of subgroups, counted from the newest run; None where there is nothing to compute limits from."""
     if subgroup > 1:
         groups = measured[len(measured) % subgroup :].reshape(-1, subgroup)
