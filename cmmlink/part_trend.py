@@ -29,7 +29,10 @@ class Results(Protocol):
     ) -> "ResultSeries":
         """The values of one characteristic of a part, oldest first."""
 
-    def strips(self, part: str, last: int = 60, *, station: str | None = None) -> "ProfileStrips":
+    def sections(self, part: str) -> list[str]:
+        """The heights of a part's sections of a surface; empty text among them where there are runs that are none."""
+
+    def strips(self, part: str, last: int = 60, *, station: str | None = None, section: str = "") -> "ProfileStrips":
         """The deviations along the profile of the newest runs of a part, oldest first."""
 
 
@@ -96,7 +99,8 @@ def look_at_trend(
     unproven = sum(verdict == "uncertain" for verdict in series.verdict)
     is_form = series.type in plant.FORM_TYPES
     trend = plant.trend_of(series.value, series.lower, series.upper, is_form=is_form, subgroup=subgroup, unproven=unproven)
-    strips = results.strips(part, min(last, MOST_STRIPS), station=station)
+    section = next((height for height in results.sections(part) if height and characteristic.endswith(f" at {height}")), "")
+    strips = results.strips(part, min(last, MOST_STRIPS), station=station, section=section)
     strips = strips if since is None else _only(strips, strips.started_s >= since.timestamp())
     strip, told = heat_strip_of(strips) if strips.run else (None, ("No run has a profile on record.",))
     left = (f"Left out: {series.left_out} values of the same name but of another type or unit.",) if series.left_out else ()

@@ -59,6 +59,20 @@ def test_runs_are_chosen_by_station_day_and_number() -> None:
     assert len(everything.strips.run) == MOST_STRIPS
 
 
+def test_a_characteristic_of_a_section_has_the_profiles_of_its_section() -> None:
+    runs = [
+        replace(run, section=f"{height}.000", values=tuple(replace(value, name=f"contour at {height}.000") for value in run.values[:1]))
+        for height in (5, 15)
+        for run in drifting_runs(12, drift_mm=0.0 if height == 5 else DRIFT_MM)
+    ]
+    upper = [run for run in runs if run.section == "15.000"]
+    strips = Remembered(runs).strips("blade", section="15.000")
+    assert strips.run == tuple(run.run for run in upper)
+    found = look_at_trend(Remembered(upper), "blade", "contour at 15.000")
+    assert found.strip is not None
+    assert np.array_equal(found.strip.strips.mean_mm, strips.mean_mm, equal_nan=True)
+
+
 def test_the_json_has_the_keys_that_are_written_down_and_survives_being_written() -> None:
     found = drifting_trend(42, subgroup=4)
     document = json.loads(json.dumps(trend_json(found), allow_nan=False))

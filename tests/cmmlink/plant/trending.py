@@ -72,8 +72,11 @@ class Remembered:
             part, characteristic, kind.type, kind.unit, value, lower, upper, _began(found), verdicts, runs, stations, serial_numbers
         )
 
-    def strips(self, part: str, last: int = 60, *, station: str | None = None) -> ProfileStrips:
-        found = [run for run in self.runs if station in (None, run.station)][-last:]
+    def sections(self, part: str) -> list[str]:
+        return sorted({run.section for run in self.runs})
+
+    def strips(self, part: str, last: int = 60, *, station: str | None = None, section: str = "") -> ProfileStrips:
+        found = [run for run in self.runs if station in (None, run.station) and run.section == section][-last:]
         strips = [run.strip for run in found if run.strip is not None]
         length, lower, upper = (numbers([getattr(one, name) for one in strips]) for name in ("length_mm", "lower_mm", "upper_mm"))
         mean, worst = (np.array([getattr(one, name) for one in strips]) for name in ("mean_mm", "worst_mm"))
