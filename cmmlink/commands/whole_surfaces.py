@@ -89,7 +89,7 @@ def surface(
     gap_max: Annotated[
         float | None,
         typer.Option(
-            min=0, metavar="MM", help="Widest place without a point that counts as measured.", show_default="1/50 of the nominal's size"
+            min=0, metavar="MM", help="Widest place without a point that counts as measured.", show_default="1/25 of the nominal's size"
         ),
     ] = None,
     gross: Annotated[
