@@ -32,7 +32,8 @@ if TYPE_CHECKING:
     from cmmlink.plan.serial_numbers import SerialNumbers, next_serial_number
     from cmmlink.plan.stack_characteristics import AskedOfStack
     from cmmlink.plan.surface import CtPlan, NominalAt, load_ct_plan
-    from cmmlink.plan.whole_surface import SurfaceFit, SurfacePlan, load_surface_plan
+    from cmmlink.plan.surface_fits import SurfaceFit
+    from cmmlink.plan.whole_surface import SurfacePlan, load_surface_plan
     from cmmlink.plan.yaml_model import Positive, Settings, line_of, read_model, texts_of, value_of, words_of_allowed
 else:
     from cmmlink.front_door import load_on_use
@@ -68,7 +69,8 @@ else:
         "cmmlink.plan.dme": ("CircleScan", "CurveScan", "LineScan", "PointsScan", "UnknownScan"),
         "cmmlink.plan.stack_characteristics": ("AskedOfStack",),
         "cmmlink.plan.surface": ("CtPlan", "NominalAt", "load_ct_plan"),
-        "cmmlink.plan.whole_surface": ("SurfaceFit", "SurfacePlan", "load_surface_plan"),
+        "cmmlink.plan.surface_fits": ("SurfaceFit",),
+        "cmmlink.plan.whole_surface": ("SurfacePlan", "load_surface_plan"),
         "cmmlink.plan.yaml_model": ("Positive", "Settings", "line_of", "read_model", "texts_of", "value_of", "words_of_allowed"),
     }
 

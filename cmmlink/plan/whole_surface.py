@@ -23,13 +23,13 @@ from cmmlink.plan.scan import Part, Probe, address_given, device_from, part_give
 from cmmlink.plan.scan_devices import Device, DmeDevice, Unit, Vector
 from cmmlink.plan.serial_numbers import SERIAL_NUMBER, SerialNumbers
 from cmmlink.plan.spelled import Spelled
+from cmmlink.plan.surface_fits import SurfaceFit
 from cmmlink.plan.uncertainty import DECISION_RULE
 from cmmlink.plan.yaml_model import Positive, Settings, Text, read_model
 from drivers import PointFileError, mm_per, read_text
 from inspection import DecisionRule, ToleranceZone
 
 FreedomName = Literal["x", "y", "z", "rx", "ry", "rz"]
-SurfaceFit = Literal["best-fit", "none"]
 
 _LENGTHS = 1e-6  # how far rows of a rotation may be from length 1 and from right angles: results print all digits, people six
 
