@@ -27,10 +27,9 @@ from cmmlink.record.store import Store
 from cmmlink.result_json import number
 from cmmlink.words import utc_words
 from drivers import LinkDown, PointBatch, Rejected, WireBytes
-from inspection import LiveUpdate
 
 if TYPE_CHECKING:
-    from inspection import InspectionResult
+    from inspection import InspectionResult, LiveUpdate
     from inspection.surface import SurfaceRegistration, SurfaceResult
 
 COMMIT_S = 0.1
@@ -198,6 +197,8 @@ class Recorder:
         if update.registration is None or (update.state == state and event.time_s < noted_s + _POSE_S):
             return
         self._last_pose = update.state, event.time_s
+        from inspection import LiveUpdate  # noqa: PLC0415 - who reads records needs no inspection
+
         moment = {"time_s": event.time_s, "points": update.stop, "state": update.state}
         found = _pose_of(update) if isinstance(update, LiveUpdate) else _pose_in_space(update.registration)
         self._hand(_Pose(moment | found), _SMALL_BYTES)
@@ -317,7 +318,7 @@ class _Packing:
         return {"received": self.kept}
 
 
-def _pose_of(update: LiveUpdate) -> dict[str, Any]:
+def _pose_of(update: "LiveUpdate") -> dict[str, Any]:
     """The pose of a section, as its history tells it."""
     registration = update.registration
     assert registration is not None
