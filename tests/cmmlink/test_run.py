@@ -146,8 +146,8 @@ def test_a_run_ends_with_a_result_when_the_disk_has_no_room_for_more(tmp_path: P
 
 
 def test_no_more_of_a_file_waits_than_keeps_a_run_busy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cmmlink.run._FILE_POINTS", 100)
-    monkeypatch.setattr("cmmlink.run._FILE_BYTES", 3000)
+    monkeypatch.setattr("cmmlink.conduct._FILE_POINTS", 100)
+    monkeypatch.setattr("cmmlink.conduct._FILE_BYTES", 3000)
     plan = small_plan().model_copy(update={"device": FileDevice(type="file", file=tmp_path / "points.csv")})
     alone, followed = run(Script(*scan_arrivals()), tmp_path, plan=plan), run(Script(*scan_arrivals()), tmp_path, lambda _: None, plan=plan)
     assert alone.outcome.counts.buffer_peak <= 100
