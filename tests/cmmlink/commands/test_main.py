@@ -81,7 +81,11 @@ def test_what_the_system_refuses_is_told_in_json(monkeypatch: pytest.MonkeyPatch
 
 @pytest.mark.parametrize(
     ("typed", "offered"),
-    [("cmmlink re", ["registers", "report", "replay", "reference", "restore"]), ("cmmlink replay la", ["last"]), ("cmmlink replay x", [])],
+    [
+        ("cmmlink re", ["registers", "report", "replay", "rejudge", "reference", "restore"]),
+        ("cmmlink replay la", ["last"]),
+        ("cmmlink replay x", []),
+    ],
 )
 def test_a_shell_is_offered_commands_and_runs(typed: str, offered: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in (("_CMMLINK_COMPLETE", "complete_bash"), ("COMP_WORDS", typed), ("COMP_CWORD", str(typed.count(" ")))):
