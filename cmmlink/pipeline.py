@@ -74,7 +74,7 @@ class Live(Protocol[_Found_co]):
         """Judge all points together, and say the verdict on the part."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)  # with slots Python 3.11 cannot make one by a name such as RunOutcome
 class Outcome(Generic[Result]):
     """How a run ended. `failure` is the device's error, or why there was no room for more; `refusal` why no result could be given."""
 

@@ -12,7 +12,7 @@ from tests.inspection.scans import ZONE
 
 CANNOT_BE: list[tuple[dict[str, Any], str]] = [
     ({"fit": "hope"}, "fit must be one of best-fit, minimum-zone, none, not 'hope'"),
-    ({"method": "spline"}, "method must be one of exact, circle, chord, pcp, veaw, inversion, not 'spline'"),
+    ({"method": "spline"}, "method must be one of exact, circle, chord, pcp, veaw, hermite, inversion, not 'spline'"),
     ({"tip_radius_mm": -1.0}, "tip radius -1 mm: must be a finite number, zero or more"),
     ({"tip_radius_mm": float("nan")}, "tip radius nan mm: must be a finite number, zero or more"),
 ]

@@ -228,7 +228,7 @@ def test_of_an_answer_that_a_kill_kept_from_the_records_nothing_is_claimed(tmp_p
 
 
 def test_an_answer_that_the_records_do_not_hold_is_told_and_changes_no_verdict(tmp_path: Path) -> None:
-    with asking(tmp_path) as machine, patch("cmmlink.run.keep_answer", lambda *_: "the disk is full"):
+    with asking(tmp_path) as machine, patch("cmmlink.conduct.keep_answer", lambda *_: "the disk is full"):
         found = carried_out(planned(tmp_path, machine.address))
         assert "the part is released" in end_of(machine)
     assert (found[0], found[1]["answer"]["sent"], found[1]["answer"]["unrecorded"]) == (0, True, "the disk is full")
@@ -237,7 +237,7 @@ def test_an_answer_that_the_records_do_not_hold_is_told_and_changes_no_verdict(t
 
 
 def carry_out_until_answered(plan: Path) -> None:
-    with patch("cmmlink.run.keep_answer", lambda *_: os._exit(KILLED)):
+    with patch("cmmlink.conduct.keep_answer", lambda *_: os._exit(KILLED)):
         carry_out(plan)
 
 

@@ -72,7 +72,7 @@ WRONG_OPTIONS = [
     (("--uncertainty", -1), r"--uncertainty is -1: expected zero or more"),
     (
         ("--method", "guess"),
-        r"Invalid value for '--method': 'guess' is not one of 'exact', 'circle', 'chord', 'pcp', 'veaw', 'inversion'; ",
+        r"Invalid value for '--method': 'guess' is not one of 'exact', 'circle', 'chord', 'pcp', 'veaw', 'hermite', 'inversion'; ",
     ),
     (("--fit", "tight"), r"Invalid value for '--fit': 'tight' is not one of 'best-fit', 'minimum-zone', 'none'; "),
     (("--material", "up"), r"Invalid value for '--material': 'up' is not one of 'left', 'right'; "),

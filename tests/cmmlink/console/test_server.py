@@ -350,7 +350,7 @@ def test_pages_hear_of_the_station_while_a_command_and_the_folder_of_plans_take_
 
 def test_every_connection_begins_with_a_hello_and_everything(server: ConsoleServer) -> None:
     """What a page knows ends with its connection, on both sides: the hello says so, and all of it follows."""
-    kinds = ("hello", "control", "station", "alarms", "run", "characteristics", "history", "found", "ct")
+    kinds = ("hello", "control", "station", "results", "alarms", "run", "characteristics", "history", "found", "ct")
     heard_of = []
     for _ in range(2):
         with joined(server) as socket:
