@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from inspection.errors import NominalError
 from inspection.kernels.surfaces import PatchTables, project_on_patches
-from inspection.kernels.surfaces.layout import BORDER_STEPS, INNER, LINKS, PLACE_WIDTH, SIDES, WIDTH_CUBIC
+from inspection.kernels.surfaces.layout import BORDER_STEPS, GRID_WIDTH, INNER, LINKS, PLACE_WIDTH, SIDES, WIDTH_CUBIC
 from inspection.surface.feet import FootKind, SurfaceFeet, points_in_space, surface_feet
 from inspection.surface.item_tree import item_tree
 from inspection.surface.patch_pieces import PatchPieces, boxes_along_axes, piece_rows
@@ -245,5 +245,8 @@ def _tables_of(pieces: PatchPieces, normals: Array, beside_edge: NDArray[np.bool
         vertices=np.empty((0, PLACE_WIDTH)).ravel(),
         width=WIDTH_CUBIC,
         row_width=rows.shape[1],
+        grid=np.zeros(GRID_WIDTH),
+        blocks=np.zeros(3, dtype=np.int64),
+        cells=np.empty(0, dtype=np.int32),
         grain_mm=1e-12 * size_mm,
     )

@@ -7,10 +7,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from inspection.errors import NominalError
 from inspection.kernels.surfaces import PatchTables, project_on_patches
+from inspection.kernels.surfaces.layout import GRID_WIDTH, PIECE_STRIDE
 from inspection.surface.feet import KILOMETRE_MM, SurfaceFeet, points_in_space, surface_feet
 from inspection.surface.item_tree import item_tree
 from inspection.surface.orientation import which_to_turn
 from inspection.surface.patch_borders import NO_ADJOINING, agreeing_faces, border_rows, find_adjoining, find_borders, vertex_rows
+from inspection.surface.patch_cells import with_patch_cells
 from inspection.surface.patch_pieces import PatchPieces, boxes_along_axes, cut_into_patches, piece_rows
 from inspection.surface.spline_face import SplineFace
 from inspection.surface.spread import shares_of, spread_within
@@ -67,9 +69,10 @@ class PatchSurface:
         vertices = vertex_rows(pieces, borders, sides, outward, near_mm)
         self.notes = tuple(notes)
         rows = piece_rows(pieces, outward[pieces.face])
+        rows[:, PIECE_STRIDE] = np.array([k for k, _ in pieces.grid])[pieces.face]
         middle, low, high = boxes_along_axes(rows)
         tree = item_tree(middle, low, high, 1)
-        self._tables = PatchTables(
+        tables = PatchTables(
             nodes=tree.nodes,
             links=tree.links,
             members=tree.members.ravel().astype(np.int32),
@@ -79,8 +82,12 @@ class PatchSurface:
             vertices=vertices.ravel(),
             width=pieces.coefficients.shape[-1],
             row_width=rows.shape[1],
+            grid=np.zeros(GRID_WIDTH),
+            blocks=np.zeros(3, dtype=np.int64),
+            cells=np.empty(0, dtype=np.int32),
             grain_mm=_GRAIN * self.size_mm,
         )
+        self._tables = with_patch_cells(tables, pieces, low, high, self.size_mm)
 
     def __len__(self) -> int:
         return len(self.faces)

@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from inspection.kernels.surfaces import CellMemory, TriangleTables, fill_cells
 from inspection.kernels.surfaces.layout import FAR, HULL_AXES, HULL_HALF, HULL_MIDDLE, HULL_WIDTH
+from inspection.surface.blocks_near import blocks_near
 
 Array = NDArray[np.float64]
 
@@ -29,7 +30,7 @@ def with_cells(tables: TriangleTables, hulls: Array, area_mm2: float, size_mm: f
     block_mm = max(_BLOCK * finest_mm, size_mm / _MOST_BLOCKS)
     first = low.min(axis=0)
     blocks = (np.floor((high.max(axis=0) - first) / block_mm) + 1).astype(np.int64)
-    near = _blocks_near((low - first) / block_mm, (high - first) / block_mm, blocks)
+    near = blocks_near((low - first) / block_mm, (high - first) / block_mm, blocks)
     room = max(_LEAST_ROOM, _ROOM * len(tables.triangles) // 3)
     cells, lists = np.empty(near.size + room, dtype=np.int32), np.empty(room, dtype=np.int32)
     cells[: near.size] = FAR
@@ -38,16 +39,3 @@ def with_cells(tables: TriangleTables, hulls: Array, area_mm2: float, size_mm: f
     tables = tables._replace(grid=np.array([*first, 1 / block_mm, block_mm]), blocks=blocks)
     fill_cells(tables, hulls, near.ravel(), reach_mm, _ENOUGH, _DEEPEST, memory)
     return tables._replace(cells=cells[: memory.used[0]].copy(), lists=lists[: memory.used[1]].copy())
-
-
-def _blocks_near(low: Array, high: Array, blocks: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Which blocks (i, j, k) boxes (c, 3) reach, in blocks from the lowest corner."""
-    begin, end = np.maximum(np.floor(low - 1e-6), 0).astype(np.int64), np.floor(high + 1e-6).astype(np.int64) + 1
-    steps = np.zeros(blocks + 1, dtype=np.int32)
-    for corner in range(8):  # one is added where a box begins and taken away where it ends, and the sums say how many hold a block
-        choice = [corner >> axis & 1 for axis in range(3)]
-        at = [np.minimum((end if chosen else begin)[:, axis], blocks[axis]) for axis, chosen in enumerate(choice)]
-        np.add.at(steps, tuple(at), -1 if sum(choice) % 2 else 1)
-    for axis in range(3):
-        np.cumsum(steps, axis=axis, out=steps)
-    return np.ascontiguousarray(steps[:-1, :-1, :-1] > 0)

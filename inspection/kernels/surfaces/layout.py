@@ -43,8 +43,9 @@ IN_TRIANGLE, EDGE_1, EDGE_2, EDGE_3, CORNER_1, CORNER_2, CORNER_3 = range(7)
 
 # Bounds over the piece of the lengths of S_s, S_t, S_ss, S_st, S_tt, S_sss, S_sst, S_stt, S_ttt.
 M10, M01, M20, M11, M02, M30, M21, M12, M03 = range(9)
-# The box that holds it: the middle, three unit axes, half the sides along them. Then where it is on its face, and 1 or -1 for the side.
-BOX_MIDDLE, BOX_AXES, BOX_HALF, PIECE_U, PIECE_V, PIECE_DU, PIECE_DV, PIECE_OUTWARD = 9, 12, 21, 24, 25, 26, 27, 28
+# The box that holds it: the middle, three unit axes, half the sides along them. Then where it is on its face, 1 or -1 for the side, and by
+# how much the number of the next piece along t is greater.
+BOX_MIDDLE, BOX_AXES, BOX_HALF, PIECE_U, PIECE_V, PIECE_DU, PIECE_DV, PIECE_OUTWARD, PIECE_STRIDE = 9, 12, 21, 24, 25, 26, 27, 28, 29
 COEFFICIENTS = 32  # of x, y, z: width * width each, that of s^i t^j at i * width + j
 WIDTH_CUBIC, WIDTH_QUINTIC = 4, 6
 HALF = 0.5  # where a piece ends

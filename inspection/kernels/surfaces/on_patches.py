@@ -15,12 +15,14 @@ from inspection.kernels.compiling import (
     uncounted_kernel,
 )
 from inspection.kernels.layout import CHUNK
+from inspection.kernels.surfaces.cell_grid import list_at
 from inspection.kernels.surfaces.layout import (
     BORDER_STEPS,
     BORDER_WIDTH,
     BOX_AXES,
     BOX_HALF,
     BOX_MIDDLE,
+    FAR,
     HALF,
     INNER,
     LINKS,
@@ -40,6 +42,7 @@ from inspection.kernels.surfaces.layout import (
     SIDES,
     STACK,
 )
+from inspection.kernels.surfaces.patch_walk import walk_to_foot
 from inspection.kernels.surfaces.piece_minimum import closest_on_piece, piece_at
 from inspection.kernels.surfaces.space_feet import (
     AT_ONCE,
@@ -71,6 +74,9 @@ class PatchTables(NamedTuple):
     vertices     : (v * PLACE_WIDTH,) and at their corners
     width        : coefficients in one direction: WIDTH_CUBIC or WIDTH_QUINTIC
     row_width    : numbers in a row
+    grid         : (GRID_WIDTH,) where the blocks of cells lie
+    blocks       : (3,) how many there are along x, y and z
+    cells        : what each block, and each part of one that is cut, holds: LISTED - (the piece to begin in), see `patch_cells`
     grain_mm     : a distance below which it is round-off; a foot that is held back at a border by less is not beyond it
     """
 
@@ -83,6 +89,9 @@ class PatchTables(NamedTuple):
     vertices: Array
     width: int
     row_width: int
+    grid: Array
+    blocks: NDArray[np.int64]
+    cells: Index
     grain_mm: float
 
 
@@ -99,7 +108,8 @@ def _project_chunks(points: Any, tables: Any, feet: Any, claimed: Any) -> None:
     m = len(feet.kind)
     waiting, memory = array_at(stack_integers(), STACK), array_at(stack_reals(), PIECE_SCRATCH)
     nodes, links, members, rows, foot_mm = tables.nodes, tables.links, tables.members, tables.rows, feet.foot_mm
-    width, row_width = tables.width, tables.row_width
+    width, row_width, beyond = tables.width, tables.row_width, tables.beyond
+    grid, blocks, cells = tables.grid, tables.blocks, tables.cells
     begin = claim_chunk(claimed) // CHUNK * AT_ONCE
     while begin < m:
         for i in range(begin, min(begin + AT_ONCE, m)):
@@ -107,6 +117,12 @@ def _project_chunks(points: Any, tables: Any, feet: Any, claimed: Any) -> None:
             if not (np.isfinite(x) and np.isfinite(y) and np.isfinite(z)):
                 store_no_foot(feet, i)
                 continue
+            start = list_at(grid, blocks, cells, x, y, z)
+            if start != FAR:
+                is_foot, named, s, t = walk_to_foot(rows, beyond, width, row_width, start, x, y, z, 1)
+                if is_foot:
+                    _store_foot(x, y, z, tables, named, s, t, feet, i)
+                    continue
             least, best, s, t = square_from_last(foot_mm, i, begin, x, y, z), _NONE_YET, 0.0, 0.0
             waiting[0], memory[0] = 0, 0.0
             depth = _ROOT_ALONE
@@ -115,7 +131,7 @@ def _project_chunks(points: Any, tables: Any, feet: Any, claimed: Any) -> None:
                 if leaf < 0:
                     break
                 piece = np.int64(members[leaf])
-                if _square_from_box(rows, piece * row_width, x, y, z) > least * _ROUND_OFF:
+                if square_from_box(rows, piece * row_width, x, y, z) > least * _ROUND_OFF:
                     continue
                 square, here_s, here_t = closest_on_piece(rows, piece * row_width, width, x, y, z, memory)
                 if square < least or (square == least and piece < best):
@@ -125,7 +141,7 @@ def _project_chunks(points: Any, tables: Any, feet: Any, claimed: Any) -> None:
 
 
 @inlined_uncounted_kernel
-def _square_from_box(rows: Any, row: int, x: float, y: float, z: float) -> float:
+def square_from_box(rows: Any, row: int, x: float, y: float, z: float) -> float:
     """Square of the distance from the box of a piece."""
     x, y, z = x - rows[row + BOX_MIDDLE], y - rows[row + BOX_MIDDLE + 1], z - rows[row + BOX_MIDDLE + 2]
     square = 0.0

@@ -68,7 +68,7 @@ def piece_at(rows: Any, row: int, width: int, s: float, t: float) -> tuple[tuple
 
 
 @uncounted_kernel
-def _square_at(rows: Any, row: int, width: int, x: float, y: float, z: float, s: float, t: float) -> tuple[float, ...]:
+def square_at(rows: Any, row: int, width: int, x: float, y: float, z: float, s: float, t: float) -> tuple[float, ...]:
     """Square of the distance, half its gradient (2), half its Hessian (ss, st, tt), and the squares of S_s, S_t, S_ss, S_st, S_tt."""
     px, py, pz = piece_at(rows, row, width, s, t)
     rx, ry, rz = px[0] - x, py[0] - y, pz[0] - z
@@ -86,13 +86,16 @@ def _square_at(rows: Any, row: int, width: int, x: float, y: float, z: float, s:
 
 
 @inlined_uncounted_kernel
-def _strays(
-    rows: Any, row: int, distance: float, e: float, k: float, ss: float, st: float, tt: float, hs: float, ht: float
+def strays(
+    rows: Any, row: int, distance: float, e: float, k: float, ss: float, st: float, tt: float, hs: float, ht: float, off: float
 ) -> tuple[float, float, float]:
-    """How far the Hessian may stray over a rectangle of half sides hs and ht, by the squares of the derivatives in its middle."""
+    """How far the Hessian may stray over a rectangle of half sides hs and ht, by the squares of the derivatives in its middle.
+
+    off : by how much the place may move
+    """
     su, sv, suu, suv, svv = np.sqrt(e), np.sqrt(k), np.sqrt(ss), np.sqrt(st), np.sqrt(tt)
     du, dv = rows[row + M20] * hs + rows[row + M11] * ht, rows[row + M11] * hs + rows[row + M02] * ht
-    dr = rows[row + M10] * hs + rows[row + M01] * ht
+    dr = rows[row + M10] * hs + rows[row + M01] * ht + off
     da, db = rows[row + M30] * hs + rows[row + M21] * ht, rows[row + M21] * hs + rows[row + M12] * ht
     dc = rows[row + M12] * hs + rows[row + M03] * ht
     stray_a = (2.0 * su + du) * du + distance * da + suu * dr + dr * da
@@ -117,7 +120,7 @@ def closest_on_piece(rows: Any, row: int, width: int, x: float, y: float, z: flo
             as_near *= 10.0
         at = SCRATCH + RECTANGLE_WIDTH * waiting
         s, t, hs, ht = memory[at], memory[at + 1], memory[at + 2], memory[at + 3]
-        square, g, h, a, b, c, e, k, ss, st, tt = _square_at(rows, row, width, x, y, z, s, t)
+        square, g, h, a, b, c, e, k, ss, st, tt = square_at(rows, row, width, x, y, z, s, t)
         if square < best:
             best, best_s, best_t = square, s, t
         distance = np.sqrt(square)
@@ -125,7 +128,7 @@ def closest_on_piece(rows: Any, row: int, width: int, x: float, y: float, z: flo
         nearest = max(distance - rows[row + M10] * hs - rows[row + M01] * ht, 0.0)
         if nearest * nearest > wanted:
             continue
-        stray_a, stray_b, stray_c = _strays(rows, row, distance, e, k, ss, st, tt, hs, ht)
+        stray_a, stray_b, stray_c = strays(rows, row, distance, e, k, ss, st, tt, hs, ht, 0.0)
         low_a, low_c, high_b = a - stray_a, c - stray_c, abs(b) + stray_b
         if low_a > _CONVEX * e and low_c > _CONVEX * k and _DETERMINANT * low_a * low_c > high_b * high_b:
             found, fs, ft = _newton(rows, row, width, x, y, z, s, t, hs, ht, (square, g, h, a, b, c))
@@ -133,7 +136,7 @@ def closest_on_piece(rows: Any, row: int, width: int, x: float, y: float, z: flo
                 best, best_s, best_t = found, fs, ft
             continue
         down_s, down_t = s + _downhill(g, a, hs), t + _downhill(h, c, ht)
-        lower = _square_at(rows, row, width, x, y, z, down_s, down_t)[0]
+        lower = square_at(rows, row, width, x, y, z, down_s, down_t)[0]
         if lower < best:
             best, best_s, best_t = lower, down_s, down_t
         gain = _gain(g, low_a, hs) + _gain(h, low_c, ht) + 2.0 * high_b * hs * ht
@@ -192,7 +195,7 @@ def _newton(
 
     A side holds while the gradient pushes against it. A step that leads uphill is halved.
 
-    there : what `_square_at` gives in the middle, the first six of it
+    there : what `square_at` gives in the middle, the first six of it
     """
     low_s, high_s, low_t, high_t = middle_s - hs, middle_s + hs, middle_t - ht, middle_t + ht
     s, t = middle_s, middle_t
@@ -218,11 +221,11 @@ def _newton(
         following_s, following_t = min(max(s + ds, low_s), high_s), min(max(t + dt, low_t), high_t)
         if abs(following_s - s) * rows[row + M10] <= _STILL_MM and abs(following_t - t) * rows[row + M01] <= _STILL_MM:
             break
-        found, g_there, h_there, a_there, b_there, c_there = _square_at(rows, row, width, x, y, z, following_s, following_t)[:6]
+        found, g_there, h_there, a_there, b_there, c_there = square_at(rows, row, width, x, y, z, following_s, following_t)[:6]
         halvings = 0
         while found > square * _UPHILL + _UPHILL_MM2 and halvings < _HALVINGS:
             following_s, following_t = 0.5 * (s + following_s), 0.5 * (t + following_t)
-            found, g_there, h_there, a_there, b_there, c_there = _square_at(rows, row, width, x, y, z, following_s, following_t)[:6]
+            found, g_there, h_there, a_there, b_there, c_there = square_at(rows, row, width, x, y, z, following_s, following_t)[:6]
             halvings += 1
         s, t, square, g, h, a, b, c = following_s, following_t, found, g_there, h_there, a_there, b_there, c_there
     return square, s, t
