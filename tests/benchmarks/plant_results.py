@@ -10,7 +10,6 @@
    asked for.
 """
 
-import json
 import multiprocessing
 import signal
 import statistics
@@ -27,7 +26,7 @@ import numpy as np
 
 from cmmlink.events import Event, Judged
 from cmmlink.plant import STRIP_PARTS, ProfileStrip, ResultsDatabase, StoredRun, StoredValue
-from cmmlink.plant_push import keep_address, verify_plant
+from cmmlink.plant_push import keep_address, outbox_of, verify_plant
 from tests.benchmarks.machine import machine
 from tests.cmmlink.plant.postgres import PostgresServer
 from tests.cmmlink.recorded import Script, record, scan_arrivals
@@ -82,6 +81,7 @@ def killed_server(runs: int) -> bool:
         killing.start()
         with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as child:
             beside, held = Waits(), Waits()
+            Waits().measure(Path(folder) / "before")  # whose first points wait for what has to be loaded or compiled
             for run in range(runs):
                 if killing.exitcode:
                     break
@@ -90,7 +90,7 @@ def killed_server(runs: int) -> bool:
                 progress.write_text(str(run + 1))
             child.send_signal(signal.SIGCONT)
             killing.join()
-            told = until_all_is_pushed(child)
+            told = until_all_is_pushed(child, records)
         found = verify_plant(records, lambda: datetime.now().astimezone())
         counted = server.query("SELECT count(*), count(DISTINCT run) FROM run")
     server.close()
@@ -114,17 +114,14 @@ def kill_in_turn(server: PostgresServer, progress: Path, runs: int) -> None:
         server.start()
 
 
-def until_all_is_pushed(child: "subprocess.Popen[str]") -> int:
-    """Read what the pusher tells until nothing waits any more, and end it. Returns how often it told something."""
+def until_all_is_pushed(child: "subprocess.Popen[str]", records: Path) -> int:
+    """Wait until nothing waits to be pushed any more, and end the pusher. Returns how often it told something."""
     assert child.stdout is not None
     assert child.stdin is not None
-    told = 0
-    for line in child.stdout:
-        told += 1
-        answer = json.loads(line)
-        if not answer["waiting"] and not child.stdin.closed and told > 1:
-            child.stdin.close()
-    return told
+    while outbox_of(records, lambda: datetime.now().astimezone()).waiting:
+        time.sleep(0.5)
+    child.stdin.close()
+    return len(child.stdout.readlines())
 
 
 def stored_runs(count: int) -> Iterator[StoredRun]:
