@@ -32,8 +32,10 @@ from cmmlink.record import (
     open_to_record,
     seal_of,
 )
+from cmmlink.result_folder import folder_of
 from cmmlink.run_log import log_event
 from cmmlink.words import utc_words
+from inspection import InspectionError
 
 _FILE_POINTS, _FILE_BYTES = 1 << 15, 4 << 20  # a file can wait: no more of it is held than keeps judging and recording busy
 _log = logging.getLogger(__name__)
@@ -122,3 +124,25 @@ def conduct(
     if evidence is not None:
         _log.info("recorded in %s as run %s, chain %s, plan %s", records, evidence.run, evidence.chain_sha256, evidence.plan_sha256)
     return Conducted(started, outcome, evidence, began, answered)
+
+
+# --- what a run that is over says of itself -------------------------------------------------------------------------------
+
+
+def title_of(started: RunStarted) -> str:
+    """The part, its serial number, and whether it was simulated."""
+    return " ".join(filter(None, [started.part, started.serial_number, "(SIMULATED)" if started.simulated else ""]))
+
+
+def refusal_of(refused: InspectionError | None, plan: Plan | SurfacePlan, started: RunStarted) -> InspectionError | None:
+    """Why no result could be given, with what was assumed of a file of points: that may be the cause. None where there is one."""
+    if refused is None or not isinstance(plan.device, FileDevice):
+        return refused
+    of_file = [note for note in started.notes if note.startswith(f"{plan.device.file.name}: ")]
+    return type(refused)("; ".join([str(refused), *of_file]))
+
+
+def results_folder(pattern: Path, started: RunStarted, evidence: RecordReference | None, began: datetime) -> Path:
+    """The folder of a run's results, its placeholders filled in; without a record the run is named by when it began."""
+    run = evidence.run if evidence else f"{began:%Y%m%d-%H%M%S}"
+    return folder_of(pattern, part=started.part, serial_number=started.serial_number, run=run)

@@ -14,14 +14,13 @@ from typing import Any
 
 from cmmlink.answer import MachineAnswer
 from cmmlink.characteristics import notes_on_characteristics
-from cmmlink.conduct import conduct
+from cmmlink.conduct import conduct, refusal_of, results_folder, title_of
 from cmmlink.devices import Connected
 from cmmlink.events import Answered, Event, RunStarted, Sink
 from cmmlink.from_plan import inspection_of, notes_on_datum, notes_on_nominal, notes_on_temperature, with_section, zone_of
 from cmmlink.pipeline import RunOutcome
 from cmmlink.plan import FileDevice, LinesDevice, Plan
 from cmmlink.record import PATIENCE_S, RecordReference, answer_document
-from cmmlink.result_folder import folder_of
 from cmmlink.result_json import density_notes, density_of, result_json, run_document, stations_of
 from cmmlink.run_log import log_event
 from cmmlink.scratch import scratch_in, words_of_room
@@ -54,11 +53,7 @@ class FinishedRun:
     @property
     def refusal(self) -> InspectionError | None:
         """Why no result could be given, with what was assumed of a file of points: that may be the cause. None where there is one."""
-        refused = self.outcome.refusal
-        if refused is None or not isinstance(self.plan.device, FileDevice):
-            return refused
-        of_file = [note for note in self.started.notes if note.startswith(f"{self.plan.device.file.name}: ")]
-        return type(refused)("; ".join([str(refused), *of_file]))
+        return refusal_of(self.outcome.refusal, self.plan, self.started)
 
     @property
     def verdict(self) -> Verdict:
@@ -73,8 +68,7 @@ class FinishedRun:
     @property
     def title(self) -> str:
         """The part, its serial number, and whether it was simulated."""
-        started = self.started
-        return " ".join(filter(None, [started.part, started.serial_number, "(SIMULATED)" if started.simulated else ""]))
+        return title_of(self.started)
 
     @property
     def notes(self) -> list[str]:
@@ -95,8 +89,7 @@ class FinishedRun:
 
     def folder_of(self, pattern: Path) -> Path:
         """The folder of this run's results, its placeholders filled in; without a record the run is named by when it began."""
-        run = self.evidence.run if self.evidence else f"{self.began:%Y%m%d-%H%M%S}"
-        return folder_of(pattern, part=self.started.part, serial_number=self.started.serial_number, run=run)
+        return results_folder(pattern, self.started, self.evidence, self.began)
 
 
 def carry_out(

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cmmlink.conduct import conduct
+from cmmlink.conduct import conduct, refusal_of, results_folder, title_of
 from cmmlink.devices import Connected
 from cmmlink.events import RunStarted, Sink
 from cmmlink.from_surface_plan import document_of_surface, live_surface_of, notes_of_result, notes_on_surface, words_of_nominal
@@ -17,7 +17,6 @@ from cmmlink.nominal_files.surface_file import SurfaceFile
 from cmmlink.pipeline import Outcome
 from cmmlink.plan import FileDevice, SurfacePlan
 from cmmlink.record import PATIENCE_S, RecordReference
-from cmmlink.result_folder import folder_of
 from cmmlink.result_json import run_document
 from cmmlink.surface_json import surface_json
 from cmmlink.words import utc_words
@@ -50,8 +49,8 @@ class FinishedSurface:
 
     @property
     def refusal(self) -> InspectionError | None:
-        """Why no result could be given. None where there is one."""
-        return self.outcome.refusal
+        """Why no result could be given, with what was assumed of a file of points: that may be the cause. None where there is one."""
+        return refusal_of(self.outcome.refusal, self.plan, self.started)
 
     @property
     def verdict(self) -> Verdict:
@@ -61,8 +60,7 @@ class FinishedSurface:
     @property
     def title(self) -> str:
         """The part, its serial number, and whether it was simulated."""
-        started = self.started
-        return " ".join(filter(None, [started.part, started.serial_number, "(SIMULATED)" if started.simulated else ""]))
+        return title_of(self.started)
 
     @property
     def notes(self) -> list[str]:
@@ -77,8 +75,7 @@ class FinishedSurface:
 
     def folder_of(self, pattern: Path) -> Path:
         """The folder of this run's results, its placeholders filled in; without a record the run is named by when it began."""
-        run = self.evidence.run if self.evidence else f"{self.began:%Y%m%d-%H%M%S}"
-        return folder_of(pattern, part=self.started.part, serial_number=self.started.serial_number, run=run)
+        return results_folder(pattern, self.started, self.evidence, self.began)
 
 
 def carry_out_surface(

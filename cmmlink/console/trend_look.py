@@ -1,5 +1,6 @@
 """The trends of a plant as a page asks for them: out of the results database, and as files for whoever wants to take them away."""
 
+import math
 from collections.abc import Callable, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -157,7 +158,7 @@ def _basis(found: "Capability", unit: str) -> str:
 def _strip(found: HeatStrip) -> TrendStrip:
     strips, length = found.strips, found.length_mm
     worst = tuple(tuple(None if value is None else round(value, _DIGITS) for value in map(number, row)) for row in strips.worst_mm.tolist())
-    levels = tuple(tuple(None if level != level else int(level) for level in row) for row in found.levels.tolist())  # noqa: PLR0124 - nan
+    levels = tuple(tuple(None if math.isnan(level) else int(level) for level in row) for row in found.levels.tolist())
     return TrendStrip(
         length,
         tuple(serial or run for serial, run in zip(strips.serial_number, strips.run, strict=True)),

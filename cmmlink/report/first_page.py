@@ -135,14 +135,17 @@ def facts(report: ReportInput, say: Speech) -> Iterator[tuple[str, str]]:
     document = report.document
     if document["rule"] is not None:
         yield from _facts_of_result(document, say)
-    yield (
-        say("Points"),
-        say(
-            "received {received} = judged {judged} + rejected {rejected}; lost {lost}; damaged bytes {damaged}",
-            **{name: document[name] for name in ("received", "judged", "rejected", "lost")},
-            damaged=document["damaged_bytes"],
-        ),
+    yield points_fact(document, say)
+
+
+def points_fact(document: Mapping[str, Any], say: Speech) -> tuple[str, str]:
+    """What came of the points that were sent."""
+    told = say(
+        "received {received} = judged {judged} + rejected {rejected}; lost {lost}; damaged bytes {damaged}",
+        **{name: document[name] for name in ("received", "judged", "rejected", "lost")},
+        damaged=document["damaged_bytes"],
     )
+    return say("Points"), told
 
 
 def _facts_of_result(document: Mapping[str, Any], say: Speech) -> Iterator[tuple[str, str]]:

@@ -183,6 +183,11 @@ def _conditions(report: ReportInput, say: Speech) -> Iterator[tuple[str, str]]:
         if found["certificate"] is not None:
             for number, line in enumerate(found["certificate"]["words"].splitlines()):
                 yield "" if number else say("Certificate of {name}", name=found["name"]), line
+    yield from evidence_facts(document, say)
+
+
+def evidence_facts(document: Mapping[str, Any], say: Speech) -> Iterator[tuple[str, str]]:
+    """What was rejected, and what ties the result to its record and to the program."""
     for reason, count in document["rejected_by_reason"].items():
         yield say("Rejected"), f"{count}: {say.sentence(reason)}"
     yield say("Measured at"), moment_words(document.get("measured_at")) or ""

@@ -6,8 +6,8 @@ from typing import Any
 
 from reportlab.platypus import Flowable, Image, PageBreak, Spacer
 
-from cmmlink.report.first_page import identity_block, moment_words, rules_table, verdict_block
-from cmmlink.report.further_pages import qualification_words, signature_words
+from cmmlink.report.first_page import identity_block, points_fact, rules_table, verdict_block
+from cmmlink.report.further_pages import evidence_facts
 from cmmlink.report.page_parts import NUMBER, SMALL, TITLE, grid, headed, text
 from cmmlink.report.report_input import ReportInput
 from cmmlink.report.speech import Speech
@@ -47,14 +47,7 @@ def _facts(document: Mapping[str, Any], say: Speech) -> Iterator[tuple[str, str]
     """Names and words of what the verdict rests on."""
     if document["rule"] is not None:
         yield from _facts_of_result(document, say)
-    yield (
-        say("Points"),
-        say(
-            "received {received} = judged {judged} + rejected {rejected}; lost {lost}; damaged bytes {damaged}",
-            **{name: document[name] for name in ("received", "judged", "rejected", "lost")},
-            damaged=document["damaged_bytes"],
-        ),
-    )
+    yield points_fact(document, say)
 
 
 def _facts_of_result(document: Mapping[str, Any], say: Speech) -> Iterator[tuple[str, str]]:
@@ -154,16 +147,7 @@ def _condition_lines(report: ReportInput, say: Speech) -> Iterator[tuple[str, st
         yield say("Assumed"), say.sentence(note)
     if document["registration"] is not None:
         yield say("Pose, nominal from scan"), _pose_words(document["registration"], say)
-    for reason, count in document["rejected_by_reason"].items():
-        yield say("Rejected"), f"{count}: {say.sentence(reason)}"
-    yield say("Measured at"), moment_words(document.get("measured_at")) or ""
-    yield say("Qualification"), qualification_words(document, say)
-    yield say("Software"), ", ".join(f"{name} {version}" for name, version in sorted((document.get("software") or {}).items()) if version)
-    for name, key in (("Record (SHA-256)", "chain_sha256"), ("Plan (SHA-256)", "plan_sha256"), ("Nominal (SHA-256)", "nominal_sha256")):
-        yield say(name), document.get(key) or ""
-    yield from signature_words(document, say)
-    if say.language != "en":
-        yield say("Language"), say("Sentences of the inspection that are not translated stand as the record has them.")
+    yield from evidence_facts(document, say)
 
 
 def _pose_words(pose: Mapping[str, Any], say: Speech) -> str:
