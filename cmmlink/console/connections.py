@@ -1,7 +1,8 @@
 """How many connections the station holds, for how long, and how much it keeps for each, so that a measurement never lacks anything.
 
-Whoever has not shown the token yet is a stranger. Strangers are few, and the oldest goes when one more comes; a request's head must
-arrive within seconds, and a stranger is gone soon whatever it does. Files that a run opens have descriptors of their own left over.
+Whoever has not shown the token yet is a stranger. Strangers are few: when one more comes the oldest goes, and is gone before another is
+taken. A request's head must arrive within seconds, and a stranger is gone soon whatever it does. Files that a run opens have descriptors
+of their own left over.
 Every answer carries the security headers, also those that the libraries below give by themselves.
 """
 
@@ -48,14 +49,55 @@ def strangers_allowed() -> int:
     return min(max(limit - _RESERVED_FILES, _FEWEST_STRANGERS), _MOST_STRANGERS)
 
 
+class Strangers:
+    """Those who have not shown the token, the oldest first; there is a place for each until its socket is closed or it is admitted."""
+
+    def __init__(self, most: int) -> None:
+        self._staying: dict[Visitor, None] = {}
+        self._places = asyncio.Semaphore(most)
+
+    def __len__(self) -> int:
+        return len(self._staying)
+
+    async def find_place(self) -> None:
+        """Take a place; where none is free the oldest stranger goes, and its socket is waited for."""
+        if self._places.locked():
+            self.turn_out_oldest()
+        await self._places.acquire()
+
+    def enter(self, visitor: "Visitor") -> None:
+        """Note who takes the place that was found."""
+        self._staying[visitor] = None
+
+    def turn_out_oldest(self) -> None:
+        """End the connection of whoever has been a stranger for longest."""
+        oldest = next(iter(self._staying), None)
+        if oldest is not None:
+            oldest.abort()
+
+    def turn_out_all(self) -> None:
+        """End the connection of every stranger."""
+        while self._staying:
+            self.turn_out_oldest()
+
+    def forget(self, visitor: "Visitor") -> None:
+        """Somebody was told to go, or was admitted."""
+        self._staying.pop(visitor, None)
+
+    def free_place(self) -> None:
+        """A stranger's socket is closed, or it was admitted."""
+        self._places.release()
+
+
 class Visitor:
     """One connection from its beginning to its end."""
 
-    def __init__(self, connected: socket.socket, strangers: dict["Visitor", None], loop: asyncio.AbstractEventLoop) -> None:
+    def __init__(self, connected: socket.socket, strangers: Strangers, loop: asyncio.AbstractEventLoop) -> None:
         self._socket, self._strangers, self._loop = connected, strangers, loop
         self._transport: asyncio.Transport | None = None
         self._end: asyncio.TimerHandle | None = None
-        strangers[self] = None
+        self._has_place = True
+        strangers.enter(self)
         self.end_within(_STRANGER_S)
 
     def connect(self, transport: asyncio.Transport) -> None:
@@ -70,13 +112,13 @@ class Visitor:
 
     def end_within(self, seconds: float) -> None:
         """End the connection then, unless it has ended by itself."""
-        if self._end is not None:
-            self._end.cancel()
+        self._stop_waiting()
         self._end = self._loop.call_later(seconds, self.abort)
 
     def abort(self) -> None:
         """End the connection at once, whatever was still to be sent."""
-        self.leave()
+        self._strangers.forget(self)
+        self._stop_waiting()
         if self._transport is not None:
             self._transport.abort()
         else:  # it is still agreeing on its encryption
@@ -84,8 +126,14 @@ class Visitor:
                 self._socket.shutdown(socket.SHUT_RDWR)
 
     def leave(self) -> None:
-        """It is gone, or admitted: it is counted no more."""
-        self._strangers.pop(self, None)
+        """Its socket is closed, or it is admitted: it is no stranger any more."""
+        self._strangers.forget(self)
+        self._stop_waiting()
+        if self._has_place:
+            self._has_place = False
+            self._strangers.free_place()
+
+    def _stop_waiting(self) -> None:
         if self._end is not None:
             self._end.cancel()
             self._end = None
@@ -97,8 +145,7 @@ class BoundedServer(uvicorn.Server):
     def __init__(self, config: uvicorn.Config, listening: socket.socket, encryption: Encryption | None) -> None:
         super().__init__(config)
         self._listening, self._encryption = listening, encryption
-        self._strangers: dict[Visitor, None] = {}  # the oldest first
-        self._most = strangers_allowed()
+        self._strangers = Strangers(strangers_allowed())
         self._tasks: set[asyncio.Task[None]] = set()
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
@@ -111,8 +158,7 @@ class BoundedServer(uvicorn.Server):
         """Take no more connections, and end those that there are."""
         for task in tuple(self._tasks):
             task.cancel()
-        for visitor in tuple(self._strangers):
-            visitor.abort()
+        self._strangers.turn_out_all()
         await super().shutdown(sockets)
 
     def _begin(self, work: Any) -> None:
@@ -126,11 +172,14 @@ class BoundedServer(uvicorn.Server):
             try:
                 connected, _ = await loop.sock_accept(self._listening)
             except OSError:  # no descriptor is left, or the connection is gone already
-                self._turn_out_oldest()
+                self._strangers.turn_out_oldest()
                 await asyncio.sleep(_OUT_OF_FILES_S)
                 continue
-            if len(self._strangers) >= self._most:
-                self._turn_out_oldest()
+            try:
+                await self._strangers.find_place()
+            except asyncio.CancelledError:
+                connected.close()
+                raise
             self._begin(self._welcome(connected, Visitor(connected, self._strangers, loop)))
 
     async def _welcome(self, connected: socket.socket, visitor: Visitor) -> None:
@@ -147,11 +196,6 @@ class BoundedServer(uvicorn.Server):
         except OSError:
             visitor.leave()
             connected.close()
-
-    def _turn_out_oldest(self) -> None:
-        oldest = next(iter(self._strangers), None)
-        if oldest is not None:
-            oldest.abort()
 
 
 class _RequestProtocol(H11Protocol):

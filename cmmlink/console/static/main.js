@@ -310,10 +310,10 @@ function nextPart() {
   partView.enterSerialNumber();
 }
 
-/** A page that watches is refused at once; one that controls asks first. */
+/** A page that watches is refused here: the station may have given it the control meanwhile, and would abort without a question. */
 function abort() {
-  if (heard.control?.controls) question.ask();
-  else ask({ do: "abort" });
+  if (heard.control?.taken && !heard.control.controls) say({ ok: false, message: gettext("another page is in control; this one watches") });
+  else question.ask();
 }
 
 /** Leave what is in front: the list of alarms, a recorded run, a view. */

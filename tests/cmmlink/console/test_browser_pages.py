@@ -119,6 +119,7 @@ def test_two_pages_see_the_same_run_and_one_controls_it(bench: Bench) -> None:
     watcher.locator("#banners button").click()
     expect(page.locator("#banners")).to_contain_text("Watching")
     expect(page.locator("#abort")).to_be_disabled()
+    expect(watcher.locator("#abort")).to_be_enabled()
     watcher.keyboard.press("Escape")
     expect(watcher.locator("#question")).to_be_visible()
     bench.device.source.put(*batches(measured(bench.profile, 2000, seed=1), 50)[20:24])
@@ -128,6 +129,17 @@ def test_two_pages_see_the_same_run_and_one_controls_it(bench: Bench) -> None:
     for one in (page, watcher):
         expect(one.locator("#verdict-why")).to_contain_text("the scan was aborted")
     expect(watcher.locator("#question")).to_be_hidden()
+
+
+def test_page_that_takes_the_control_by_its_abort_is_asked_too(bench: Bench) -> None:
+    page, watcher = bench.started(), bench.page()
+    page.close()
+    expect(watcher.locator("#banners")).to_contain_text("Watching: no page is in control")
+    watcher.keyboard.press("Escape")
+    expect(watcher.locator("#question")).to_be_visible()
+    assert bench.station.running
+    watcher.keyboard.press("Escape")
+    expect(watcher.locator("#verdict-why")).to_have_text("no point was received")
 
 
 def test_page_says_that_it_is_stale_and_comes_back_after_a_restart(bench: Bench) -> None:

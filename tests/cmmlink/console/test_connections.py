@@ -162,6 +162,27 @@ def test_a_station_with_few_files_to_open_keeps_some_for_the_measurement(tmp_pat
             process.kill()
 
 
+def test_a_rush_is_let_in_no_faster_than_strangers_are_turned_out(tmp_path: Path) -> None:
+    """Those who have called while the station was busy hold for no moment more sockets than the station spares."""
+    held: list[int] = []
+    with served(tmp_path) as server, page(server), ExitStack() as strangers:
+        loop = next(iter(server._server._tasks)).get_loop()
+        rushed, before = threading.Event(), sockets_of(os.getpid())
+
+        def count() -> None:
+            held.append(sockets_of(os.getpid()))
+            if len(held) < 1000:
+                loop.call_soon(count)
+
+        loop.call_soon_threadsafe(rushed.wait, 20.0)
+        loop.call_soon_threadsafe(count)
+        for _ in range(120):  # no more than wait in front of a listening socket
+            strangers.enter_context(half_request(server.port))
+        rushed.set()
+        assert got(server.port) == 200
+    assert max(held) <= before + 120 + connections._MOST_STRANGERS + 4
+
+
 def is_turned_out(caller: socket.socket) -> bool:
     """Whether the station has answered a caller or left it; it says nothing to one that it still waits for."""
     caller.setblocking(False)
