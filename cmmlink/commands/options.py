@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from cmmlink.errors import PlanError
+from cmmlink.errors import PlanError, RunError
 from drivers import UnitName
 from inspection import RuleName, WeightName
 
@@ -99,6 +99,19 @@ def records_folder(records: Path | None) -> Path:
     from cmmlink.record import default_folder
 
     return records or default_folder()
+
+
+def station_records(records: Path | None, *, is_needed: bool = False) -> Path:
+    """The same of a station whose records are read, or its settings. Raises RunError where it was asked for and is not there.
+
+    is_needed : the user's own has to be there as well
+    """
+    folder = records_folder(records)
+    if folder.exists() and not folder.is_dir():
+        raise RunError(f"{folder}: is no folder; --records DIR says in which one the records are")
+    if (is_needed or records is not None) and not folder.exists():
+        raise RunError(f"{folder}: there is no such folder; --records DIR says in which one the records are")
+    return folder
 
 
 def columns_from(text: str | None) -> dict[str, int] | None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cmmlink.commands.exit_codes import DEVICE_FAILED, UNUSABLE, fail
-from cmmlink.commands.options import Json, Records, records_folder
+from cmmlink.commands.options import Json, Records, records_folder, station_records
 from cmmlink.commands.output import now, print_json
 from cmmlink.commands.progress import progress
 from cmmlink.commands.trends import trends
@@ -44,7 +44,7 @@ def push(
     """
     from cmmlink.plant_push import push as push_results
 
-    folder = records_folder(records)
+    folder = station_records(records)
     if stay:
         return _stay(folder)
     with progress("pushing results") as tell:
@@ -60,7 +60,7 @@ def status(records: Records = None, as_json: Json = False) -> int:
     """Show which database the results go to and what waits to be pushed, without asking the database."""
     from cmmlink.plant_push import outbox_of
 
-    outbox = outbox_of(records_folder(records), now)
+    outbox = outbox_of(station_records(records), now)
     _tell(outbox, as_json)
     return 0
 
@@ -74,7 +74,7 @@ def verify(records: Records = None, as_json: Json = False) -> int:
     from cmmlink.plant_push import verify_plant
 
     with progress("comparing the database with the records") as tell:
-        found = verify_plant(records_folder(records), now, tell)
+        found = verify_plant(station_records(records), now, tell)
     if as_json:
         print_json(_verified_json(found))
         return 0 if found.sound else 1

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cmmlink.commands.options import Json, Records, records_folder
+from cmmlink.commands.options import Json, Records, station_records
 from cmmlink.commands.output import print_json
 from cmmlink.commands.progress import progress
 from cmmlink.errors import PlanError
@@ -47,7 +47,7 @@ def trends(
 
     if out is not None and out.suffix.lower() not in _WRITTEN:
         raise PlanError(f"{out}: nothing is written by the suffix '{out.suffix}'; expected one of {', '.join(_WRITTEN)}")
-    with ResultsDatabase(address_for(records_folder(records))) as results:
+    with ResultsDatabase(address_for(station_records(records, is_needed=True)), is_made=False) as results:
         name = _characteristic_of(results, part, characteristic)
         begin = None if since is None else since.astimezone()
         found = look_at_trend(results, part, name, station=station, since=begin, last=last, subgroup=subgroup)

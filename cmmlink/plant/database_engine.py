@@ -11,6 +11,7 @@ from sqlalchemy.exc import ArgumentError, DBAPIError, SQLAlchemyError
 
 from cmmlink.errors import PlantAwayError, PlantError
 from cmmlink.plant.database_address import address_of, is_server, without_password, words_of
+from cmmlink.plant.database_words import remedy, require_place
 from cmmlink.plant.results_tables import VERSION_TABLE, VERSIONS, Tables
 
 _PATIENCE_S = 10  # to reach a server, and for another program's transaction in a file
@@ -27,11 +28,16 @@ _SERVER_OPTIONS = {
 
 
 class DatabaseEngine:
-    """A connected results database. Raises PlantError where it cannot be used, PlantAwayError where it cannot be reached."""
+    """A connected results database. Raises PlantError where it cannot be used, PlantAwayError where it cannot be reached.
 
-    def __init__(self, given: str | Path) -> None:
+    is_made : whether a file is made where there is none
+    """
+
+    def __init__(self, given: str | Path, *, is_made: bool = True) -> None:
         address = address_of(given)
         self.words = words_of(address)
+        if not is_server(address) and (file := make_url(address).database):
+            require_place(Path(file), is_made=is_made)
         with self._translated():
             self._engine = _server(address) if is_server(address) else _file(address)
             try:
@@ -94,9 +100,10 @@ class DatabaseEngine:
             yield
         except DBAPIError as error:
             state = str(getattr(error.orig, "sqlstate", None) or "")
-            told = " ".join(without_password(str(error.orig)).split())
+            told = " ".join(without_password(str(error.orig)).split()).partition(" Is the server running")[0]
             kind = PlantAwayError if _is_away(error, state) else PlantError
-            raise kind(f"{self.words}: {told[:300]}") from None
+            of_server = type(error.orig).__module__.startswith("psycopg")
+            raise kind(f"{self.words}: {told[:300]}{remedy(told, of_server=of_server)}") from None
         except ImportError as error:
             raise PlantError(f"PostgreSQL needs an extra of cmmlink; `pip install 'cmmlink[plant]'` brings it ({error})") from None
         except (ArgumentError, SQLAlchemyError) as error:

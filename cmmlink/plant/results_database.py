@@ -49,11 +49,12 @@ _BYTES = "<f4"  # of a strip
 class ResultsDatabase:
     """A results database that is open. Raises PlantError where it cannot be used, PlantAwayError where it cannot be reached.
 
-    `address` is the path of a file of SQLite, which is made where there is none, or postgresql://USER@HOST/DATABASE.
+    address : the path of a file of SQLite, or postgresql://USER@HOST/DATABASE
+    is_made : whether the file is made where there is none; who only reads is told that nothing is there
     """
 
-    def __init__(self, address: str | Path) -> None:
-        self._engine = DatabaseEngine(address)
+    def __init__(self, address: str | Path, *, is_made: bool = True) -> None:
+        self._engine = DatabaseEngine(address, is_made=is_made)
 
     def close(self) -> None:
         """Close it."""

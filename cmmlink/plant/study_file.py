@@ -89,7 +89,8 @@ def read_study(path: Path) -> Study:
     try:
         return _study_in(found)
     except (KeyError, TypeError, AttributeError, ValueError) as error:
-        raise ValueError(f"{path}: no study of this version of cmmlink: {error}") from None
+        told = f"{error} is missing" if isinstance(error, KeyError) else str(error)
+        raise ValueError(f"{path}: no study of this version of cmmlink: {told}; `cmmlink study new` makes one") from None
 
 
 def _study_in(found: Any) -> Study:

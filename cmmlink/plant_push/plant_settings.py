@@ -29,7 +29,8 @@ def address_for(records: Path) -> str:
     except FileNotFoundError:
         return address_of(records / RESULTS_FILE)
     except (OSError, UnicodeDecodeError) as error:
-        raise PlantError(f"{file}: cannot be read: {error}") from None
+        told = error.strerror if isinstance(error, OSError) else "it is no text (UTF-8)"
+        raise PlantError(f"{file}: cannot be read: {told}; `cmmlink plant address ADDRESS` writes it anew") from None
     try:
         given = read_model(text, PlantSettings).address
     except YamlError as error:

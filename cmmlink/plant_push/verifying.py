@@ -57,7 +57,7 @@ class PlantVerified:
 def verify_plant(folder: Path, now: Callable[[], datetime], tell: Callable[[float], None] = lambda share: None) -> PlantVerified:
     """Hold the database against the records. Raises PlantError, StoreError, and RunError where there are no records."""
     address = address_for(folder)
-    with open_to_read(folder, now, close_interrupted=False) as store, ResultsDatabase(address) as database:
+    with open_to_read(folder, now, close_interrupted=False) as store, ResultsDatabase(address, is_made=False) as database:
         found = check_chain(store, None)
         if found["altered"]:
             return PlantVerified(words_of(address), 0, 0, (), (), (), found["first"]["message"])

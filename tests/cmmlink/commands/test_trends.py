@@ -60,7 +60,3 @@ def test_what_cannot_be_shown_is_refused_in_words(records: Path, asked: tuple[st
 def test_a_drawing_that_cannot_be_written_is_refused_in_words(records: Path) -> None:
     out = records / "plant.sqlite" / "trend.svg"  # its folder is a file
     assert "the trend cannot be written there" in cmmlink("plant", "trends", "blade", "--records", records, "--out", out).refused()
-
-
-def test_a_station_that_pushed_nothing_is_told_how_to(tmp_path: Path) -> None:
-    assert "`cmmlink plant push` sends the recorded runs" in cmmlink("plant", "trends", "blade", "--records", tmp_path).refused()
