@@ -23,6 +23,7 @@ from cmmlink.commands.options import (
     records_folder,
 )
 from cmmlink.commands.output import Output, now, report_outcome, stop_on_ctrl_c
+from cmmlink.commands.pushed import pushing_after
 from cmmlink.commands.series import NextPart, connect_part
 from cmmlink.commands.surface_outcome import run_surface
 from cmmlink.errors import PlanError
@@ -139,16 +140,19 @@ def _run(plan: "Plan", profile: "NominalProfile", connect: "Connect", output: Ou
     quiet = output.headless or output.as_json or not sys.stderr.isatty()
     view = RunView(RunContext.of(plan, profile, now(), number="", plan_name=""), time.monotonic, now)
     table = nullcontext() if quiet else LiveTable(Console(stderr=True), view)
-    with connect(plan) as device, stop_on_ctrl_c() as stop, table:
-        finished = carry_out(
-            plan,
-            profile,
-            device,
-            records=records_folder(output.records),
-            clock=time.monotonic,
-            now=now,
-            stop=stop,
-            sinks=[] if quiet else [view],
-            on_ready=view.await_device,
-        )
-    return report_outcome(finished, output)
+    records = records_folder(output.records)
+    with pushing_after(records) as recorded:
+        with connect(plan) as device, stop_on_ctrl_c() as stop, table:
+            finished = carry_out(
+                plan,
+                profile,
+                device,
+                records=records,
+                clock=time.monotonic,
+                now=now,
+                stop=stop,
+                sinks=[] if quiet else [view],
+                on_ready=view.await_device,
+            )
+        recorded.append(finished.evidence)
+        return report_outcome(finished, output)

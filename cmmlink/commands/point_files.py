@@ -35,6 +35,7 @@ from cmmlink.commands.options import (
 )
 from cmmlink.commands.output import Output, now, report_outcome, stop_on_ctrl_c
 from cmmlink.commands.progress import progress
+from cmmlink.commands.pushed import pushing_after
 from cmmlink.errors import PlanError
 from cmmlink.words import printable
 from inspection import FitName, Material, Method
@@ -142,11 +143,12 @@ def inspect(
                 raise PlanError(f"--tip-radius {tip_radius:g}: {error}") from None
             prepare(out)
             finished = carry_out(plan, profile, source, records=folder, clock=time.monotonic, now=now, stop=stop, patience_s=_PATIENCE_S)
+        recorded.append(finished.evidence)
         if finished.refusal is not None:
             raise type(finished.refusal)(f"{file}: {finished.refusal}")
         return finished
 
-    with Pictures() as pictures, stop_on_ctrl_c() as stop:
+    with pushing_after(folder) as recorded, Pictures() as pictures, stop_on_ctrl_c() as stop:
         pictures.start(min(processes_here(), 0 if out is None else 1))  # it loads what it draws with while points are read and judged
         if len(points) > 1:
             return inspect_files(points, inspect_one, out, pictures, stop, as_json=as_json)

@@ -13,6 +13,7 @@ from cmmlink.commands.exit_codes import DEVICE_FAILED, EXIT_OF, NO_RECORD, UNUSA
 from cmmlink.commands.options import records_folder
 from cmmlink.commands.output import Output, now, print_json, say_untold, stop_on_ctrl_c, terminal
 from cmmlink.commands.progress import progress
+from cmmlink.commands.pushed import pushing_after
 from cmmlink.commands.series import NextPart, connect_part
 from cmmlink.errors import StoreError
 from inspection import NotMeasured
@@ -41,10 +42,12 @@ def run_surface(plan_file: Path, part: NextPart, output: Output) -> int:
         connect_this = partial(connect_part, connect, plan.part.serial_number, notes)
         report = partial(_report_shown, as_json=output.as_json)
         return run_on_page(plan_file, connect_this, shown, report, plan.part.serial_number, plan.operator)
-    with connect(plan) as device, stop_on_ctrl_c() as stop, progress(f"measuring {plan.part.name}"):
-        noted = replace(device, notes=(*notes, *device.notes))
-        finished = carry_out_surface(plan, file, noted, records=records, clock=time.monotonic, now=now, stop=stop)
-    return report_surface(finished, out, as_json=output.as_json)
+    with pushing_after(records) as recorded:
+        with connect(plan) as device, stop_on_ctrl_c() as stop, progress(f"measuring {plan.part.name}"):
+            noted = replace(device, notes=(*notes, *device.notes))
+            finished = carry_out_surface(plan, file, noted, records=records, clock=time.monotonic, now=now, stop=stop)
+        recorded.append(finished.evidence)
+        return report_surface(finished, out, as_json=output.as_json)
 
 
 def _report_shown(run: "FinishedRun | FinishedSurface", *, as_json: bool) -> int:

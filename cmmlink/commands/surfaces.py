@@ -34,6 +34,7 @@ from cmmlink.commands.options import (
     records_folder,
 )
 from cmmlink.commands.output import Output, print_json, say_untold, stop_on_ctrl_c, terminal
+from cmmlink.commands.pushed import pushing_after
 from cmmlink.errors import PlanError
 from cmmlink.plan import CutterName
 from cmmlink.words import VERDICT_WORDS, headline_of, printable
@@ -200,32 +201,35 @@ def _inspect_stack(plan: "CtPlan", output: Output, pictures: PicturesWanted, no_
     pattern = output.out or plan.out.folder
     prepare(pattern)
     bar = _SectionBar(Console(stderr=True), visible=not output.as_json and sys.stderr.isatty())
-    with Pictures() as processes:
-        drawn = pictures != "none" and pattern is not None
-        wanted = SectionPictures(plan.part.name, processes, every=pictures == "all") if drawn else None
-        stack = _judge_stack(plan, output, bar, wanted, no_record)
-        say_untold([asdict(one) for one in stack.anchors])
-        folder = None if pattern is None else stack.folder_of(pattern, plan)
-        try:
-            if folder is not None:
-                with bar.show():
-                    done = bar.begin_round("written", len(stack.sections))
-                    write_stack(folder, stack, plan.zone, plan.part.name, plan=plan, pictures=wanted, on_section=done)
-        finally:
-            if output.as_json:
-                print_json(stack.result_json())
-            else:
-                _print_stack(terminal(), stack)
-    if folder is not None and not output.as_json:
-        whole = ", stack.png, stack.svg, report.pdf" if drawn else ""
-        further = "".join(f", result.{name}" for name in plan.out.formats if name != "json")
-        typer.echo(f"results in {folder}: result.json, sections.csv, a folder for each section{whole}{further}")
-        if wanted is not None and (left := sum(not wanted.wants(section) for section in stack.sections)):
-            typer.echo(f"sections that were not drawn: {left}; --pictures all draws those that conform as well")
+    records = None if no_record else records_folder(output.records or plan.records.folder)
+    with pushing_after(records) as recorded:
+        with Pictures() as processes:
+            drawn = pictures != "none" and pattern is not None
+            wanted = SectionPictures(plan.part.name, processes, every=pictures == "all") if drawn else None
+            stack = _judge_stack(plan, records, bar, wanted)
+            recorded += [section.evidence for section in stack.sections]
+            say_untold([asdict(one) for one in stack.anchors])
+            folder = None if pattern is None else stack.folder_of(pattern, plan)
+            try:
+                if folder is not None:
+                    with bar.show():
+                        done = bar.begin_round("written", len(stack.sections))
+                        write_stack(folder, stack, plan.zone, plan.part.name, plan=plan, pictures=wanted, on_section=done)
+            finally:
+                if output.as_json:
+                    print_json(stack.result_json())
+                else:
+                    _print_stack(terminal(), stack)
+        if folder is not None and not output.as_json:
+            whole = ", stack.png, stack.svg, report.pdf" if drawn else ""
+            further = "".join(f", result.{name}" for name in plan.out.formats if name != "json")
+            typer.echo(f"results in {folder}: result.json, sections.csv, a folder for each section{whole}{further}")
+            if wanted is not None and (left := sum(not wanted.wants(section) for section in stack.sections)):
+                typer.echo(f"sections that were not drawn: {left}; --pictures all draws those that conform as well")
     return EXIT_OF[stack.verdict]
 
 
-def _judge_stack(plan: "CtPlan", output: Output, bar: "_SectionBar", pictures: "SectionPictures | None", no_record: bool) -> "StackOutcome":
+def _judge_stack(plan: "CtPlan", records: Path | None, bar: "_SectionBar", pictures: "SectionPictures | None") -> "StackOutcome":
     """Inspect the sections, each of which is drawn as soon as it is judged, where pictures are wanted."""
     from cmmlink.stack import inspect_stack
 
@@ -246,7 +250,7 @@ def _judge_stack(plan: "CtPlan", output: Output, bar: "_SectionBar", pictures: "
             plan,
             clock=time.monotonic,
             stop=stop,
-            records=None if no_record else records_folder(output.records or plan.records.folder),
+            records=records,
             patience_s=_PATIENCE_S,
             on_start=begin,
             on_section=add,

@@ -22,6 +22,7 @@ from cmmlink.commands.options import (
 )
 from cmmlink.commands.output import Output, now, report_outcome, stop_on_ctrl_c
 from cmmlink.commands.progress import progress
+from cmmlink.commands.pushed import pushing_after
 from cmmlink.commands.surface_outcome import report_surface
 from cmmlink.errors import PlanError
 from cmmlink.plan import SurfaceFit
@@ -153,12 +154,15 @@ def surface(
         "out": None,
     }
     plan = plan_given_by(SurfacePlan, settings, _OPTION_OF)
+    folder = None if no_record else records_folder(records)
     if section is not None:
-        return _inspect_section(plan, section, slab, out, None if no_record else records_folder(records), as_json=as_json)
+        return _inspect_section(plan, section, slab, out, folder, as_json=as_json)
     if slab is not None:
         raise PlanError("--slab is for a section; expected --section beside it")
-    finished = _inspect(plan, out, None if no_record else records_folder(records))
-    return report_surface(finished, out, as_json=as_json)
+    with pushing_after(folder) as recorded:
+        finished = _inspect(plan, out, folder)
+        recorded.append(finished.evidence)
+        return report_surface(finished, out, as_json=as_json)
 
 
 def _inspect(plan: "SurfacePlan", out: Path | None, records: Path | None) -> "FinishedSurface":
@@ -187,11 +191,12 @@ def _inspect_section(
     from cmmlink.surface_section import section_of_scan
 
     plane = Section.model_validate(section_in("xy", numbers))
-    with stop_on_ctrl_c() as stop:
+    with pushing_after(records) as recorded, stop_on_ctrl_c() as stop:
         with progress(f"inspecting {plan.part.name}"), section_of_scan(plan, plane, slab_mm) as cut:
             prepare(out)
             profile = profile_of(cut.plan)
             finished = carry_out(cut.plan, profile, cut.device, records=records, clock=time.monotonic, now=now, stop=stop)
+        recorded.append(finished.evidence)
         return report_outcome(finished, Output(headless=True, as_json=as_json, out=out))
 
 

@@ -9,11 +9,16 @@ from pathlib import Path
 
 from cmmlink.errors import RunError
 
-CHILD = (
+_CHILD = (
     "import os, sys; sys.path.append(sys.argv.pop(1)); getattr(os, 'nice', int)(10); from cmmlink.__main__ import main; sys.exit(main())"
 )
 BELOW_NORMAL = getattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0)  # Windows has no `nice`
 _LONGEST_S = 300.0  # a report of a million points takes a few seconds
+
+
+def this_program(words: Sequence[str]) -> list[str]:
+    """What starts this program once more, with less priority than any run: `cmmlink` with these words behind it."""
+    return [sys.executable, "-P", "-c", _CHILD, str(Path(__file__).resolve().parents[2]), *words]
 
 
 def make_report(records: Path, run: str, file: Path, settings: Mapping[str, str]) -> None:
@@ -38,11 +43,9 @@ def make_trend(records: Path, part: str, file: Path, options: Sequence[str]) -> 
 
 def _make(command: list[str], records: Path, file: Path, options: list[str]) -> None:
     words = [*command, "--records", str(records), "--out", str(file), "--json", *options]
-    child = [sys.executable, "-P", "-c", CHILD, str(Path(__file__).resolve().parents[2]), *words]
+    child, quiet = this_program(words), subprocess.DEVNULL
     try:
-        ended = subprocess.run(
-            child, stdin=subprocess.DEVNULL, capture_output=True, timeout=_LONGEST_S, creationflags=BELOW_NORMAL, check=False
-        )
+        ended = subprocess.run(child, stdin=quiet, capture_output=True, timeout=_LONGEST_S, creationflags=BELOW_NORMAL, check=False)
     except subprocess.TimeoutExpired:
         raise RunError(f"it was not made within {_LONGEST_S:g} s") from None
     if ended.returncode or not file.is_file():

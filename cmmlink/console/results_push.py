@@ -6,7 +6,6 @@ and waits for nothing. It ends with the console: nothing comes through its stand
 
 import json
 import subprocess
-import sys
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -15,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from cmmlink.console.alarms import Alarms
-from cmmlink.console.paper_process import BELOW_NORMAL, CHILD
+from cmmlink.console.paper_process import BELOW_NORMAL, this_program
 from cmmlink.console.protocol import ResultsState
 from cmmlink.console.refused import without_folders
 from cmmlink.record import FILE_NAME
@@ -82,8 +81,7 @@ def pushing(records: Path | None, pushed: PushedResults, pause_s: float = _PAUSE
 
 def _keep_pushing(records: Path, pushed: PushedResults, ended: threading.Event, pause_s: float) -> None:
     """Run the process, and start it again after a pause where it ended by itself."""
-    words = ["plant", "push", "--stay", "--json", "--records", str(records)]
-    command = [sys.executable, "-P", "-c", CHILD, str(Path(__file__).resolve().parents[2]), *words]
+    command = this_program(["plant", "push", "--stay", "--json", "--records", str(records)])
     while not (records / FILE_NAME).exists():  # nothing was recorded yet
         if ended.wait(_LOOK_S):
             return

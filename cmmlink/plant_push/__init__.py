@@ -7,7 +7,7 @@ TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer 
 
 if TYPE_CHECKING:
     from cmmlink.plant_push.following import LOOK_S, be_last_in_line, follow
-    from cmmlink.plant_push.plant_settings import RESULTS_FILE, SETTINGS_FILE, address_for, keep_address
+    from cmmlink.plant_push.plant_settings import RESULTS_FILE, SETTINGS_FILE, address_for, keep_address, named_address
     from cmmlink.plant_push.pushing import Outbox, outbox_of, push
     from cmmlink.plant_push.recorded_results import stored_run
     from cmmlink.plant_push.verifying import PlantVerified, Row, verify_plant
@@ -16,7 +16,7 @@ else:
 
     _PLACES = {
         "cmmlink.plant_push.following": ("LOOK_S", "be_last_in_line", "follow"),
-        "cmmlink.plant_push.plant_settings": ("RESULTS_FILE", "SETTINGS_FILE", "address_for", "keep_address"),
+        "cmmlink.plant_push.plant_settings": ("RESULTS_FILE", "SETTINGS_FILE", "address_for", "keep_address", "named_address"),
         "cmmlink.plant_push.pushing": ("Outbox", "outbox_of", "push"),
         "cmmlink.plant_push.recorded_results": ("stored_run",),
         "cmmlink.plant_push.verifying": ("PlantVerified", "Row", "verify_plant"),
@@ -36,6 +36,7 @@ __all__ = [
     "be_last_in_line",
     "follow",
     "keep_address",
+    "named_address",
     "outbox_of",
     "push",
     "stored_run",

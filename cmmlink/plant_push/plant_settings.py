@@ -23,22 +23,27 @@ class PlantSettings(Settings):
 
 def address_for(records: Path) -> str:
     """Where the results of the station with these records go, as the database takes it. Raises PlantError."""
-    file = records / SETTINGS_FILE
-    try:
-        text = file.read_text(encoding="utf-8")[:_LONGEST]
-    except FileNotFoundError:
-        return address_of(records / RESULTS_FILE)
-    except (OSError, UnicodeDecodeError) as error:
-        told = error.strerror if isinstance(error, OSError) else "it is no text (UTF-8)"
-        raise PlantError(f"{file}: cannot be read: {told}; `cmmlink plant address ADDRESS` writes it anew") from None
-    try:
-        given = read_model(text, PlantSettings).address
-    except YamlError as error:
-        raise PlantError(f"{file}: {error}") from None
+    given = named_address(records)
     if given is None:
         return address_of(records / RESULTS_FILE)
     is_path = "://" not in given
     return address_of(records / given if is_path else given)
+
+
+def named_address(records: Path) -> str | None:
+    """The address in the settings of the station with these records; None where they name none. Raises PlantError."""
+    file = records / SETTINGS_FILE
+    try:
+        text = file.read_text(encoding="utf-8")[:_LONGEST]
+    except FileNotFoundError:
+        return None
+    except (OSError, UnicodeDecodeError) as error:
+        told = error.strerror if isinstance(error, OSError) else "it is no text (UTF-8)"
+        raise PlantError(f"{file}: cannot be read: {told}; `cmmlink plant address ADDRESS` writes it anew") from None
+    try:
+        return read_model(text, PlantSettings).address
+    except YamlError as error:
+        raise PlantError(f"{file}: {error}") from None
 
 
 def keep_address(records: Path, address: str) -> None:
