@@ -43,7 +43,7 @@ def test_the_results_of_a_run_are_pushed_by_itself(nominal: Path, monkeypatch: p
     [
         ("import threading; threading.Event().wait()", "nothing was answered within 0.3 s"),
         ("", "it failed"),
-        ("print('{\"error\": {\"message\": \"db: refused\"}}')", "db: refused"),
+        ('print(\'{"error": {"message": "db: refused"}}\')', "db: refused"),
     ],
 )
 def test_what_cannot_be_pushed_waits_in_the_outbox(nominal: Path, monkeypatch: pytest.MonkeyPatch, child: str, why: str) -> None:
