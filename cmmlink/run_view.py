@@ -7,110 +7,34 @@ at every batch. What looks is given an immutable `RunState`. Nobody waits for an
 import math
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import datetime
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from cmmlink.arrival_rate import ArrivalRate
-from cmmlink.characteristic_rows import Characteristics, characteristics_at_end, characteristics_so_far, names_of, worst_words
-from cmmlink.characteristics import base_row
-from cmmlink.endings import Ended, count_words, reasons_of
+from cmmlink.characteristic_rows import Characteristics, characteristics_at_end, characteristics_so_far, names_of
+from cmmlink.endings import Ended, count_words
 from cmmlink.events import Answered, Arrived, Counts, Evaluated, Event, Judged, ProvenOut, RunStarted
 from cmmlink.extremes import ChangedBins, PointsVersion
-from cmmlink.from_plan import zone_of
-from cmmlink.plan import Plan, SurfacePlan
 from cmmlink.result_json import number, result_json
-from cmmlink.run_state import AnswerState, LinkPhase, Phase, RegistrationState, RunKind, RunState, VerdictState, WholeSurface, ZoneLimits
+from cmmlink.run_context import RunContext
+from cmmlink.run_state import AnswerState, LinkPhase, Phase, RunState, VerdictState, WholeSurface, ZoneLimits
 from cmmlink.shown_section import ShownSection
-from cmmlink.words import LOOKS_OUT, NOT_MEASURED, VERDICT_WORDS, Headline, headline_of, local_words
+from cmmlink.shown_verdict import registration_shown, verdict_at_end, verdict_state
+from cmmlink.words import LOOKS_OUT, NOT_MEASURED, VERDICT_WORDS, headline_of, local_words
 from drivers import Heartbeat, LinkDown, LinkUp, PointBatch, Rejected, ScanClosed, ScanOpened
-from inspection import InspectionResult, LiveUpdate, NominalProfile, ToleranceZone, Verdict
+from inspection import InspectionResult, LiveUpdate, NominalProfile, Verdict
 
 if TYPE_CHECKING:  # who shows sections alone loads nothing of surfaces
-    from cmmlink.nominal_files.surface_file import SurfaceFile
-    from cmmlink.shown_surface import ShownSurface
     from cmmlink.worst_voxels import ChangedVoxels
-    from inspection.surface import NominalSurface, SurfaceResult, SurfaceUpdate
+    from inspection.surface import SurfaceResult, SurfaceUpdate
 
 _COUNTED = ("received", "judged", "rejected", "lost", "damaged_bytes", "rejected_by_reason")
 _ALIVE_S = 1.0
 _COVERAGE_EVERY_S = 0.25
 _ROWS_AT_ONCE = 1 << 16
 _MOST_WAITING = 8192  # points; the run itself sees to them where nobody looks
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RunContext:
-    """What is known of a run before it begins: its number or title, its plan, and what the points are judged by.
-
-    nominal : a section or a whole surface
-    base : the place of the characteristic that fails wherever a point is proven to be out of the zone; None where none need fail
-    answers : a machine waits for the verdict
-    gap_max_mm  : of a whole surface the diameter of the widest place without a point that counts as measured
-    document_of : says what is told of the result of a whole surface
-    """
-
-    number: str
-    plan: str
-    nominal: "NominalProfile | NominalSurface"
-    zone: ToleranceZone
-    coverage_min: float
-    buffer_points: int
-    began: datetime
-    kind: RunKind = "run"
-    base: int | None = 0
-    answers: bool = False
-    gap_max_mm: float = math.nan
-    document_of: "Callable[[SurfaceResult | None, Counts], Mapping[str, Any]] | None" = None
-
-    @classmethod
-    def of(cls, plan: Plan, profile: NominalProfile, began: datetime, number: str, plan_name: str, kind: RunKind = "run") -> "RunContext":
-        """What a plan says of a run that begins, or began, at a time of day."""
-        zone, coverage_min = zone_of(plan, profile), plan.registration.coverage_min
-        answers = plan.answer is not None and kind == "run"
-        return cls(number, plan_name, profile, zone, coverage_min, plan.buffer_points, began, kind, base_row(plan), answers)
-
-    @classmethod
-    def of_surface(
-        cls,
-        plan: SurfacePlan,
-        file: "SurfaceFile",
-        document_of: "Callable[[SurfaceResult | None, Counts], Mapping[str, Any]]",
-        began: datetime,
-        number: str,
-        plan_name: str,
-        kind: RunKind = "run",
-    ) -> "RunContext":
-        """What the plan of a whole surface says of a run; `document_of` says what is told of its result."""
-        from cmmlink.from_surface_plan import held_against, terms_of  # noqa: PLC0415 - who shows sections alone loads nothing of surfaces
-
-        nominal, terms = held_against(plan, file), terms_of(plan)
-        return cls(
-            number,
-            plan_name,
-            nominal,
-            terms.zone_on(nominal),
-            plan.registration.coverage_min,
-            plan.buffer_points,
-            began,
-            kind,
-            gap_max_mm=terms.limits_on(nominal).gap_max_mm,
-            document_of=document_of,
-        )
-
-    @property
-    def length_mm(self) -> float:
-        """The length of the section; 0 of a whole surface, which has none."""
-        return self.nominal.length_mm if isinstance(self.nominal, NominalProfile) else 0.0
-
-    def shown(self) -> "ShownSection | ShownSurface":
-        """What is shown of its points, before there are any."""
-        if isinstance(self.nominal, NominalProfile):
-            return ShownSection(self.nominal, self.zone)
-        from cmmlink.shown_surface import ShownSurface  # noqa: PLC0415 - who shows sections alone loads nothing of surfaces
-
-        return ShownSurface(self.nominal, self.zone, self.gap_max_mm)
 
 
 class RunView:
@@ -409,7 +333,7 @@ class RunView:
             stalls=counts.stalls,
             latency_s=number(self._latency_s),
             verdict_at_ms=self._verdict_at.timestamp() * 1e3 if self._verdict_at else None,
-            registration=self._registration(),
+            registration=registration_shown(self._ended, self._update),
             coverage=self._coverage,
             coverage_min=context.coverage_min,
             out_of_tolerance=self._out,
@@ -430,57 +354,29 @@ class RunView:
 
         return whole_surface_in(self._ended.result, self.context.gap_max_mm)
 
-    def _registration(self) -> RegistrationState:
-        found = self._ended.result["registration"] if self._ended else None
-        if found is not None and self._ended is not None and self._ended.ending == "complete":
-            return RegistrationState("settled", 0.0, _other_poses(found))
-        if found is not None:
-            return RegistrationState("provisional", None, _other_poses(found))  # more points would have moved it
-        if self._update is None:
-            return RegistrationState("seeking", None, 0)
-        can_move_mm = self._update.can_move_mm if isinstance(self._update, LiveUpdate) else math.nan
-        return RegistrationState(self._update.state, 0.0 if self._update.state == "settled" else number(can_move_mm), 0)
-
     def _verdict(self) -> VerdictState:
         ended = self._ended
         if self._failure:
             headline = headline_of(None, "interrupted", self._coverage) if self._counts.received else NOT_MEASURED
-            return _state_of(headline, True, self._failure)
-        if ended is None:
-            return self._verdict_so_far()
-        result = ended.result
-        found = Verdict[result["verdict"].upper()] if result["registration"] and result["received"] else None
-        early = ended.ending != "complete" and result["received"] > 0
-        headline = headline_of(found, ended.ending, result["coverage"]) if early else headline_of(found)
-        why, *further = reasons_of(ended, found)
-        of = "" if early or found is None else worst_words(self._characteristics.rows)
-        return _state_of(headline, not early, why, further, of)
+            return verdict_state(headline, True, self._failure)
+        return self._verdict_so_far() if ended is None else verdict_at_end(ended, self._characteristics.rows)
 
     def _verdict_so_far(self) -> VerdictState:
         unproven, out = headline_of(Verdict.UNCERTAIN), headline_of(Verdict.NONCONFORM)
         if self._phase == "preparing":
-            return _state_of(unproven, False, "preparing the inspection")
+            return verdict_state(unproven, False, "preparing the inspection")
         proven, looks_out = (names_of(self._characteristics.rows, shape) for shape in (out.shape, LOOKS_OUT.shape))
         if self._proven_at is not None and self.context.base is not None:
-            return _state_of(out, False, f"no placement of the first {count_words(self._proven_at)} passes", of=proven)
+            return verdict_state(out, False, f"no placement of the first {count_words(self._proven_at)} passes", of=proven)
         if proven:
-            return _state_of(out, False, "proven, whatever comes", of=proven)
+            return verdict_state(out, False, "proven, whatever comes", of=proven)
         if self._out:
-            is_proof = self.context.base is not None and self._registration().state == "settled"
+            is_proof = self.context.base is not None and registration_shown(None, self._update).state == "settled"
             headline, how = (out, "out so far") if is_proof else (LOOKS_OUT, "so far, not proven")
-            return _state_of(headline, False, f"{count_words(self._out)} {how}", of=looks_out)
+            return verdict_state(headline, False, f"{count_words(self._out)} {how}", of=looks_out)
         if looks_out:
-            return _state_of(LOOKS_OUT, False, "so far, not proven", of=looks_out)
+            return verdict_state(LOOKS_OUT, False, "so far, not proven", of=looks_out)
         if not self._counts.judged:
             is_sought = self._update is not None and self._update.state == "seeking"
-            return _state_of(unproven, False, "seeking the part" if is_sought else "waiting for points")
-        return _state_of(unproven, False, f"{math.floor(100 * self._coverage)} % measured, none out so far")
-
-
-def _state_of(headline: Headline, final: bool, why: str, further: Sequence[str] = (), of: str = "") -> VerdictState:
-    return VerdictState(headline.words, headline.shape, final, why, of, tuple(further))
-
-
-def _other_poses(found: Mapping[str, Any]) -> int:
-    """How many other poses fit as well: a section names them, a surface counts them."""
-    return int(found["rivals"]) if "rivals" in found else len(found.get("other_poses", ()))
+            return verdict_state(unproven, False, "seeking the part" if is_sought else "waiting for points")
+        return verdict_state(unproven, False, f"{math.floor(100 * self._coverage)} % measured, none out so far")

@@ -206,7 +206,7 @@ def _section(plan: "CtPlan", outcome: "SectionOutcome", plan_name: str) -> "Sect
     from cmmlink.console.ct_import import Section
     from cmmlink.endings import Ended
     from cmmlink.from_plan import zone_of
-    from cmmlink.run_view import RunContext
+    from cmmlink.run_context import RunContext
 
     height_mm, run = outcome.slice.height_mm, outcome.run
     title = f"Section at height {height_mm:.3f} mm of {plan.mesh.file.name}"

@@ -135,7 +135,8 @@ def _run(plan: "Plan", profile: "NominalProfile", connect: "Connect", output: Ou
 
     from cmmlink.report import LiveTable
     from cmmlink.run import carry_out
-    from cmmlink.run_view import RunContext, RunView
+    from cmmlink.run_context import RunContext
+    from cmmlink.run_view import RunView
 
     quiet = output.headless or output.as_json or not sys.stderr.isatty()
     view = RunView(RunContext.of(plan, profile, now(), number="", plan_name=""), time.monotonic, now)

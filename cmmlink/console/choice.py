@@ -14,7 +14,7 @@ from cmmlink.from_plan import check_plan, zone_of
 from cmmlink.from_surface_plan import check_surface_plan, document_of_surface
 from cmmlink.nominal_files.surface_file import SurfaceFile
 from cmmlink.plan import Plan, SurfacePlan, kind_of_plan, load_plan, load_surface_plan
-from cmmlink.run_view import RunContext
+from cmmlink.run_context import RunContext
 from drivers import PointFileError
 from inspection import InspectionError, NominalProfile, ToleranceZone
 

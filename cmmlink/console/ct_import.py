@@ -10,7 +10,7 @@ from cmmlink.console.refused import without_folders
 from cmmlink.endings import Ended
 from cmmlink.errors import StoreError
 from cmmlink.events import RunStarted
-from cmmlink.run_view import RunContext
+from cmmlink.run_context import RunContext
 from cmmlink.words import NOT_MEASURED, Headline, headline_of
 from drivers import DeviceError
 from inspection import Verdict

@@ -43,8 +43,8 @@ from cmmlink.record import (
 )
 from cmmlink.record import export_run as export_files
 from cmmlink.result_json import result_json
+from cmmlink.run_context import RunContext
 from cmmlink.run_state import RunKind
-from cmmlink.run_view import RunContext
 from cmmlink.surface_rows import SurfaceRows
 from cmmlink.words import headline_of, judgement_words, local_words, section_words
 from drivers import Decoder

@@ -159,8 +159,7 @@ class Station:
     def replay(self, run: str) -> str:
         """Measure a recorded run again, from its recorded bytes."""
         with self._new_job("replay", "a record can be replayed") as job:
-            records = self._records()
-            with answer_errors():
+            with self._records() as records:
                 recorded = records.open_run(run)
             view = RunView(recorded.context(f"replay of {recorded.run}", "replay"), self._setup.clock, lambda: recorded.began)
             job.view = view
@@ -224,8 +223,7 @@ class Station:
 
     def open_run(self, run: str) -> RunView:
         """Give a recorded run to look at."""
-        records = self._records()
-        with answer_errors():
+        with self._records() as records:
             recorded = records.open_run(run)
         title = f"Recorded run {recorded.run} of {recorded.began:%Y-%m-%d %H:%M}"
         view = RunView(recorded.context(title, "recorded"), self._setup.clock, lambda: recorded.began)
@@ -244,27 +242,23 @@ class Station:
 
     def find_runs(self, search: RunSearch) -> FoundRuns:
         """Look for recorded runs."""
-        records = self._records()
-        with answer_errors():
+        with self._records() as records:
             rows, total = records.find_runs(search)
         return FoundRuns(tuple(rows), total)
 
     def export_run(self, run: str, folder: Path) -> Path:
         """Write a recorded run as a zip archive into a folder."""
-        records = self._records()
-        with answer_errors():
+        with self._records() as records:
             return records.export_run(run, folder)
 
     def report_run(self, run: str, folder: Path, settings: Mapping[str, str]) -> Path:
         """Write the report of a recorded run into a folder; `settings` are those of its look that are not as its plan says."""
-        records = self._records()
-        with answer_errors():
+        with self._records() as records:
             return records.report_run(run, folder, settings)
 
     def compare_runs(self, first: str, second: str, folder: Path) -> Path:
         """Draw two recorded runs of one profile and their difference into a folder."""
-        records = self._records()
-        with answer_errors():
+        with self._records() as records:
             return records.compare_runs(first, second, folder)
 
     def devices(self) -> list[tuple[str, str]]:
@@ -339,10 +333,12 @@ class Station:
             busy = "registers are being read" if self._job is not None and self._job.kind == "registers" else "a run is on"
             raise Refused(f"{busy}; {what} when it is over")
 
-    def _records(self) -> Records:
+    @contextmanager
+    def _records(self) -> Iterator[Records]:
         if self._setup.records is None:
             raise Refused("this station keeps no records")
-        return self._setup.records
+        with answer_errors():
+            yield self._setup.records
 
     def _knowing_the_part(self, checked: CheckedPlan | CheckedSurface, *, again: bool) -> CheckedPlan | CheckedSurface:
         """The plan with a note where its part was measured before, which is refused unless it is to be measured again."""

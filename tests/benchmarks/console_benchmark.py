@@ -34,7 +34,8 @@ from cmmlink.events import Counts, Judged, RunStarted
 from cmmlink.from_plan import inspection_of, profile_of
 from cmmlink.plan.scan import Plan, load_plan
 from cmmlink.plan.whole_surface import SurfacePlan
-from cmmlink.run_view import RunContext, RunView
+from cmmlink.run_context import RunContext
+from cmmlink.run_view import RunView
 from drivers.source import Arrival, PointBatch
 from inspection import LiveUpdate, NominalProfile
 from tests.cmmlink.console.conftest import FLAGS

@@ -32,7 +32,8 @@ from cmmlink.plan import FileDevice, Plan, load_plan
 from cmmlink.record import check_chain, describe, export_run, find_run, open_to_read, recorded_run, replay_run
 from cmmlink.report import write_run
 from cmmlink.run import carry_out
-from cmmlink.run_view import RunContext, RunView
+from cmmlink.run_context import RunContext
+from cmmlink.run_view import RunView
 from cmmlink.scratch import Scratch
 from drivers import Arrival, PointBatch, ScanClosed, ScanOpened
 from inspection import NominalProfile, RigidTransform

@@ -32,7 +32,8 @@ from cmmlink.console.server import ConsoleServer
 from cmmlink.console.station import Station
 from cmmlink.events import Event, Judged, RunStarted, Sink
 from cmmlink.pipeline import run_inspection
-from cmmlink.run_view import RunContext, RunView
+from cmmlink.run_context import RunContext
+from cmmlink.run_view import RunView
 from drivers.codecs.binary_frames import BinaryDecoder
 from drivers.links.link_settings import LinkSettings
 from drivers.links.serial_scanner import SerialScanner

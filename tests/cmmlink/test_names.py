@@ -18,7 +18,8 @@ from cmmlink.report.judged_scan import scan_of
 from cmmlink.report.picture import ProfilePictures
 from cmmlink.report.picture_content import content_of
 from cmmlink.result_folder import folder_of
-from cmmlink.run_view import RunContext, RunView
+from cmmlink.run_context import RunContext
+from cmmlink.run_view import RunView
 from inspection import NominalProfile, ToleranceZone
 from tests.cmmlink.command import cmmlink
 from tests.cmmlink.commands.oval_files import write_plan

@@ -10,8 +10,9 @@ import pytest
 
 from cmmlink.events import Answered, Arrived, Counts, Evaluated, Judged, ProvenOut, RunFinished, RunStarted
 from cmmlink.extremes import Extremes, PointsVersion
+from cmmlink.run_context import RunContext
 from cmmlink.run_state import AnswerState
-from cmmlink.run_view import RunContext, RunView
+from cmmlink.run_view import RunView
 from drivers import Arrival, LinkDown, LinkUp, PointBatch, ScanClosed, ScanOpened
 from inspection import LiveUpdate, NominalProfile, NurbsCurve, State, ToleranceZone, Verdict, discretize
 from tests.cmmlink.test_characteristic_rows import CHORD, OUT, PROVEN

@@ -15,7 +15,7 @@ from cmmlink.console.station import Station
 from cmmlink.endings import Ended
 from cmmlink.events import Counts, RunStarted
 from cmmlink.result_json import result_json
-from cmmlink.run_view import RunContext
+from cmmlink.run_context import RunContext
 from inspection import NominalProfile, NurbsCurve, ToleranceZone, discretize
 
 from .played import Device, setup_of

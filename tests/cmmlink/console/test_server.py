@@ -25,7 +25,8 @@ from cmmlink.console.server import ConsoleServer
 from cmmlink.console.station import Station
 from cmmlink.from_plan import profile_of
 from cmmlink.plan.scan import load_plan
-from cmmlink.run_view import RunContext, RunView
+from cmmlink.run_context import RunContext
+from cmmlink.run_view import RunView
 
 from .played import UNREAD, Device, setup_of, write_plan
 

@@ -8,7 +8,8 @@ from rich.console import Console
 
 from cmmlink.events import Arrived, Counts, Judged, RunFinished, RunStarted
 from cmmlink.report.live_table import LiveTable
-from cmmlink.run_view import RunContext, RunView
+from cmmlink.run_context import RunContext
+from cmmlink.run_view import RunView
 from drivers import LinkDown, ScanOpened
 from inspection import LiveInspection, NominalProfile, RigidTransform, ToleranceZone
 from tests.cmmlink.judged_oval import bumped
