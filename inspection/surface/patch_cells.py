@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 _BAND = 0.008  # of the size: how far from the surface cells are made; what is farther off is searched in the tree
 _BLOCK = 2.0  # of the band, along a block
-_DEEPEST = 2
+_DEEPEST = 3
 _MOST = 8_000_000  # cells: 32 MB
 
 

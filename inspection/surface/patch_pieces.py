@@ -33,6 +33,7 @@ Index = NDArray[np.int64]
 MISSED = 2e-13  # of the size, by which a quintic may miss a face that is none
 _TURNS_PER_RAD = 8.0  # pieces in a stretch that turns by one radian
 _LONGEST = 0.02  # of the size; but what is nearly flat is cut into eight times fewer pieces than it would be by its turn
+_UNEVEN = 0.5, 0.5  # what a change of speed along a knot span, of itself, counts as a turn in radians, and the most that it counts as
 _ASPECT = 4.0  # of a piece that turns
 _MOST_PIECES = 2_000_000
 _MOST_HALVINGS = 12
@@ -138,13 +139,15 @@ def _wanted_cuts(face: SplineFace, breaks: tuple[Array, Array], size_mm: float) 
         along = np.abs((twist * normal).sum(axis=-1)) / area
         turn_u = np.maximum(np.linalg.norm(np.cross(du, d[2, 0]), axis=-1) / speed_u**2, along / speed_v)
         turn_v = np.maximum(np.linalg.norm(np.cross(dv, d[0, 2]), axis=-1) / speed_v**2, along / speed_u)
+        uneven_u, uneven_v = np.abs((du * d[2, 0]).sum(axis=-1)) / speed_u**2, np.abs((dv * d[0, 2]).sum(axis=-1)) / speed_v**2
     wanted, lengths = [], []
-    for axis, (speed, turn, line) in enumerate(((speed_u, turn_u, breaks[0]), (speed_v, turn_v, breaks[1]))):
+    for axis, (*rates, line) in enumerate(((speed_u, turn_u, uneven_u, breaks[0]), (speed_v, turn_v, uneven_v, breaks[1]))):
         spans = np.diff(line)
-        length, turned = (
-            _most_in_spans(np.where(known, values, 0.0), axis, len(spans)) * spans for values in (speed, np.minimum(turn, 1e6))
+        length, turned, uneven = (
+            _most_in_spans(np.where(known, np.minimum(values, most), 0.0), axis, len(spans)) * spans
+            for values, most in zip(rates, (np.inf, 1e6, 1e6), strict=True)
         )
-        by_turn = _TURNS_PER_RAD * turned
+        by_turn = _TURNS_PER_RAD * np.maximum(turned, np.minimum(_UNEVEN[0] * uneven, _UNEVEN[1]))
         wanted.append(np.maximum(by_turn, np.minimum(length / (_LONGEST * size_mm), 8 * by_turn)))
         lengths.append(length)
     widest = [float((length / np.maximum(1, cut)).max()) for length, cut in zip(lengths, wanted, strict=True)]

@@ -39,6 +39,11 @@ NOTHING = -1  # in place of a triangle beyond an edge, where there is none
 # What a foot lies on in its triangle: its inside, the edges AB, AC, BC, the corners A, B, C.
 IN_TRIANGLE, EDGE_1, EDGE_2, EDGE_3, CORNER_1, CORNER_2, CORNER_3 = range(7)
 
+# --- cells of space with the piece of a spline face that Newton's method begins in -----------------------------------------
+
+NAMED = 2  # a cell holds NAMED * (number of a piece) + one of these:
+CERTAIN, GUESSED = range(2)  # whether a foot that is found from there is certainly the closest point, or a search may only begin with it
+
 # --- a piece of a spline face: a polynomial in s, t of [-1/2, 1/2] each -------------------------------------------------------
 
 # Bounds over the piece of the lengths of S_s, S_t, S_ss, S_st, S_tt, S_sss, S_sst, S_stt, S_ttt.

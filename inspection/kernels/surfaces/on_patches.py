@@ -22,12 +22,14 @@ from inspection.kernels.surfaces.layout import (
     BOX_AXES,
     BOX_HALF,
     BOX_MIDDLE,
+    CERTAIN,
     FAR,
     HALF,
     INNER,
     LINKS,
     M01,
     M10,
+    NAMED,
     ON_BORDER,
     ON_CORNER,
     ON_EDGE,
@@ -42,7 +44,7 @@ from inspection.kernels.surfaces.layout import (
     SIDES,
     STACK,
 )
-from inspection.kernels.surfaces.patch_walk import walk_to_foot
+from inspection.kernels.surfaces.patch_walk import WALK, walk_to_foot
 from inspection.kernels.surfaces.piece_minimum import closest_on_piece, piece_at
 from inspection.kernels.surfaces.space_feet import (
     AT_ONCE,
@@ -76,7 +78,7 @@ class PatchTables(NamedTuple):
     row_width    : numbers in a row
     grid         : (GRID_WIDTH,) where the blocks of cells lie
     blocks       : (3,) how many there are along x, y and z
-    cells        : what each block, and each part of one that is cut, holds: LISTED - (the piece to begin in), see `patch_cells`
+    cells        : what each block, and each part of one that is cut, holds: LISTED - (NAMED * (piece to begin in) + CERTAIN or GUESSED)
     grain_mm     : a distance below which it is round-off; a foot that is held back at a border by less is not beyond it
     """
 
@@ -117,13 +119,15 @@ def _project_chunks(points: Any, tables: Any, feet: Any, claimed: Any) -> None:
             if not (np.isfinite(x) and np.isfinite(y) and np.isfinite(z)):
                 store_no_foot(feet, i)
                 continue
-            start = list_at(grid, blocks, cells, x, y, z)
-            if start != FAR:
-                is_foot, named, s, t = walk_to_foot(rows, beyond, width, row_width, start, x, y, z, 1)
-                if is_foot:
-                    _store_foot(x, y, z, tables, named, s, t, feet, i)
-                    continue
             least, best, s, t = square_from_last(foot_mm, i, begin, x, y, z), _NONE_YET, 0.0, 0.0
+            named = list_at(grid, blocks, cells, x, y, z)
+            if named != FAR:
+                certain = named % NAMED == CERTAIN
+                is_foot, best, s, t = walk_to_foot(rows, beyond, width, row_width, named // NAMED, x, y, z, 1 if certain else WALK)
+                if is_foot and certain:
+                    _store_foot(x, y, z, tables, best, s, t, feet, i)
+                    continue
+                least, s, t = closest_on_piece(rows, best * row_width, width, x, y, z, memory)
             waiting[0], memory[0] = 0, 0.0
             depth = _ROOT_ALONE
             while True:
@@ -131,7 +135,7 @@ def _project_chunks(points: Any, tables: Any, feet: Any, claimed: Any) -> None:
                 if leaf < 0:
                     break
                 piece = np.int64(members[leaf])
-                if square_from_box(rows, piece * row_width, x, y, z) > least * _ROUND_OFF:
+                if piece == best or square_from_box(rows, piece * row_width, x, y, z) > least * _ROUND_OFF:
                     continue
                 square, here_s, here_t = closest_on_piece(rows, piece * row_width, width, x, y, z, memory)
                 if square < least or (square == least and piece < best):

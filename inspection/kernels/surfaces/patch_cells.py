@@ -23,26 +23,27 @@ from inspection.kernels.compiling import (
     uncounted_kernel,
 )
 from inspection.kernels.surfaces.layout import (
+    CERTAIN,
     COEFFICIENTS,
     FAR,
     GRID_BLOCK_MM,
     GRID_LOW,
+    GUESSED,
     HALF,
     INNER,
     LINKS,
     LISTED,
-    M01,
     M02,
-    M10,
     M11,
     M20,
+    NAMED,
     PIECE_STRIDE,
     SCRATCH,
     STACK,
 )
 from inspection.kernels.surfaces.on_patches import PatchTables, square_from_box
 from inspection.kernels.surfaces.patch_walk import walk_to_foot
-from inspection.kernels.surfaces.piece_minimum import square_at, strays
+from inspection.kernels.surfaces.piece_minimum import bent_at, beyond_first_order, dot, piece_at, square_at
 from inspection.kernels.surfaces.space_feet import next_leaf
 
 Index = NDArray[np.int32]
@@ -169,9 +170,10 @@ def _enter(
         return depth - 1
     found = _keep(tables, kept, given, count, own, x, y, z, radius, (distance + 2.0 * radius) * _ROOM)
     if _is_certified(tables, nets, kept, own, found, start, x, y, z, radius):
-        cells[cell] = LISTED - start
+        cells[cell] = LISTED - (NAMED * start + CERTAIN)
         return depth - 1
     if depth == deepest or used[0] + _PARTS > len(cells):
+        cells[cell] = LISTED - (NAMED * start + GUESSED)
         return depth - 1
     cells[cell] = used[0]
     for part in range(_PARTS):
@@ -217,13 +219,22 @@ def _keep(tables: Any, kept: Any, given: int, count: int, own: int, x: float, y:
 @uncounted_kernel
 def _may_have_foot(rows: Any, row: int, width: int, x: float, y: float, z: float, radius: float) -> bool:
     """Whether the gradient may vanish on a piece for a place within a radius: no part of it keeps its sign."""
-    square, g, h, _, _, _, e, k, _, _, _ = square_at(rows, row, width, x, y, z, 0.0, 0.0)
-    distance = np.sqrt(square)
+    px, py, pz = piece_at(rows, row, width, 0.0, 0.0)
+    rx, ry, rz = px[0] - x, py[0] - y, pz[0] - z
+    g, h = rx * px[1] + ry * py[1] + rz * pz[1], rx * px[2] + ry * py[2] + rz * pz[2]
+    a = dot(px, py, pz, 1, 1) + rx * px[3] + ry * py[3] + rz * pz[3]
+    b = dot(px, py, pz, 1, 2) + rx * px[4] + ry * py[4] + rz * pz[4]
+    c = dot(px, py, pz, 2, 2) + rx * px[5] + ry * py[5] + rz * pz[5]
+    su, sv, distance = np.sqrt(dot(px, py, pz, 1, 1)), np.sqrt(dot(px, py, pz, 2, 2)), np.sqrt(rx * rx + ry * ry + rz * rz)
+    far, far_u, far_v = beyond_first_order(rows, row, HALF, HALF)
+    far, reach = far + radius, distance + (su + sv) * HALF
     du, dv = (rows[row + M20] + rows[row + M11]) * HALF, (rows[row + M11] + rows[row + M02]) * HALF
-    dr = (rows[row + M10] + rows[row + M01]) * HALF + radius
-    along_s = (distance * du + np.sqrt(e) * dr + dr * du) * _ROOM
-    along_t = (distance * dv + np.sqrt(k) * dr + dr * dv) * _ROOM
-    return bool(abs(g) <= along_s and abs(h) <= along_t)
+    st_s, st_t = abs(dot(px, py, pz, 1, 4)), abs(dot(px, py, pz, 2, 4))
+    twice_s = abs(dot(px, py, pz, 1, 3)) + st_s + abs(dot(px, py, pz, 2, 3)) + st_t
+    twice_t = abs(dot(px, py, pz, 2, 5)) + st_t + abs(dot(px, py, pz, 1, 5)) + st_s
+    along_s = (abs(a) + abs(b)) * HALF + twice_s * HALF * HALF + reach * far_u + far * (su + du)
+    along_t = (abs(b) + abs(c)) * HALF + twice_t * HALF * HALF + reach * far_v + far * (sv + dv)
+    return bool(abs(g) <= along_s * _ROOM and abs(h) <= along_t * _ROOM)
 
 
 @uncounted_kernel
@@ -253,7 +264,5 @@ def _is_certified(tables: Any, nets: Any, kept: Any, own: int, count: int, start
 @uncounted_kernel
 def _is_convex(rows: Any, row: int, width: int, x: float, y: float, z: float, radius: float) -> bool:
     """Whether the square of the distance is convex on a piece for every place within a radius."""
-    square, _, _, a, b, c, e, k, ss, st, tt = square_at(rows, row, width, x, y, z, 0.0, 0.0)
-    stray_a, stray_b, stray_c = strays(rows, row, np.sqrt(square), e, k, ss, st, tt, HALF, HALF, radius)
-    low_a, low_c, high_b = a - stray_a, c - stray_c, abs(b) + stray_b
+    _, _, _, _, _, _, low_a, high_b, low_c, e, k = bent_at(rows, row, width, x, y, z, 0.0, 0.0, HALF, HALF, radius)
     return bool(low_a > _CONVEX * e and low_c > _CONVEX * k and _DETERMINANT * low_a * low_c > high_b * high_b)

@@ -6,6 +6,7 @@ from inspection.kernels.compiling import uncounted_kernel
 from inspection.kernels.surfaces.layout import HALF, INNER, LINKS, PIECE_DU, PIECE_DV, PIECE_STRIDE, PIECE_U, PIECE_V
 from inspection.kernels.surfaces.piece_minimum import square_at
 
+WALK = 3  # pieces that a foot is looked for from the one that is begun in
 _STEPS = 12
 _SETTLED = 1e-6  # of a piece: a last step; the error of the foot after it is about its square, whatever the distance is
 _PAST = 1e-12  # of a piece: a foot so far beyond its side lies on the side
@@ -23,7 +24,7 @@ def walk_to_foot(
     off_s, off_t, held = 0, 0, 0
     for _ in range(_STEPS):
         row = piece * row_width
-        _, g, h, a, b, c, _, _, _, _, _ = square_at(rows, row, width, x, y, z, s, t)
+        _, g, h, a, b, c = square_at(rows, row, width, x, y, z, s, t)
         determinant = a * c - b * b
         if not (a > 0.0 and determinant > 0.0):
             break

@@ -68,40 +68,69 @@ def piece_at(rows: Any, row: int, width: int, s: float, t: float) -> tuple[tuple
 
 
 @uncounted_kernel
-def square_at(rows: Any, row: int, width: int, x: float, y: float, z: float, s: float, t: float) -> tuple[float, ...]:
-    """Square of the distance, half its gradient (2), half its Hessian (ss, st, tt), and the squares of S_s, S_t, S_ss, S_st, S_tt."""
+def square_at(
+    rows: Any, row: int, width: int, x: float, y: float, z: float, s: float, t: float
+) -> tuple[float, float, float, float, float, float]:
+    """Square of the distance, half its gradient (2), and half its Hessian (ss, st, tt)."""
     px, py, pz = piece_at(rows, row, width, s, t)
     rx, ry, rz = px[0] - x, py[0] - y, pz[0] - z
     g = rx * px[1] + ry * py[1] + rz * pz[1]
     h = rx * px[2] + ry * py[2] + rz * pz[2]
-    e = px[1] * px[1] + py[1] * py[1] + pz[1] * pz[1]
-    k = px[2] * px[2] + py[2] * py[2] + pz[2] * pz[2]
-    a = e + rx * px[3] + ry * py[3] + rz * pz[3]
+    a = px[1] * px[1] + py[1] * py[1] + pz[1] * pz[1] + rx * px[3] + ry * py[3] + rz * pz[3]
     b = px[1] * px[2] + py[1] * py[2] + pz[1] * pz[2] + rx * px[4] + ry * py[4] + rz * pz[4]
-    c = k + rx * px[5] + ry * py[5] + rz * pz[5]
-    ss = px[3] * px[3] + py[3] * py[3] + pz[3] * pz[3]
-    st = px[4] * px[4] + py[4] * py[4] + pz[4] * pz[4]
-    tt = px[5] * px[5] + py[5] * py[5] + pz[5] * pz[5]
-    return rx * rx + ry * ry + rz * rz, g, h, a, b, c, e, k, ss, st, tt
+    c = px[2] * px[2] + py[2] * py[2] + pz[2] * pz[2] + rx * px[5] + ry * py[5] + rz * pz[5]
+    return rx * rx + ry * ry + rz * rz, g, h, a, b, c
 
 
 @inlined_uncounted_kernel
-def strays(
-    rows: Any, row: int, distance: float, e: float, k: float, ss: float, st: float, tt: float, hs: float, ht: float, off: float
-) -> tuple[float, float, float]:
-    """How far the Hessian may stray over a rectangle of half sides hs and ht, by the squares of the derivatives in its middle.
+def dot(px: Any, py: Any, pz: Any, one: int, other: int) -> float:
+    """The scalar product of two of the derivatives that `piece_at` gives."""
+    return float(px[one] * px[other] + py[one] * py[other] + pz[one] * pz[other])
+
+
+@inlined_uncounted_kernel
+def beyond_first_order(rows: Any, row: int, hs: float, ht: float) -> tuple[float, float, float]:
+    """By how much S, S_s and S_t may differ from what their derivatives in the middle of a rectangle of half sides hs and ht say."""
+    ss, st, tt = 0.5 * hs * hs, hs * ht, 0.5 * ht * ht
+    far = rows[row + M20] * ss + rows[row + M11] * st + rows[row + M02] * tt
+    far_u = rows[row + M30] * ss + rows[row + M21] * st + rows[row + M12] * tt
+    far_v = rows[row + M21] * ss + rows[row + M12] * st + rows[row + M03] * tt
+    return far, far_u, far_v
+
+
+@uncounted_kernel
+def bent_at(
+    rows: Any, row: int, width: int, x: float, y: float, z: float, s: float, t: float, hs: float, ht: float, off: float
+) -> tuple[float, float, float, float, float, float, float, float, float, float, float]:
+    """What `square_at` gives, bounds of half the Hessian over a rectangle of half sides hs and ht, and the squares of S_s and S_t.
+
+    The bounds are the least of ss, the greatest size of st, and the least of tt. What changes by first order is known along each side; for
+    what is of higher order the bounds of the piece are taken.
 
     off : by how much the place may move
     """
-    su, sv, suu, suv, svv = np.sqrt(e), np.sqrt(k), np.sqrt(ss), np.sqrt(st), np.sqrt(tt)
+    px, py, pz = piece_at(rows, row, width, s, t)
+    rx, ry, rz = px[0] - x, py[0] - y, pz[0] - z
+    square = rx * rx + ry * ry + rz * rz
+    e, k, st_s = dot(px, py, pz, 1, 1), dot(px, py, pz, 2, 2), abs(dot(px, py, pz, 1, 4))
+    ss_s, ss_t, st_t = abs(dot(px, py, pz, 1, 3)), abs(dot(px, py, pz, 2, 3)), abs(dot(px, py, pz, 2, 4))
+    tt_s, tt_t = abs(dot(px, py, pz, 1, 5)), abs(dot(px, py, pz, 2, 5))
+    distance, su, sv = np.sqrt(square), np.sqrt(e), np.sqrt(k)
+    suu, suv, svv = np.sqrt(dot(px, py, pz, 3, 3)), np.sqrt(dot(px, py, pz, 4, 4)), np.sqrt(dot(px, py, pz, 5, 5))
+    far, far_u, far_v = beyond_first_order(rows, row, hs, ht)
+    far += off
     du, dv = rows[row + M20] * hs + rows[row + M11] * ht, rows[row + M11] * hs + rows[row + M02] * ht
-    dr = rows[row + M10] * hs + rows[row + M01] * ht + off
+    reach = distance + rows[row + M10] * hs + rows[row + M01] * ht + off
     da, db = rows[row + M30] * hs + rows[row + M21] * ht, rows[row + M21] * hs + rows[row + M12] * ht
     dc = rows[row + M12] * hs + rows[row + M03] * ht
-    stray_a = (2.0 * su + du) * du + distance * da + suu * dr + dr * da
-    stray_b = su * dv + sv * du + du * dv + distance * db + suv * dr + dr * db
-    stray_c = (2.0 * sv + dv) * dv + distance * dc + svv * dr + dr * dc
-    return stray_a, stray_b, stray_c
+    stray_a = 3.0 * ss_s * hs + (2.0 * st_s + ss_t) * ht + 2.0 * su * far_u + suu * far + reach * da
+    stray_b = (2.0 * st_s + ss_t) * hs + (2.0 * st_t + tt_s) * ht + su * far_v + sv * far_u + du * dv + suv * far + reach * db
+    stray_c = 3.0 * tt_t * ht + (2.0 * st_t + tt_s) * hs + 2.0 * sv * far_v + svv * far + reach * dc
+    g, h = rx * px[1] + ry * py[1] + rz * pz[1], rx * px[2] + ry * py[2] + rz * pz[2]
+    a = e + rx * px[3] + ry * py[3] + rz * pz[3]
+    b = dot(px, py, pz, 1, 2) + rx * px[4] + ry * py[4] + rz * pz[4]
+    c = k + rx * px[5] + ry * py[5] + rz * pz[5]
+    return square, g, h, a, b, c, a - stray_a, abs(b) + stray_b, c - stray_c, e, k
 
 
 @uncounted_kernel
@@ -120,7 +149,7 @@ def closest_on_piece(rows: Any, row: int, width: int, x: float, y: float, z: flo
             as_near *= 10.0
         at = SCRATCH + RECTANGLE_WIDTH * waiting
         s, t, hs, ht = memory[at], memory[at + 1], memory[at + 2], memory[at + 3]
-        square, g, h, a, b, c, e, k, ss, st, tt = square_at(rows, row, width, x, y, z, s, t)
+        square, g, h, a, b, c, low_a, high_b, low_c, e, k = bent_at(rows, row, width, x, y, z, s, t, hs, ht, 0.0)
         if square < best:
             best, best_s, best_t = square, s, t
         distance = np.sqrt(square)
@@ -128,8 +157,6 @@ def closest_on_piece(rows: Any, row: int, width: int, x: float, y: float, z: flo
         nearest = max(distance - rows[row + M10] * hs - rows[row + M01] * ht, 0.0)
         if nearest * nearest > wanted:
             continue
-        stray_a, stray_b, stray_c = strays(rows, row, distance, e, k, ss, st, tt, hs, ht, 0.0)
-        low_a, low_c, high_b = a - stray_a, c - stray_c, abs(b) + stray_b
         if low_a > _CONVEX * e and low_c > _CONVEX * k and _DETERMINANT * low_a * low_c > high_b * high_b:
             found, fs, ft = _newton(rows, row, width, x, y, z, s, t, hs, ht, (square, g, h, a, b, c))
             if found < best:
@@ -221,11 +248,11 @@ def _newton(
         following_s, following_t = min(max(s + ds, low_s), high_s), min(max(t + dt, low_t), high_t)
         if abs(following_s - s) * rows[row + M10] <= _STILL_MM and abs(following_t - t) * rows[row + M01] <= _STILL_MM:
             break
-        found, g_there, h_there, a_there, b_there, c_there = square_at(rows, row, width, x, y, z, following_s, following_t)[:6]
+        found, g_there, h_there, a_there, b_there, c_there = square_at(rows, row, width, x, y, z, following_s, following_t)
         halvings = 0
         while found > square * _UPHILL + _UPHILL_MM2 and halvings < _HALVINGS:
             following_s, following_t = 0.5 * (s + following_s), 0.5 * (t + following_t)
-            found, g_there, h_there, a_there, b_there, c_there = square_at(rows, row, width, x, y, z, following_s, following_t)[:6]
+            found, g_there, h_there, a_there, b_there, c_there = square_at(rows, row, width, x, y, z, following_s, following_t)
             halvings += 1
         s, t, square, g, h, a, b, c = following_s, following_t, found, g_there, h_there, a_there, b_there, c_there
     return square, s, t
