@@ -9,9 +9,22 @@ from cmmlink.errors import PlanError
 from cmmlink.line_sample import check_existing, line_decoder
 from cmmlink.plan import Device, DmeDevice, FileDevice, LinesDevice, ModbusDevice, Plan, SerialDevice, SurfacePlan, map_of
 from cmmlink.scratch import Scratch, scratch_in
-from drivers import DME_UNSEEN, Decoder, PointFileSource, RegisterDecoder, RegisterSurvey, ScanSource, decoder, unseen_in
+from drivers import (
+    DME_UNSEEN,
+    Decoder,
+    PointArraySource,
+    PointFile,
+    PointFileSource,
+    RegisterDecoder,
+    RegisterSurvey,
+    ScanSource,
+    decoder,
+    unseen_in,
+)
 from drivers.links.axis import Beam, ConstantFeed, FollowedAxis
 from drivers.links.link_settings import LinkSettings
+
+_NO_NORMALS = "the device gives no normals: on which side of a wall a point lies is decided by distance alone"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,10 +54,10 @@ def connect(plan: Plan | SurfacePlan, scratch: Scratch | None = None) -> Iterato
     scratch : gives the points of a long file their room; None takes it in the folder of the plan's records
     """
     source, device = source_of(plan, scratch), plan.device
-    if isinstance(source, PointFileSource) and isinstance(device, FileDevice):
+    if isinstance(source, PointArraySource) and isinstance(device, FileDevice):
         notes = tuple(f"{device.file.name}: {note}" for note in source.notes)
     else:
-        notes = tuple(notes_on(device))
+        notes = (*notes_on(device), *([_NO_NORMALS] if isinstance(plan, SurfacePlan) else []))
     trial = _trial(plan, device) if isinstance(device, DmeDevice) else None
     yield Connected(source, words_of(device), simulated=False, notes=notes, moves=trial is not None, trial=trial)
 
@@ -84,6 +97,8 @@ def source_of(plan: Plan | SurfacePlan, scratch: Scratch | None = None) -> ScanS
     device = plan.device
     if isinstance(device, FileDevice):
         room = scratch or scratch_in(plan.records.folder)
+        if isinstance(plan, SurfacePlan):
+            return PointArraySource(words_of(device), scan_of(device, room))
         return PointFileSource(device.file, device.scale, unit=device.unit, columns=device.columns, invalid=device.invalid, room=room)
     try:
         if isinstance(device, LinesDevice):
@@ -91,6 +106,13 @@ def source_of(plan: Plan | SurfacePlan, scratch: Scratch | None = None) -> ScanS
         return _machine(plan, device) if isinstance(device, DmeDevice) else _source_with_axis(device)
     except ValueError as error:
         raise PlanError(f"device: {error}") from None
+
+
+def scan_of(device: FileDevice, room: Scratch) -> PointFile:
+    """The points of a scan of a whole surface, with their normals where the file has any or a mesh tells them."""
+    from drivers.scan_file import read_scan  # noqa: PLC0415 - it loads what cuts surfaces
+
+    return read_scan(device.file, device.scale, unit=device.unit, columns=device.columns, invalid=device.invalid, room=room)
 
 
 def decoder_of(plan: Plan | SurfacePlan) -> Decoder | None:

@@ -9,10 +9,10 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Generic, Literal, Protocol, TypeVar
+from typing import TYPE_CHECKING, Generic, Literal, Protocol, TypeVar, cast
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from cmmlink.buffer import Buffer
 from cmmlink.errors import StoreError
@@ -34,7 +34,7 @@ from inspection import (
 )
 
 if TYPE_CHECKING:
-    from inspection.surface import SurfaceResult, SurfaceUpdate
+    from inspection.surface import LiveSurface, SurfaceResult, SurfaceUpdate
 
 CutShort = Literal["never", "when failed", "as recorded"]
 """Whether a scan is ended once it is proven that the part can no longer pass; that of a record was, where it has no end."""
@@ -329,11 +329,23 @@ def _judge(
     clock: Callable[[], float],
 ) -> bool:
     """Judge points and tell the sinks. Returns whether one is out of tolerance for good: that is known at once where the pose is."""
-    update = live.add(np.concatenate([batch.points_mm for _, batch in batches]))
+    update = _add(live, [batch for _, batch in batches])
     now = clock()
     counts = tally.counts(live.judged, live.rejected_by_reason, buffer)
     _publish(sinks, Judged(now, now - batches[-1][0], update, counts))
     return update.state == "settled" and bool((update.verdicts == Verdict.NONCONFORM).any())
+
+
+def _add(live: Live[Result], batches: Sequence[PointBatch]) -> "LiveUpdate | SurfaceUpdate":
+    """Give points to the inspection. Normals tell the sides of a wall apart; a section has no use for them."""
+    points = np.concatenate([batch.points_mm for batch in batches])
+    if isinstance(live, LiveInspection) or all(batch.normals is None for batch in batches):
+        return live.add(points)
+    return cast("LiveSurface", live).add(points, np.concatenate([_normals_of(batch) for batch in batches]))
+
+
+def _normals_of(batch: PointBatch) -> NDArray[np.float64]:
+    return np.full((len(batch), 3), np.nan) if batch.normals is None else batch.normals
 
 
 def _reasons_without_pose(live: Live[Result]) -> dict[str, int]:

@@ -14,13 +14,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from cmmlink.devices import Connected
+from cmmlink.devices import Connected, scan_of
 from cmmlink.errors import PlanError
 from cmmlink.from_plan import plane_of
 from cmmlink.from_surface_plan import held_against, notes_on_surface, surface_of, terms_of
 from cmmlink.nominal_files.nurbs_yaml import save_nurbs_yaml
 from cmmlink.plan import FileDevice, Plan, Section, SurfacePlan
-from drivers import PointArraySource, points_in, read_points
+from cmmlink.scratch import scratch_in
+from drivers import PointArraySource, points_in
 from inspection import NurbsCurve, SectionPlane
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ _WITHIN = 0.005  # of the nominal's size: points no farther from the plane are t
 _FEWEST = 10
 _FINE = 1e-3  # of the zone's width: how far the lines of the course may lie off the surface
 _FINEST_MM = 1e-4
+_BY_DISTANCE = "points are moved into the section by distance alone: the normals of the scan have no part in it"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,7 +58,7 @@ def section_of_scan(plan: SurfacePlan, section: Section, within_mm: float | None
     device = plan.device
     assert isinstance(device, FileDevice)
     file, terms, plane = surface_of(plan), terms_of(plan), plane_of(section)
-    read = read_points(device.file, device.scale, unit=device.unit, columns=device.columns, invalid=device.invalid)
+    read = scan_of(device, scratch_in(plan.records.folder))
     nominal, radius_mm = file.nominal, plan.probe.tip_radius_mm
     whole = judge_surface(read.points_mm, held_against(plan, file), terms)
     within = _WITHIN * nominal.size_mm if within_mm is None else within_mm
@@ -75,6 +77,7 @@ def section_of_scan(plan: SurfacePlan, section: Section, within_mm: float | None
     notes = (
         *notes_on_surface(plan, file),
         *(f"{device.file.name}: {note}" for note in read.notes),
+        *([_BY_DISTANCE] if read.normals is not None else []),
         _words_of_pose(whole),
         f"{len(moved)} of {len(read.points_mm)} points lie within {within:.3g} mm of the section; they were moved "
         "along the surface into it, each with its deviation",

@@ -213,7 +213,7 @@ TABLES: tuple[tuple[str, Mapping[str, str]], ...] = (
     ("Characteristics in them: a line for every characteristic", tables.CHARACTERISTIC_COLUMNS),
     ("Points in them: a line for every received point", tables.POINT_COLUMNS),
     ("Runs of an archive, in the table of `rejudge --out`: a line for every run", REJUDGED_COLUMNS),
-    ("`points.csv` and `points.npy` of `export`: a line for every point", export.POINT_COLUMNS),
+    ("`points.csv` and `points.npy` of `export`: a line for every point", {**export.POINT_COLUMNS, **export.NORMAL_COLUMNS}),
     ("`wire.csv` of `export`: a line for every read", export.WIRE_COLUMNS),
     ("`chain.csv` of `export`: a line for every record", evidence.CHAIN_COLUMNS),
 )

@@ -1,8 +1,8 @@
 """Devices, and files of points, to batches of points in millimetres.
 
 This is the front door: the contract of every source and decoder, the errors, the wire formats by name, register maps, and
-files of points. What opens a link stays in `drivers.links`, and what cuts surfaces in `drivers.surface`: pyserial, pymodbus,
-scipy and Open3D are loaded only by those who import from there.
+files of points. What opens a link stays in `drivers.links`, what cuts surfaces in `drivers.surface`, and what reads scans of them in
+`drivers.scan_file`: pyserial, pymodbus, scipy and Open3D are loaded only by those who import from there.
 """
 
 TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer to load than all of this
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from drivers.codecs.register_survey import KINDS, TABLES, WORD_ORDERS, RegisterSurvey, Table, WordOrder, registers_of, stored_number
     from drivers.errors import CadError, DeviceError, DeviceRefused, LinkError, MeshError, PointFileError, ProtocolError
     from drivers.files.column_choice import AxisName
-    from drivers.files.normals import read_normals
     from drivers.files.point_file import PointArraySource, PointFile, PointFileSource, convert_to_mm, points_in, points_of, read_points
     from drivers.files.row_reading import shorten
     from drivers.files.stated_units import UnitName, mm_per
@@ -68,7 +67,6 @@ else:
         ),
         "drivers.errors": ("CadError", "DeviceError", "DeviceRefused", "LinkError", "MeshError", "PointFileError", "ProtocolError"),
         "drivers.files.column_choice": ("AxisName",),
-        "drivers.files.normals": ("read_normals",),
         "drivers.files.point_file": (
             "PointArraySource",
             "PointFile",
@@ -165,7 +163,6 @@ __all__ = [
     "points_in",
     "points_of",
     "read_bytes",
-    "read_normals",
     "read_points",
     "read_text",
     "register_map",

@@ -50,18 +50,24 @@ class PointBatch:
     sequence  : (m,) int64, the device's counter, unwrapped
     time_s    : (m,) by the device's own clock, from its arbitrary zero
     points_mm : (m, 3) in machine coordinates; surface points or ball centres, as the plan says
+    normals   : (m, 3) outward directions of the measured surface, of any length, zero or NaN where not known; None where the device
+                gives none
     """
 
     sequence: NDArray[np.int64]
     time_s: NDArray[np.float64]
     points_mm: NDArray[np.float64]
+    normals: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         m = len(self.sequence)
         if self.time_s.shape != (m,) or self.points_mm.shape != (m, 3):
             raise ValueError(f"expected ({m},) and ({m}, 3), got {self.time_s.shape} and {self.points_mm.shape}")
-        for array in (self.sequence, self.time_s, self.points_mm):
-            array.setflags(write=False)
+        if self.normals is not None and self.normals.shape != (m, 3):
+            raise ValueError(f"expected normals ({m}, 3), got {self.normals.shape}")
+        for array in (self.sequence, self.time_s, self.points_mm, self.normals):
+            if array is not None:
+                array.setflags(write=False)
 
     def __len__(self) -> int:
         return len(self.sequence)

@@ -55,7 +55,9 @@ _OPTION_OF = {
 
 
 def surface(
-    scan: Annotated[Path, typer.Argument(metavar="SCAN", help="Measured points in space: csv, txt, asc, xyz or npy.")],
+    scan: Annotated[
+        Path, typer.Argument(metavar="SCAN", help="Measured points in space: csv, txt, asc, xyz, npy or PLY; or a mesh: STL, PLY, OBJ.")
+    ],
     nominal: Annotated[Path, typer.Option(metavar="FILE", help="The nominal: STEP, IGES, STL, PLY, OBJ, or a cloud of points.")],
     tolerance: Annotated[tuple[float, float], typer.Option(metavar="LO HI", help="Deviations allowed, mm, positive out of material.")],
     uncertainty: Uncertainty = 0.0,

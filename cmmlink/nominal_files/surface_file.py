@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers import CadError, MeshError, PointFileError, read_normals, read_points
+from drivers import CadError, MeshError, PointFileError, read_points
 from drivers.cad import CadFace, CadFaces, Kind, read_cad_faces
 from drivers.surface import Open3DMissing, Open3DProcess, SurfaceMesh, is_ply_cloud, read_obj, read_ply_cloud, read_stl
 from inspection import NominalError
@@ -90,8 +90,8 @@ def load_surface(
 
 def _of_points(path: Path, scale: float) -> SurfaceFile:
     try:
-        found = read_points(path, scale)
-        return _of_cloud(path, found.points_mm, read_normals(path), "points", found.notes)
+        found = read_points(path, scale, normals=True)
+        return _of_cloud(path, found.points_mm, found.normals, "points", found.notes)
     except PointFileError as error:
         raise NominalError(str(error)) from None
 

@@ -137,7 +137,9 @@ class FileDevice(Settings):
     """A file of points in place of a device."""
 
     type: Literal["file"] = Field(description="a file of points in place of a device")
-    file: Path = Field(description="the file of points: csv, txt, asc, xyz or npy")
+    file: Path = Field(
+        description="the file of points: csv, txt, asc, xyz or npy; of a whole surface also PLY, STL or OBJ, whose vertices are the points"
+    )
     scale: Positive = Field(default=1.0, description="how many mm a unit of the file is")
     unit: Unit = Field(
         default=None,

@@ -2,6 +2,7 @@
 
 - wire: n as uint32, n arrival times (float64), n sizes (uint32), the bytes of all reads
 - points, 40 bytes each: all sequence numbers (int64), all device times (float64), all x y z (float64)
+- normals, 24 bytes each: the outward direction x y z (float64) of every point in the record before, NaN where it is not known
 - deviations, 50 bytes each: all actual points and feet (x y as float64), stations, deviations (float64), verdicts, rejections (int8)
 - all others: JSON (UTF-8, sorted keys), or the file as it was (plan, nominal)
 """
@@ -21,6 +22,7 @@ from drivers import Arrival, PointBatch, WireBytes
 from inspection import NOT_JUDGED, JudgedRows, Rejection, Verdict
 
 POINT_BYTES = 40
+_NORMAL_BYTES = 24
 _JUDGED_BYTES = 50
 JUDGED_ROWS = 20_000  # of a record of deviations: about a megabyte
 _ARRIVALS = {kind.__name__: kind for kind in get_args(Arrival) if kind not in (PointBatch, WireBytes)}
@@ -76,15 +78,31 @@ def pack_points(batches: Sequence[PointBatch], most: int) -> Iterator[tuple[int,
         yield len(columns[0]), b"".join(column.tobytes() for column in columns)
 
 
-def unpack_points(body: bytes) -> PointBatch:
-    """Unpack points."""
+def pack_normals(batches: Sequence[PointBatch], most: int) -> Iterator[tuple[int, bytes]]:
+    """Pack the normals of consecutive points, cut as `pack_points` cuts these; nothing where none of them has any."""
+    if all(batch.normals is None for batch in batches):
+        return
+    normals = np.concatenate([np.full((len(batch), 3), np.nan) if batch.normals is None else batch.normals for batch in batches])
+    for first in range(0, len(normals), most):
+        rows = normals[first : first + most]
+        yield len(rows), rows.astype("<f8").tobytes()
+
+
+def unpack_points(body: bytes, normals: bytes | None = None) -> PointBatch:
+    """Unpack points, with their normals where there is a record of them."""
     count, rest = divmod(len(body), POINT_BYTES)
     if rest:
         raise StoreError(f"a record of points has {len(body)} bytes, no multiple of {POINT_BYTES}")
     sequence = np.frombuffer(body, "<i8", count).astype(np.int64)
     time_s = np.frombuffer(body, "<f8", count, 8 * count).astype(np.float64)
     points = np.frombuffer(body, "<f8", 3 * count, 16 * count).astype(np.float64)
-    return PointBatch(sequence, time_s, points.reshape(count, 3))
+    return PointBatch(sequence, time_s, points.reshape(count, 3), None if normals is None else _unpack_normals(normals, count))
+
+
+def _unpack_normals(body: bytes, count: int) -> NDArray[np.float64]:
+    if len(body) != count * _NORMAL_BYTES:
+        raise StoreError(f"a record of the normals of {count} points has {len(body)} bytes, not {_NORMAL_BYTES} for each")
+    return np.frombuffer(body, "<f8").astype(np.float64).reshape(count, 3)
 
 
 def pack_arrivals(moments: Iterable[PlacedArrival]) -> bytes:

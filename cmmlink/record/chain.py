@@ -11,12 +11,12 @@ from typing import Literal
 from zlib import crc32
 
 Kind = Literal[
-    "run", "plan", "nominal", "wire", "points", "events", "registration", "deviations", "result", "end",
+    "run", "plan", "nominal", "wire", "points", "normals", "events", "registration", "deviations", "result", "end",
     "signature", "answer", "anchors", "timestamp", "origin", "derived", "countersignature", "key",
 ]  # fmt: skip
-"""What a record holds. Behind the end of a run may stand its signature, what a machine tool was told of it, which places were told its
-hash, a time stamp, where the run was taken over from, what it was found to be when judged again, and signatures of these. A key that was
-handed over belongs to no run."""
+"""What a record holds. Normals are those of the points in the record before them. Behind the end of a run may stand its signature, what a
+machine tool was told of it, which places were told its hash, a time stamp, where the run was taken over from, what it was found to be when
+judged again, and signatures of these. A key that was handed over belongs to no run."""
 
 BEHIND_THE_END: tuple[Kind, ...] = ("signature", "answer", "anchors", "timestamp", "origin", "derived", "countersignature")
 

@@ -33,7 +33,8 @@ CHAIN_COLUMNS = {
     "previous_sha256": "the hash of the record before it",
     "sha256": "its own hash, over all that and its body",
 }
-_OF_A_RUN = ("run", "plan", "nominal", "wire", "points", "events", "registration", "deviations", "result", "end")  # up to its end
+# up to its end
+_OF_A_RUN = ("run", "plan", "nominal", "wire", "points", "normals", "events", "registration", "deviations", "result", "end")
 _IN_FILES = ("plan", "nominal", "result")  # which also stand in files of their own
 _MOST = 2**63  # what a column of the records holds
 _MEND = "Export the run anew with `cmmlink export RUN --out FOLDER`, and hand over the whole folder"

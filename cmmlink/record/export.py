@@ -32,6 +32,7 @@ POINT_COLUMNS = {
     "y_mm": "y in machine coordinates",
     "z_mm": "z in machine coordinates",
 }
+NORMAL_COLUMNS = {f"n{axis}": f"{axis} of the outward direction that the scan gives, nan where it gives none" for axis in "xyz"}
 WIRE_COLUMNS = {
     "time_s": "when the bytes were read, by the clock of the run",
     "offset": "where they begin in wire.bin",
@@ -42,7 +43,8 @@ WIRE_COLUMNS = {
 def export_run(store: Store, run: str, folder: Path) -> list[Path]:
     """Write a run to a folder. Returns the files written; raises PlanError when the folder cannot be written.
 
-    run.json: all but the points; events.json; points.csv and points.npy (m, 5): sequence, time_s, x, y, z in mm;
+    run.json: all but the points; events.json; points.csv and points.npy (m, 5): sequence, time_s, x, y, z in mm, and (m, 8) with nx, ny,
+    nz where the scan gave normals;
     wire.bin, the bytes as they arrived, and wire.csv, when; plan.yaml; the nominal's file; of a run with a result
     deviations.csv and result.json, and zone.json where it has a certificate. nominal.json is the curve that was made of the nominal's
     file; records.bin, the records as they are hashed, and chain.csv, their hashes, are what somebody else recomputes the chain from;
@@ -70,14 +72,18 @@ def _documents(store: Store, run: str, files: NewFiles) -> None:
 
 
 def _points(store: Store, run: str, files: NewFiles) -> None:
-    count = store.totals(run).get("points", (0, 0))[1]
+    totals = store.totals(run)
+    count, with_normals = totals.get("points", (0, 0))[1], "normals" in totals
+    columns = (*POINT_COLUMNS, *(NORMAL_COLUMNS if with_normals else ()))
     array_path, table_path = files.together("points.npy", "points.csv")
     with array_path.open("wb") as array, table_path.open("w", newline="", encoding="utf-8") as file:
-        np.lib.format.write_array_header_1_0(array, {"descr": "<f8", "fortran_order": False, "shape": (count, 5)})
+        np.lib.format.write_array_header_1_0(array, {"descr": "<f8", "fortran_order": False, "shape": (count, len(columns))})
         writer = csv.writer(file)
-        writer.writerow(POINT_COLUMNS)
+        writer.writerow(columns)
         for batch in points_of(store, run):
             rows = np.column_stack([batch.sequence, batch.time_s, batch.points_mm])
+            if with_normals:
+                rows = np.column_stack([rows, np.full((len(rows), 3), np.nan) if batch.normals is None else batch.normals])
             array.write(rows.astype("<f8").tobytes())
             writer.writerows((int(row[0]), *row[1:]) for row in rows.tolist())
 

@@ -238,10 +238,14 @@ def reads_of(store: Store, run: str) -> Iterator[WireBytes]:
 
 
 def points_of(store: Store, run: str) -> Iterator[PointBatch]:
-    """Every point, in order, as many at once as a record holds."""
+    """Every point, in order, as many at once as a record holds; with their normals where a record of these follows."""
+    all_normals = store.records(run, "normals")
+    normals = next(all_normals, None)
     for record in store.records(run, "points"):
-        with name_record(store.path, record):
-            batch = unpack_points(record.body)
+        follows = normals is not None and normals.number == record.number + 1
+        with name_record(store.path, normals if follows and normals is not None else record):
+            batch = unpack_points(record.body, normals.body if follows and normals is not None else None)
+        normals = next(all_normals, None) if follows else normals
         yield batch
 
 

@@ -87,4 +87,5 @@ def _merge_points(batches: Iterator[PointBatch], moments: Iterator[PlacedArrival
 
 
 def _rows(batch: PointBatch, begin: int, end: int) -> PointBatch:
-    return PointBatch(batch.sequence[begin:end], batch.time_s[begin:end], batch.points_mm[begin:end])
+    normals = None if batch.normals is None else batch.normals[begin:end]
+    return PointBatch(batch.sequence[begin:end], batch.time_s[begin:end], batch.points_mm[begin:end], normals)

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from cmmlink.buffer import Buffer
 from cmmlink.errors import StoreError
 from cmmlink.events import Arrived, Event, Judged, RunFinished, RunStarted
-from cmmlink.record.bodies import PlacedArrival, pack_arrivals, pack_document, pack_points, pack_reads
+from cmmlink.record.bodies import PlacedArrival, pack_arrivals, pack_document, pack_normals, pack_points, pack_reads
 from cmmlink.record.chain import Draft, Kind, Record
 from cmmlink.record.kept_result import DocumentOf, document_of_section, judged_bodies
 from cmmlink.record.run_inputs import RunInputs
@@ -308,7 +308,7 @@ class _Packing:
                 moments.append(PlacedArrival(item.time_s, self.reads, self.points, item.arrival))
                 self.rejected += item.arrival.count if isinstance(item.arrival, Rejected) else 0
         found: list[tuple[Kind, bytes, int]] = [("wire", pack_reads(reads), len(reads))] if reads else []
-        found += [("points", body, count) for count, body in (pack_points(batches, CHUNK_POINTS) if batches else ())]
+        found += _bodies_of_points(batches) if batches else []
         found += [("events", pack_arrivals(moments), len(moments))] if moments else []
         found += [("registration", pack_document(poses), len(poses))] if poses else []
         return found
@@ -316,6 +316,16 @@ class _Packing:
     def counts(self) -> dict[str, int]:
         """What is on record: a batch that the full disk refused is not, though the end of its run may still have found room."""
         return {"received": self.kept}
+
+
+def _bodies_of_points(batches: Sequence[PointBatch]) -> list[tuple[Kind, bytes, int]]:
+    """The points, and behind each body of them that of their normals, where the device gives any."""
+    normals = pack_normals(batches, CHUNK_POINTS)
+    found: list[tuple[Kind, bytes, int]] = []
+    for count, body in pack_points(batches, CHUNK_POINTS):
+        found.append(("points", body, count))
+        found += [("normals", directions, rows) for rows, directions in islice(normals, 1)]
+    return found
 
 
 def _pose_of(update: "LiveUpdate") -> dict[str, Any]:
@@ -366,5 +376,6 @@ def _size(event: Arrived) -> int:
     if isinstance(arrival, WireBytes):
         return len(arrival.data) + _SMALL_BYTES
     if isinstance(arrival, PointBatch):
-        return arrival.sequence.nbytes + arrival.time_s.nbytes + arrival.points_mm.nbytes + _SMALL_BYTES
+        normals = 0 if arrival.normals is None else arrival.normals.nbytes
+        return arrival.sequence.nbytes + arrival.time_s.nbytes + arrival.points_mm.nbytes + normals + _SMALL_BYTES
     return _SMALL_BYTES

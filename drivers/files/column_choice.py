@@ -4,7 +4,7 @@ A column in front of x would shift every coordinate by one place without a word,
 tell the time or hold something unknown are asked about.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Literal, get_args
 
 import numpy as np
@@ -40,20 +40,25 @@ def refuse_places(columns: Mapping[AxisName, int] | None, count: int) -> None:
             raise PointFileError(f"{axis} is asked for in column {place}, but there are {count}; expected a column that is there")
 
 
-def choose_axes(table: Columns, columns: Mapping[AxisName, int] | None) -> tuple[dict[AxisName, int], list[str]]:
-    """Return the place (from 0) of x, y and, if there is one, z, and notes. Raises PointFileError where that is not clear."""
+def choose_axes(
+    table: Columns, columns: Mapping[AxisName, int] | None, beside: Collection[int] = ()
+) -> tuple[dict[AxisName, int], list[str]]:
+    """Return the place (from 0) of x, y and, if there is one, z, and notes. Raises PointFileError where that is not clear.
+
+    beside : columns (from 0) that are used for something else, so that they are not left out
+    """
     count = table.values.shape[1]
     refuse_places(columns, count)
     asked = axes_of(columns)
     if asked:
-        return asked, _notes_of(asked, table, "as asked")
+        return asked, _notes_of(asked, table, "as asked", beside)
     letters = axis_letters(table.names)
     for letter in get_args(AxisName):
         if letters.count(letter) > 1:
             raise PointFileError(f"the header names more than one column {letter}: {', '.join(table.names)}; expected one x, y and z")
     named = {axis: letters.index(axis) for axis in get_args(AxisName) if axis in letters}
     if len(named) > 1:
-        return named, _notes_of(named, table, "")
+        return named, _notes_of(named, table, "", beside)
     if table.names and count > 2:
         names = shorten(", ".join(table.names))
         raise PointFileError(
@@ -62,9 +67,10 @@ def choose_axes(table: Columns, columns: Mapping[AxisName, int] | None) -> tuple
     return _first_ones(table, count)
 
 
-def _notes_of(chosen: Mapping[AxisName, int], table: Columns, why: str) -> list[str]:
+def _notes_of(chosen: Mapping[AxisName, int], table: Columns, why: str, beside: Collection[int]) -> list[str]:
     """Say which columns were taken as asked, which axis is missing, and which columns are left out."""
-    left_out = [name or f"column {place + 1}" for place, name in enumerate(table.names) if place not in chosen.values()]
+    used = {*chosen.values(), *beside}
+    left_out = [name or f"column {place + 1}" for place, name in enumerate(table.names) if place not in used]
     notes = [f"columns {', '.join(f'{axis}={place + 1}' for axis, place in chosen.items())}, {why}"] if why else []
     notes += [f"no column {axis}: taken as 0" for axis in "xy" if axis not in chosen]
     return notes + ([f"columns left out: {', '.join(left_out)}"] if left_out else [])

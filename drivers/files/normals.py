@@ -1,31 +1,37 @@
-"""The outward directions that a file of points gives beside its coordinates."""
+"""The outward directions that a table of points gives beside its coordinates."""
 
-from pathlib import Path
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.files.column_choice import are_directions
-from drivers.files.text_table import parse_columns, read_plain, read_text
+from drivers.files.plain_rows import Room
 
 Array = NDArray[np.float64]
 
 _NAMES = (("nx", "ny", "nz"), ("normal_x", "normal_y", "normal_z"), ("normalx", "normaly", "normalz"), ("i", "j", "k"))
+_ROWS_AT_ONCE = 1 << 16
 
 
-def read_normals(path: Path) -> Array | None:
-    """The normals (m, 3) of a file that `read_points` takes, row by row as its points are; None where it has none.
+def places_of_normals(names: Sequence[str], values: NDArray[Any]) -> tuple[int, ...]:
+    """The columns (from 0) of values (m, c) that hold normals; none where there are none.
 
-    They are found by their names, or as the last three of six unnamed columns, where these all have length 1. An npy array has
-    none. Raises PointFileError for a file that is no table.
+    They are found by their names, or as the last three of six unnamed columns, where these all have length 1.
     """
-    if path.suffix.lower() == ".npy":
-        return None
-    table = read_plain(path) or parse_columns(read_text(path))
-    values, names = table.values, tuple(name.strip().lower() for name in table.names)
+    spelled = [name.strip().lower() for name in names]
     for wanted in _NAMES:
-        if all(name in names for name in wanted):
-            return np.asarray(values[:, [names.index(name) for name in wanted]], dtype=np.float64)
-    if not names and values.shape[1] == 6 and are_directions(values):
-        return np.asarray(values[:, 3:], dtype=np.float64)
-    return None
+        if all(name in spelled for name in wanted):
+            return tuple(spelled.index(name) for name in wanted)
+    return (3, 4, 5) if not names and values.shape[1] == 6 and are_directions(values) else ()
+
+
+def normals_at(places: Sequence[int], values: NDArray[Any], room: Room = np.empty) -> Array | None:
+    """The normals (m, 3) in three columns of values (m, c), in pieces: only they are held. None where no columns are given."""
+    if not places:
+        return None
+    normals = room((len(values), 3), np.float64)
+    for first in range(0, len(values), _ROWS_AT_ONCE):
+        normals[first : first + _ROWS_AT_ONCE] = values[first : first + _ROWS_AT_ONCE, list(places)]
+    return normals

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from drivers.errors import PointFileError
 from drivers.files.column_choice import AxisName, axes_of, choose_axes, refuse_places
+from drivers.files.normals import normals_at, places_of_normals
 from drivers.files.plain_rows import Room
 from drivers.files.stated_units import MM_PER_UNIT, UnitName, units_of_names
 from drivers.files.text_table import Array, Columns, count_of, parse_columns, read_bytes, read_plain, read_text, refuse_long_text
@@ -42,13 +43,24 @@ _LARGEST_MM = 1e6  # a kilometre: beyond it the unit or the scale is wrong, and 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointFile:
-    """Measured points of a file: points_mm (m, 3), in the order of the file, NaN for rows without numbers; notes of what was assumed."""
+    """Measured points of a file.
+
+    points_mm : (m, 3) in the order of the file, NaN for rows without numbers
+    notes     : what was assumed
+    normals   : (m, 3) outward directions of the measured surface, zero or NaN where the file tells none; None where none are in it, or
+                nobody asked for them
+    """
 
     points_mm: Array
     notes: tuple[str, ...]
+    normals: Array | None = None
 
     def __post_init__(self) -> None:
         self.points_mm.setflags(write=False)
+        if self.normals is not None:
+            if self.normals.shape != self.points_mm.shape:
+                raise ValueError(f"expected a normal for every point, {self.points_mm.shape}, got {self.normals.shape}")
+            self.normals.setflags(write=False)
 
 
 class PointArraySource:
@@ -69,13 +81,14 @@ class PointArraySource:
 
     def arrivals(self) -> Iterator[Arrival]:
         """Yield the points, in batches; see ScanSource."""
-        points = self._points.points_mm
+        points, normals = self._points.points_mm, self._points.normals
         yield ScanOpened(device=self._device, serial_number="", expected=len(points))
         for start in range(0, len(points), self._batch_points):
             if self._stopped.is_set():
                 return
             batch = points[start : start + self._batch_points].copy()
-            yield PointBatch(np.arange(start, start + len(batch), dtype=np.int64), np.zeros(len(batch)), batch)
+            seen = None if normals is None else normals[start : start + self._batch_points].copy()
+            yield PointBatch(np.arange(start, start + len(batch), dtype=np.int64), np.zeros(len(batch)), batch, seen)
         yield ScanClosed(sent=len(points))
 
     def stop(self) -> None:
@@ -112,6 +125,7 @@ def read_points(
     columns: Mapping[AxisName, int] | None = None,
     invalid: Collection[float] = (),
     room: Room = np.empty,
+    normals: bool = False,
 ) -> PointFile:
     """Read measured points (m, 3) in mm from csv, txt, asc, xyz or npy. Two columns are x and y, at z = 0.
 
@@ -120,10 +134,11 @@ def read_points(
     columns : which columns (from 1) are x, y and z, where the file itself does not tell
     invalid : values that mean no point, as they stand in the file; a row with one of them as a coordinate has no numbers
     room    : gives the arrays that are as long as the file, like numpy.empty; those of a long one may lie on a disk
+    normals : read the normals as well, where the file has any: in columns nx, ny, nz, or the last three of six without names
 
     Raises PointFileError: file, line, what was found, what is expected.
     """
-    asked = _Asked(scale, unit, columns, tuple(invalid), room)
+    asked = _Asked(scale, unit, columns, tuple(invalid), room, normals)
     npy = path.suffix.lower() == ".npy"
     with _name_file(path):
         places = axes_of(columns).values()
@@ -155,6 +170,7 @@ class _Asked:
     columns: Mapping[AxisName, int] | None
     invalid: tuple[float, ...]
     room: Room
+    normals: bool = False
 
     @property
     def notes(self) -> list[str]:
@@ -163,10 +179,11 @@ class _Asked:
 
 
 def _read_table(table: Columns, asked: _Asked) -> PointFile:
-    chosen, notes = choose_axes(table, asked.columns)
+    seen = places_of_normals(table.names, table.values) if asked.normals else ()
+    chosen, notes = choose_axes(table, asked.columns, seen)
     points, found = _points(table.values, chosen, asked, _mm_per_unit(table, asked.scale, asked.unit), table.line_numbers)
     unit = [*asked.notes, *_note_of_unit(table, asked.scale, asked.unit)]
-    return PointFile(points, (*table.notes, *notes, *unit, *found))
+    return PointFile(points, (*table.notes, *notes, *unit, *found), normals_at(seen, table.values, asked.room))
 
 
 def points_of(columns: Columns, scale: float, unit: UnitName | None = None) -> tuple[Array, tuple[str, ...]]:
@@ -309,10 +326,11 @@ def points_in(
 def _read_array(array: object, asked: _Asked) -> PointFile:
     columns = asked.columns
     flat = isinstance(array, np.ndarray) and array.ndim == 2 and array.dtype.kind in "fiu"
-    if not isinstance(array, np.ndarray) or not flat or (columns is None and array.shape[1] not in (2, 3)):
+    seen = places_of_normals((), array) if isinstance(array, np.ndarray) and flat and asked.normals else ()
+    if not isinstance(array, np.ndarray) or not flat or (columns is None and not seen and array.shape[1] not in (2, 3)):
         found = f"{array.dtype} array of shape {array.shape}" if isinstance(array, np.ndarray) else "an archive"
         raise PointFileError(f"{found}; expected numbers of shape (m, 2) or (m, 3)")
     refuse_places(columns, array.shape[1])
-    chosen = axes_of(columns) or dict(zip(("x", "y", "z"), range(array.shape[1]), strict=False))
+    chosen = axes_of(columns) or dict(zip(("x", "y", "z"), range(min(3, array.shape[1])), strict=False))
     points, found_rows = _points(array, chosen, asked, _mm_per_unit(None, asked.scale, asked.unit), None)
-    return PointFile(points, (*asked.notes, *found_rows))
+    return PointFile(points, (*asked.notes, *found_rows), normals_at(seen, array, asked.room))

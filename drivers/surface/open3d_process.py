@@ -110,6 +110,20 @@ class Open3DProcess:
 
     def read(self, path: Path, scale: float = 1.0) -> SurfaceMesh:
         """Read PLY, whatever Open3D reads; raises `MeshError` where it yields no triangles or breaks."""
+        vertices, triangles, faces = self._read(path)
+        mesh = surface_of(_corners(vertices * scale, triangles, path, faces), str(path), "PLY")
+        return replace(mesh, warnings=rounding_note(mesh, scale) if vertices.dtype == np.float32 else ())
+
+    def faces_of(self, path: Path, vertices: int) -> NDArray[np.int64]:
+        """The triangles (t, 3) of a PLY file with so many vertices, as numbers of these from 0. Raises as `read` does."""
+        places, triangles, faces = self._read(path)
+        _corners(places, triangles, path, faces)
+        if len(places) != vertices:
+            raise MeshError(f"{path}: Open3D reads {len(places)} of its {vertices} vertices; export the surface again, or as STL")
+        return triangles.astype(np.int64)
+
+    def _read(self, path: Path) -> tuple[NDArray[Any], NDArray[Any], int]:
+        """The vertices (v, 3) of a PLY file, its triangles (t, 3), and how many faces it announces."""
         header = header_of(path)
         with readable(path, header) as file, self._turn:
             loaded = self.status().version is not None
@@ -122,8 +136,7 @@ class Open3DProcess:
         if "error" in answer:
             raise MeshError(f"{path}: Open3D cannot read it ({answer['error']}); export the surface again, or as STL")
         vertices, triangles = arrays
-        mesh = surface_of(_corners(vertices * scale, triangles, path, faces_announced(header)), str(path), "PLY")
-        return replace(mesh, warnings=rounding_note(mesh, scale) if vertices.dtype == np.float32 else ())
+        return vertices, triangles, faces_announced(header)
 
     def _ask(self, request: dict[str, Any], arrays: list[NDArray[Any]]) -> tuple[dict[str, Any], list[NDArray[Any]]]:
         status = self.status()

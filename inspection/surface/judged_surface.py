@@ -29,7 +29,7 @@ Codes = NDArray[np.int8]
 Index = NDArray[np.int64]
 
 _PLACED = 0.95  # share of the area whose points place the part, where no coverage is asked for
-_FAR_OFF = 0.5  # share of the points off the surface beyond which the set-up is wrong
+_FAR_OFF = 0.5  # share of the points off the surface, or on the wrong side of it, beyond which the set-up is wrong
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -151,6 +151,13 @@ class _Scan:
             raise NotMeasured(
                 f"{off} of {there} points lie more than {away:.4g} mm off the surface: is it the right part, the right unit, and do the "
                 "points lie in the coordinates of the nominal? Else let the pose be fitted, or give a start nearer to it"
+            )
+        turned = np.count_nonzero(found.rejection == Rejection.OPPOSITE_FACE)
+        if turned > _FAR_OFF * there:
+            raise NotMeasured(
+                f"{turned} of {there} points were seen from another side than that of the surface on which they lie: do the normals of the "
+                "scan, or the corners of its triangles, turn out of the material, and is it the right part and unit? Else bring the scan "
+                "without normals"
             )
 
     def _conclude(self, found: JudgedPoints, pose: RigidMotion, registration: SurfaceRegistration | None) -> SurfaceResult:

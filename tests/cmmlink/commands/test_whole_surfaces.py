@@ -11,7 +11,9 @@ from cmmlink.result_keys import Recorded
 from cmmlink.surface_csv import SURFACE_COLUMNS
 from cmmlink.surface_keys import SurfaceMeasured, SurfaceRecorded, SurfaceReplayed, SurfacesCompared
 from tests.cmmlink.command import Ended, cmmlink
-from tests.cmmlink.egg import MOVED_MM, ROTATION, egg_scan, with_bump, write_egg, write_scan
+from tests.cmmlink.egg import MOVED_MM, ROTATION, Array, egg_scan, egg_triangles, on_machine, with_bump, write_egg, write_scan
+from tests.drivers.surface.meshes import binary_stl, box
+from tests.drivers.test_scan_file import ply as ply_of
 
 GAP = ("--gap-max", 7)
 
@@ -182,6 +184,57 @@ def test_two_runs_of_a_surface_are_compared_place_by_place(files: Path, tmp_path
     told = cmmlink("compare", "last~1", "last", *records).out
     assert "second - first: mean" in told
     assert "no drawing" in cmmlink("compare", "last~1", "last", "--out", tmp_path / "a.png", *records).refused()
+
+
+def plate_seen(folder: Path) -> tuple[Array, Array]:
+    """Write a plate of 1 mm, and give points on its six sides with their outward directions: on top those of a hollow 0.7 mm deep."""
+    (folder / "plate.stl").write_bytes(binary_stl(box((0.0, 0.0, 0.0), (12.0, 8.0, 1.0))))
+    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.25, 12.0, 0.5), np.arange(0.25, 8.0, 0.5)))
+    top = np.where((np.abs(x - 6.0) < 1.0) & (np.abs(y - 4.0) < 1.0), 0.3, 1.0)
+    faces = [np.column_stack([x, y, top]), np.column_stack([x, y, np.zeros_like(x)])]
+    outward = [np.tile([0.0, 0.0, 1.0], (len(x), 1)), np.tile([0.0, 0.0, -1.0], (len(x), 1))]
+    along, up = (axis.ravel() for axis in np.meshgrid(np.arange(0.25, 12.0, 0.5), [0.25, 0.75]))
+    for axis, far, most in ((0, 12.0, 8.0), (1, 8.0, 12.0)):
+        here = along < most
+        for place, sign in ((0.0, -1.0), (far, 1.0)):
+            faces.append(np.insert(np.column_stack([along, up])[here], axis, place, axis=1))
+            outward.append(np.tile(sign * np.eye(3)[axis], (int(here.sum()), 1)))
+    return np.concatenate(faces), np.concatenate(outward)
+
+
+def test_normals_of_a_scan_are_judged_by_recorded_replayed_and_exported(tmp_path: Path) -> None:
+    """The hollow is nearer to the underside: only who knows from where it was seen finds it 0.7 mm deep."""
+    points, outward = plate_seen(tmp_path)
+    np.savetxt(tmp_path / "scan.csv", np.hstack([points, outward]), delimiter=",", header="x,y,z,nx,ny,nz", comments="")
+    (tmp_path / "scan.ply").write_bytes(ply_of(points, outward))
+    write_scan(tmp_path / "blind.csv", points)
+    options = ("--nominal", tmp_path / "plate.stl", "--tolerance", -0.5, 0.5, "--fit", "none", "--gap-max", 1, "--gross", 2)
+    records = ("--records", tmp_path / "records")
+    seen, of_ply = (cmmlink("surface", tmp_path / name, *options, "--json", *records).json() for name in ("scan.csv", "scan.ply"))
+    blind = cmmlink("surface", tmp_path / "blind.csv", *options, "--json", "--no-record").json()
+    assert seen["min_deviation_mm"] == of_ply["min_deviation_mm"] == pytest.approx(-0.7)
+    assert (seen["verdict"], seen["regions"]) == ("nonconform", of_ply["regions"])
+    assert blind["min_deviation_mm"] == pytest.approx(-0.3)
+    assert "scan.csv: the normals are those of the file of the scan" in seen["notes"]
+    assert any(note.startswith("blind.csv: the file has no normals") for note in blind["notes"])
+    assert cmmlink("replay", "last~1", "--json", *records).json()["identical"] is True
+    assert cmmlink("verify", *records).code == 0
+    assert cmmlink("export", "last", "--out", tmp_path / "all", *records).code == 0
+    np.testing.assert_array_equal(np.load(tmp_path / "all" / "points.npy")[:, 2:], np.hstack([points, outward]))
+    assert (tmp_path / "all" / "points.csv").read_text(encoding="utf-8").startswith("sequence,time_s,x_mm,y_mm,z_mm,nx,ny,nz\n")
+    assert cmmlink("replay", tmp_path / "all", "--json").json()["identical"] is True
+
+
+def test_the_vertices_of_a_mesh_are_judged_and_one_inside_out_is_not_measured(tmp_path: Path) -> None:
+    write_egg(tmp_path / "egg.stl")
+    triangles = on_machine(egg_triangles(34, 58).reshape(-1, 3)).reshape(-1, 3, 3)
+    (tmp_path / "scan.stl").write_bytes(binary_stl(triangles))
+    (tmp_path / "inside-out.stl").write_bytes(binary_stl(triangles[:, ::-1]))
+    done = surface(tmp_path, "scan.stl", "--json", "--no-record", "--chord", 0.5)
+    found = done.json()
+    assert (found["received"], found["judged"], found["lost"]) == (32 * 58 + 2, 32 * 58 + 2, 0), found["reasons"]
+    assert any("1858 vertices are judged, each once" in note for note in found["notes"])
+    assert "turn out of the material" in surface(tmp_path, "inside-out.stl", "--no-record", "--chord", 0.5).refused()
 
 
 def pose_file(folder: Path) -> Path:
