@@ -11,8 +11,18 @@ from numpy.typing import NDArray
 from cmmlink.characteristics import pose_of
 from cmmlink.errors import PlanError
 from cmmlink.from_plan import nominal_of, plane_of, with_section
-from cmmlink.plan import CircleScan, CurveScan, DmeDevice, LineScan, Plan, PointsScan, SurfacePlan
-from drivers import DmeJob, PointCheck, curve_density, point_measurement, scan_on_circle, scan_on_line, scan_unknown, scans_on_curve
+from cmmlink.plan import AskedScan, CircleScan, CurveScan, DmeDevice, LineScan, Plan, PointsScan, SurfacePlan, UnknownScan
+from drivers import (
+    DmeJob,
+    PointCheck,
+    curve_density,
+    move_to,
+    point_measurement,
+    scan_on_circle,
+    scan_on_line,
+    scan_unknown,
+    scans_on_curve,
+)
 from inspection import NurbsCurve
 
 _LONGEST_STEP_MM = 5.0  # between two points of a course, however straight it is
@@ -22,19 +32,19 @@ _SURFACE_DEG = {"outside": 0.0, "inside": 180.0, "plane": 90.0}
 
 def job_of(plan: Plan | SurfacePlan, device: DmeDevice) -> DmeJob:
     """What the machine of a plan is asked to do. Raises NominalError and PlanError where the nominal gives no course."""
-    scan = device.scan
-    block = "PtMeasPar" if isinstance(scan, PointsScan) else "ScanPar"
+    first = device.asked_scans[0]
+    block = "PtMeasPar" if isinstance(first, PointsScan) else "ScanPar"
     speed = () if device.speed_mm_s is None else (f"Tool.{block}.Speed({device.speed_mm_s:g})",)
-    preparations = (curve_density(scan.step_mm, scan.angle_deg),) if isinstance(scan, CurveScan) else ()
+    preparations = (curve_density(first.step_mm, first.angle_deg),) if isinstance(first, CurveScan) else ()
     return DmeJob(
         PointCheck(plan.probe.tip_radius_mm, device.radius_tolerance_mm, device.quality_max),
-        _scans(plan, device),
+        tuple(command for scan in device.asked_scans for command in _commands(plan, scan)),
         tool=device.tool,
         home=device.home,
         coordinate_system=device.coordinate_system,
         settings=speed,
         preparations=preparations,
-        single_points=isinstance(scan, PointsScan),
+        single_points=isinstance(first, PointsScan),
     )
 
 
@@ -43,30 +53,31 @@ def questions_of(plan: Plan | SurfacePlan, device: DmeDevice) -> DmeJob:
     return DmeJob(PointCheck(plan.probe.tip_radius_mm, device.radius_tolerance_mm, device.quality_max), ())
 
 
-def _scans(plan: Plan | SurfacePlan, device: DmeDevice) -> tuple[str, ...]:
-    scan = device.scan
+def _commands(plan: Plan | SurfacePlan, scan: AskedScan) -> tuple[str, ...]:
     if isinstance(scan, CurveScan | PointsScan):
         if isinstance(plan, SurfacePlan):
             raise PlanError("device.scan: a surface has no curve that a machine could follow; expected a circle, a line or unknown")
         return _along_nominal(plan, scan)
+    return (*map(move_to, scan.via_mm), _along_own_path(scan))
+
+
+def _along_own_path(scan: CircleScan | LineScan | UnknownScan) -> str:
     if isinstance(scan, CircleScan):
         surface_deg = _SURFACE_DEG[scan.surface]
-        return (scan_on_circle(scan.centre_mm, scan.start_mm, scan.axis, scan.sweep_deg, surface_deg, scan.step_deg),)
+        return scan_on_circle(scan.centre_mm, scan.start_mm, scan.axis, scan.sweep_deg, surface_deg, scan.step_deg)
     if isinstance(scan, LineScan):
-        return (scan_on_line(scan.start_mm, scan.end_mm, scan.normal, scan.step_mm),)
-    return (
-        scan_unknown(
-            scan.start_mm,
-            scan.start_direction,
-            scan.plane_normal,
-            scan.towards_mm,
-            scan.step_mm,
-            scan.end_mm,
-            scan.end_diameter_mm,
-            scan.end_count,
-            scan.end_direction,
-            scan.dialect,
-        ),
+        return scan_on_line(scan.start_mm, scan.end_mm, scan.normal, scan.step_mm)
+    return scan_unknown(
+        scan.start_mm,
+        scan.start_direction,
+        scan.plane_normal,
+        scan.towards_mm,
+        scan.step_mm,
+        scan.end_mm,
+        scan.end_diameter_mm,
+        scan.end_count,
+        scan.end_direction,
+        scan.dialect,
     )
 
 

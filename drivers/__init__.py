@@ -9,7 +9,15 @@ TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer 
 
 if TYPE_CHECKING:
     from drivers.codecs import decoder, decoders, unseen_in
-    from drivers.codecs.dme_commands import curve_density, point_measurement, scan_on_circle, scan_on_line, scan_unknown, scans_on_curve
+    from drivers.codecs.dme_commands import (
+        curve_density,
+        move_to,
+        point_measurement,
+        scan_on_circle,
+        scan_on_line,
+        scan_unknown,
+        scans_on_curve,
+    )
     from drivers.codecs.dme_points import PointCheck
     from drivers.codecs.dme_session import DME_UNSEEN, DmeJob
     from drivers.codecs.register_decoder import RegisterDecoder
@@ -45,6 +53,7 @@ else:
         "drivers.codecs": ("decoder", "decoders", "unseen_in"),
         "drivers.codecs.dme_commands": (
             "curve_density",
+            "move_to",
             "point_measurement",
             "scan_on_circle",
             "scan_on_line",
@@ -157,6 +166,7 @@ __all__ = [
     "decoders",
     "device_address",
     "mm_per",
+    "move_to",
     "numbers_of",
     "parse_columns",
     "point_measurement",

@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from cmmlink.plan.cutters import CutterName
     from cmmlink.plan.datum import Datum
     from cmmlink.plan.deciding import PROFILE, Deciding
-    from cmmlink.plan.dme import CircleScan, CurveScan, LineScan, PointsScan, UnknownScan
+    from cmmlink.plan.dme import AskedScan, CircleScan, CurveScan, LineScan, PointsScan, UnknownScan
     from cmmlink.plan.formats import FormatName
     from cmmlink.plan.given import plan_given_by
     from cmmlink.plan.key_search import KeyEntry, all_keys, keys_named
@@ -66,7 +66,7 @@ else:
         ),
         "cmmlink.plan.characteristics": ("AskedCharacteristic", "AskedDatum", "AskedFilter", "AskedProfile", "Place"),
         "cmmlink.plan.cutters": ("CutterName",),
-        "cmmlink.plan.dme": ("CircleScan", "CurveScan", "LineScan", "PointsScan", "UnknownScan"),
+        "cmmlink.plan.dme": ("AskedScan", "CircleScan", "CurveScan", "LineScan", "PointsScan", "UnknownScan"),
         "cmmlink.plan.stack_characteristics": ("AskedOfStack",),
         "cmmlink.plan.surface": ("CtPlan", "NominalAt", "load_ct_plan"),
         "cmmlink.plan.surface_fits": ("SurfaceFit",),
@@ -86,6 +86,7 @@ __all__ = [
     "AskedFilter",
     "AskedOfStack",
     "AskedProfile",
+    "AskedScan",
     "CircleScan",
     "CtPlan",
     "CurveScan",

@@ -49,7 +49,17 @@ class PointsScan(_AlongNominal):
     step_mm: Positive = Field(default=1.0, description="the distance of two points; where the nominal bends sharply they lie closer")
 
 
-class CircleScan(Settings):
+class _OwnPath(Settings):
+    """A scan whose path its own numbers describe."""
+
+    via_mm: tuple[Vector, ...] = Field(
+        default=(),
+        description="places that the machine passes before this scan, one after the other, like [[60, 0, 80]]; from the last one, or from "
+        "where it stands, it goes straight to the start",
+    )
+
+
+class CircleScan(_OwnPath):
     """A scan around an axis: ScanOnCircle."""
 
     type: Literal["circle"] = Field(description="a scan around an axis: ScanOnCircle")
@@ -61,7 +71,7 @@ class CircleScan(Settings):
     step_deg: Positive = Field(default=0.5, description="the angle between two points")
 
 
-class LineScan(Settings):
+class LineScan(_OwnPath):
     """A scan along a straight line: ScanOnLine."""
 
     type: Literal["line"] = Field(description="a scan along a straight line: ScanOnLine")
@@ -71,7 +81,7 @@ class LineScan(Settings):
     step_mm: Positive = Field(default=0.1, description="the distance of two points")
 
 
-class UnknownScan(Settings):
+class UnknownScan(_OwnPath):
     """A scan in a plane along a contour that the machine is not told: ScanInPlaneEndIsSphere."""
 
     type: Literal["unknown"] = Field(description="a contour that is not known, in a plane: ScanInPlaneEndIsSphere")
@@ -92,6 +102,7 @@ class UnknownScan(Settings):
 
 
 AskedScan = Annotated[CurveScan | PointsScan | CircleScan | LineScan | UnknownScan, Field(discriminator="type")]
+AskedPath = Annotated[CircleScan | LineScan | UnknownScan, Field(discriminator="type")]
 
 
 class DmeSettings(Settings):
@@ -102,7 +113,13 @@ class DmeSettings(Settings):
     coordinate_system: SystemName | None = Field(
         default=None, description="the machine's coordinate system to measure in, like PartCsy; null: the active one"
     )
-    scan: AskedScan = Field(default=CurveScan(type="curve"), description="what the machine scans")
+    scan: AskedScan | None = Field(
+        default=None, description="what the machine scans; null: along the nominal as type curve does, or what scans lists"
+    )
+    scans: tuple[AskedPath, ...] = Field(
+        default=(),
+        description="several scans in place of scan, in their order: their points are one run, which is complete when the last one is",
+    )
     speed_mm_s: Positive | None = Field(default=None, description="the speed of the scan or of touching; null: as the machine is set")
     radius_tolerance_mm: Annotated[float, Field(ge=0)] = Field(
         default=_RADIUS_TOLERANCE_MM, description="how far the radius of the tip by the machine may be from probe.tip_radius_mm"
@@ -111,6 +128,17 @@ class DmeSettings(Settings):
         default=50.0, description="points of a worse quality are rejected; 0 is good, 100 is bad, for machines that tell it"
     )
     silence_s: Positive = Field(default=30.0, description="how long the machine may say nothing, be it because it moves")
+
+    @property
+    def asked_scans(self) -> tuple[AskedScan, ...]:
+        """What the machine scans, one after the other."""
+        return self.scans or (self.scan or CurveScan(type="curve"),)
+
+    @model_validator(mode="after")
+    def _one_or_several(self) -> "DmeSettings":
+        if self.scan is not None and self.scans:
+            raise ValueError("either scan or scans")
+        return self
 
     @model_validator(mode="after")
     def _no_reserved_tool(self) -> "DmeSettings":

@@ -270,6 +270,21 @@ report: {language: en}
 records: records
 """
 
+_STRIPS_ON_A_MACHINE = """
+part: {name: wall}
+surface: {file: wall.stp}
+tolerance: {lower_mm: -0.05, upper_mm: 0.05}
+probe: {tip_radius_mm: 1.5}
+device:
+  type: dme
+  address: "192.168.1.10:1294"
+  coordinate_system: PartCsy
+  scans:
+    - {type: line, start_mm: [0, 0, 0], end_mm: [80, 0, 0], normal: [0, -1, 0], step_mm: 0.5}
+    - {type: line, via_mm: [[80, -20, 0], [80, -20, 10]], start_mm: [80, 0, 10], end_mm: [0, 0, 10], normal: [0, -1, 0], step_mm: 0.5}
+registration: {fit: none}
+"""
+
 PLANS: tuple[tuple[type[BaseModel], str], ...] = (
     (Plan, SCAN),
     (CtPlan, _SURFACE),
@@ -284,6 +299,7 @@ PLANS: tuple[tuple[type[BaseModel], str], ...] = (
     (CtPlan, _MANY_SECTIONS),
     (SurfacePlan, _WHOLE_SURFACE),
     (SurfacePlan, _SURFACE_IN_INCHES),
+    (SurfacePlan, _STRIPS_ON_A_MACHINE),
     *((Plan, _ON_A_MACHINE % scan) for scan in _SCANS_OF_A_MACHINE),
 )
 

@@ -156,8 +156,8 @@ class SurfacePlan(Spelled):
     @field_validator("device")
     @classmethod
     def _follows_no_curve(cls, device: Device) -> Device:
-        if isinstance(device, DmeDevice) and isinstance(device.scan, CurveScan | PointsScan):
-            raise ValueError("a scan of type circle, line or unknown: a surface has no curve that a machine could follow")
+        if isinstance(device, DmeDevice) and isinstance(device.asked_scans[0], CurveScan | PointsScan):
+            raise ValueError("a scan of type circle, line or unknown, or several scans: a surface has no curve that a machine could follow")
         return device
 
     @property

@@ -15,6 +15,7 @@ from drivers.codecs.dme_lines import LONGEST_LINE
 Vector = tuple[float, float, float]
 Dialect = Literal["1.4.3", "1.4.0"]
 DECIMALS = 6
+MOVE = "GoTo"
 _ROOM_FOR_TAG = 6  # five characters and a blank before the command
 
 
@@ -38,6 +39,12 @@ def point_measurement(point_mm: Vector, direction: Vector) -> str:
     """Touch one point of the surface; `direction` points out of the material."""
     x, y, z = map(number, point_mm)
     return f"PtMeas(X({x}), Y({y}), Z({z}), IJK({numbers(*direction)}))"
+
+
+def move_to(place_mm: Vector) -> str:
+    """Move there in a straight line, without measuring."""
+    x, y, z = map(number, place_mm)
+    return f"{MOVE}(X({x}), Y({y}), Z({z}))"
 
 
 def scan_on_line(start_mm: Vector, end_mm: Vector, direction: Vector, step_mm: float) -> str:

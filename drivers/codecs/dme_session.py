@@ -9,7 +9,7 @@ never relied on: servers differ in it.
 from collections.abc import Generator
 from dataclasses import dataclass, field
 
-from drivers.codecs.dme_commands import command_line
+from drivers.codecs.dme_commands import MOVE, command_line
 from drivers.codecs.dme_lines import EVENT_TAG, LineReader, MachineError, Response, error_in, number_in, values_in
 from drivers.codecs.dme_points import PointCheck, PointReader
 from drivers.errors import DeviceRefused
@@ -33,7 +33,7 @@ class DmeJob:
     check               what a point has to be like
     settings            further properties to set, like Tool.PtMeasPar.Speed(5)
     preparations        commands before the scans: hints and densities
-    scans               the scans or single points, in their order
+    scans               the scans or single points, in their order, with the moves before them
     single_points       the scans are single points, which are reported by their names
     """
 
@@ -137,10 +137,18 @@ class DmeSession:
         if not (self._radius_known or "ER" in self._points.columns):
             told += ", the radius of whose tip it does not tell"
         self._out.append(ScanOpened(told, "", len(self._job.scans) if self._job.single_points else None))
-        for scan in self._job.scans:
-            yield from self._insist(scan, is_scan=True)
+        yield from self._scan_all()
         self._out.append(ScanClosed(None))
         yield "EndSession()"
+
+    def _scan_all(self) -> _Script:
+        """Carry out every scan, and every move before one; of several it is told which one the machine gave up."""
+        count, number = sum(not command.startswith(MOVE) for command in self._job.scans), 1
+        for command in self._job.scans:
+            is_scan = not command.startswith(MOVE)
+            which = "" if count == 1 else f" {number} of {count}" if is_scan else f" before scan {number} of {count}"
+            yield from self._insist(command, is_scan=is_scan, which=which)
+            number += is_scan
 
     def _start(self) -> _Script:
         """Start a session; one that a lost client left behind is ended first."""
@@ -212,17 +220,17 @@ class DmeSession:
             yield "ClearAllErrors()"
         return reply
 
-    def _insist(self, command: str, *, is_scan: bool = False) -> _Script:
+    def _insist(self, command: str, *, is_scan: bool = False, which: str = "") -> _Script:
         """Give a command that has to be carried out."""
         self._is_scan = is_scan
         reply = yield command
         self._is_scan = False
         self._points.end_scan()
-        self._require(reply, command)
+        self._require(reply, command, which)
 
-    def _require(self, reply: _Reply, command: str) -> None:
+    def _require(self, reply: _Reply, command: str, which: str = "") -> None:
         if reply.breakdown is not None:
-            raise DeviceRefused(f"the machine gave up {command.partition('(')[0]}: {reply.breakdown.words}")
+            raise DeviceRefused(f"the machine gave up {command.partition('(')[0]}{which}: {reply.breakdown.words}")
 
     def _require_taken(self, reply: _Reply, setting: str) -> None:
         """Raise DeviceRefused where a property is not as it was to be: of one out of range a server only warns."""

@@ -48,6 +48,20 @@ def test_a_course_lies_where_section_and_datum_put_it(plan: Plan) -> None:
     np.testing.assert_allclose(moved[:, 3:], np.column_stack([np.zeros(len(x)), there[:, 4], -there[:, 3]]), atol=1e-9)
 
 
+def test_several_scans_follow_one_another_with_the_moves_before_them(plan: Plan) -> None:
+    first = {"type": "line", "start_mm": (0, 0, 0), "end_mm": (8, 0, 0), "normal": (0, -1, 0), "step_mm": 0.5}
+    second = {**first, "via_mm": [(8, -20, 0), (8.5, -20, 1e-3)], "start_mm": (8, 0, 1), "end_mm": (0, 0, 1)}
+    device = DmeDevice.model_validate({"type": "dme", "address": "127.0.0.1:1294", "scans": [first, second]})
+    assert job_of(plan, device).scans == (
+        "ScanOnLine(0,0,0,8,0,0,0,-1,0,0.5)",
+        "GoTo(X(8), Y(-20), Z(0))",
+        "GoTo(X(8.5), Y(-20), Z(0.001))",
+        "ScanOnLine(8,0,1,0,0,1,0,-1,0,0.5)",
+    )
+    with pytest.raises(ValueError, match="either scan or scans"):
+        DmeDevice.model_validate({"type": "dme", "address": "127.0.0.1:1294", "scan": first, "scans": [second]})
+
+
 def test_questions_move_nothing(plan: Plan) -> None:
     device = DmeDevice(type="dme", address="127.0.0.1:1294", tool="Probe1", home=True, speed_mm_s=10.0)
     asked, questions = job_of(plan, device), questions_of(plan, device)

@@ -74,11 +74,26 @@ def test_a_device_that_dies_half_way_ends_with_code_4_and_what_was_received(tmp_
     assert 0 < facts["received"] < COUNT
 
 
-def test_centres_of_the_ball_of_a_coordinate_measuring_machine_are_judged_against_a_surface(tmp_path: Path) -> None:
+PATHS = ", ".join(
+    f"{{type: circle, via_mm: [[30, 0, 20], [30, 0, {z}]], centre_mm: [0, 0, {z}], start_mm: [20, 0, {z}], axis: [0, 0, 1], step_deg: 2}}"
+    for z in (-0.4, 0.0, 0.4)
+)
+PART = ["--tip-radius-mm", str(RADIUS_MM), "--form-error-mm", "0.005", "--unpaced"]
+
+
+def test_several_scans_of_a_coordinate_measuring_machine_are_one_run_of_a_surface(tmp_path: Path) -> None:
     write_wall(tmp_path / "wall.stl", ROUND_MM)
-    part = ["--tip-radius-mm", str(RADIUS_MM), "--form-error-mm", "0.005", "--unpaced"]
-    scan = "{type: circle, centre_mm: [0, 0, 0], start_mm: [20, 0, 0], axis: [0, 0, 1], step_deg: 2}"
-    with simulated("dme", "127.0.0.1:0", tmp_path, *part, path_mm=ROUND_MM, noise_mm=0.001) as machine:
-        code, facts, errors = run(tmp_path, f"{{type: dme, address: '{machine.address}', scan: {scan}}}", RADIUS_MM)
-    assert (code, facts["verdict"], facts["received"]) == (0, "conform", 181), errors
+    with simulated("dme", "127.0.0.1:0", tmp_path, *PART, path_mm=ROUND_MM, noise_mm=0.001) as machine:
+        code, facts, errors = run(tmp_path, f"{{type: dme, address: '{machine.address}', scans: [{PATHS}]}}", RADIUS_MM)
+    assert (code, facts["verdict"], facts["received"]) == (0, "conform", 3 * 181), errors
     assert abs(facts["max_deviation_mm"]) < 0.02
+    assert any("decided by distance alone" in note for note in facts["notes"])
+
+
+def test_a_scan_that_fails_after_others_ends_the_run_with_the_words_of_the_machine(tmp_path: Path) -> None:
+    write_wall(tmp_path / "wall.stl", ROUND_MM)
+    with simulated("dme", "127.0.0.1:0", tmp_path, *PART, "--fault=no-surface@250", path_mm=ROUND_MM, noise_mm=0.001) as machine:
+        code, facts, errors = run(tmp_path, f"{{type: dme, address: '{machine.address}', scans: [{PATHS}]}}", RADIUS_MM)
+    assert (code, facts["ending"], facts["verdict"]) == (4, "interrupted", "uncertain"), errors
+    assert "the machine gave up ScanOnCircle 2 of 3: error 1006" in errors
+    assert 250 <= facts["received"] < 2 * 181
