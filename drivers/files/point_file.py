@@ -38,6 +38,7 @@ _NPY_ERRORS = (
     tokenize.TokenError,
 )
 _ROWS_AT_ONCE = 1 << 16
+_IN_SPACE = (".stl", ".obj", ".ply")
 _LARGEST_MM = 1e6  # a kilometre: beyond it the unit or the scale is wrong, and a float64 no longer resolves a tenth of a nanometre
 
 
@@ -140,6 +141,9 @@ def read_points(
     """
     asked = _Asked(scale, unit, columns, tuple(invalid), room, normals)
     npy = path.suffix.lower() == ".npy"
+    if path.suffix.lower() in _IN_SPACE and path.is_file():
+        told = f"{path.suffix.upper()[1:]} is the format of a scan of a whole surface, and no table of points"
+        raise PointFileError(f"{path}: {told}; inspect it as a surface, or export its points as csv or npy")
     with _name_file(path):
         places = axes_of(columns).values()
     plain = None if npy else read_plain(path, places, room)

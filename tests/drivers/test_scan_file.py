@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from drivers import PointFileError
+from drivers import PointFileError, read_points
 from drivers.scan_file import read_scan
 from tests.drivers.surface.meshes import Triangles, ascii_stl, binary_stl, box
 
@@ -141,6 +141,12 @@ def test_what_is_no_scan_is_refused_with_its_name(name: str, content: bytes | No
     with pytest.raises(PointFileError, match=told) as raised:
         read_scan(tmp_path / name)
     assert name in str(raised.value)
+
+
+def test_a_mesh_is_no_table_of_points_of_a_section(tmp_path: Path) -> None:
+    (tmp_path / "a.stl").write_bytes(binary_stl(BOX))
+    with pytest.raises(PointFileError, match="STL is the format of a scan of a whole surface, and no table of points"):
+        read_points(tmp_path / "a.stl")
 
 
 def test_columns_and_marks_are_for_tables(tmp_path: Path) -> None:
