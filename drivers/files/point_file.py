@@ -181,9 +181,14 @@ class _Asked:
         """What was asked, as far as the reader of the verdict has to know it."""
         return [f"read in {self.unit}, as asked"] if self.unit else []
 
+    def places_of_normals(self, names: Sequence[str], values: NDArray[Any]) -> tuple[int, ...]:
+        """The columns (from 0) of normals, where they are wanted and none of them was asked for as a coordinate."""
+        found = places_of_normals(names, values) if self.normals else ()
+        return () if set(found) & set(axes_of(self.columns).values()) else found
+
 
 def _read_table(table: Columns, asked: _Asked) -> PointFile:
-    seen = places_of_normals(table.names, table.values) if asked.normals else ()
+    seen = asked.places_of_normals(table.names, table.values)
     chosen, notes = choose_axes(table, asked.columns, seen)
     points, found = _points(table.values, chosen, asked, _mm_per_unit(table, asked.scale, asked.unit), table.line_numbers)
     unit = [*asked.notes, *_note_of_unit(table, asked.scale, asked.unit)]
@@ -330,7 +335,7 @@ def points_in(
 def _read_array(array: object, asked: _Asked) -> PointFile:
     columns = asked.columns
     flat = isinstance(array, np.ndarray) and array.ndim == 2 and array.dtype.kind in "fiu"
-    seen = places_of_normals((), array) if isinstance(array, np.ndarray) and flat and asked.normals else ()
+    seen = asked.places_of_normals((), array) if isinstance(array, np.ndarray) and flat else ()
     if not isinstance(array, np.ndarray) or not flat or (columns is None and not seen and array.shape[1] not in (2, 3)):
         found = f"{array.dtype} array of shape {array.shape}" if isinstance(array, np.ndarray) else "an archive"
         raise PointFileError(f"{found}; expected numbers of shape (m, 2) or (m, 3)")

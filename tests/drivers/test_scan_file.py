@@ -117,6 +117,9 @@ def test_an_array_of_six_columns_has_normals_where_all_have_length_1(tmp_path: P
     found = read_scan(tmp_path / "scan.npy")
     np.testing.assert_array_equal(found.points_mm, CORNERS)
     np.testing.assert_array_equal(found.normals, DIRECTIONS)
+    of_directions = read_scan(tmp_path / "scan.npy", columns={"x": 4, "y": 5, "z": 6})  # what is asked for goes above what is found
+    np.testing.assert_array_equal(of_directions.points_mm, DIRECTIONS)
+    assert of_directions.normals is None
     np.save(tmp_path / "scan.npy", np.hstack([CORNERS, 2 * DIRECTIONS]))
     with pytest.raises(PointFileError, match=r"shape \(8, 6\); expected"):
         read_scan(tmp_path / "scan.npy")
