@@ -25,14 +25,23 @@ class Results(Protocol):
     """What is asked of the results of a plant; a ResultsDatabase answers it."""
 
     def series(
-        self, part: str, characteristic: str, *, station: str | None = None, since: datetime | None = None, last: int | None = None
+        self,
+        part: str,
+        characteristic: str,
+        *,
+        station: str | None = None,
+        since: datetime | None = None,
+        until: datetime | None = None,
+        last: int | None = None,
     ) -> "ResultSeries":
         """The values of one characteristic of a part, oldest first."""
 
     def sections(self, part: str) -> list[str]:
         """The heights of a part's sections of a surface; empty text among them where there are runs that are none."""
 
-    def strips(self, part: str, last: int = 60, *, station: str | None = None, section: str = "") -> "ProfileStrips":
+    def strips(
+        self, part: str, last: int = 60, *, station: str | None = None, section: str = "", until: datetime | None = None
+    ) -> "ProfileStrips":
         """The deviations along the profile of the newest runs of a part, oldest first."""
 
 
@@ -87,20 +96,22 @@ def look_at_trend(
     *,
     station: str | None = None,
     since: datetime | None = None,
+    until: datetime | None = None,
     last: int = 100,
     subgroup: int = 1,
 ) -> PartTrend:
     """The trend of a characteristic over the newest runs of a part.
 
+    until    : a moment, before which the runs began that are looked at; None: all of them
     last     : how many of the newest runs are looked at
     subgroup : how many runs in a row were made under the same conditions; 1: each stands alone
     """
-    series = results.series(part, characteristic, station=station, since=since, last=last)
+    series = results.series(part, characteristic, station=station, since=since, until=until, last=last)
     unproven = sum(verdict == "uncertain" for verdict in series.verdict)
     is_form = series.type in plant.FORM_TYPES
     trend = plant.trend_of(series.value, series.lower, series.upper, is_form=is_form, subgroup=subgroup, unproven=unproven)
     section = next((height for height in results.sections(part) if height and characteristic.endswith(f" at {height}")), "")
-    strips = results.strips(part, min(last, MOST_STRIPS), station=station, section=section)
+    strips = results.strips(part, min(last, MOST_STRIPS), station=station, section=section, until=until)
     strips = strips if since is None else _only(strips, strips.started_s >= since.timestamp())
     strip, told = heat_strip_of(strips) if strips.run else (None, ("No run has a profile on record.",))
     left = (f"Left out: {series.left_out} values of the same name but of another type or unit.",) if series.left_out else ()

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from cmmlink.plant.results_database import ResultsDatabase, month_of
     from cmmlink.plant.study_file import Reference, StudiedCharacteristic, Study, StudyRun, read_study, study_text
     from cmmlink.plant.study_findings import BudgetOfU, SourceOfU, StudyFinding, StudyFindings, budget_of, findings_of
-    from cmmlink.plant.trend import FORM_TYPES, Trend, alarm_words, new_violations, trend_of
+    from cmmlink.plant.trend import FEWEST_BEFORE_ALARM, FORM_TYPES, Trend, alarm_words, broken_words, new_violations, trend_of
     from cmmlink.plant.western_electric import ControlLimits, RuleViolation
 else:
     from cmmlink.front_door import load_on_use
@@ -73,9 +73,11 @@ else:
         "cmmlink.plant.study_file": ("Reference", "StudiedCharacteristic", "Study", "StudyRun", "read_study", "study_text"),
         "cmmlink.plant.study_findings": ("BudgetOfU", "SourceOfU", "StudyFinding", "StudyFindings", "budget_of", "findings_of"),
         "cmmlink.plant.trend": (
+            "FEWEST_BEFORE_ALARM",
             "FORM_TYPES",
             "Trend",
             "alarm_words",
+            "broken_words",
             "new_violations",
             "trend_of",
         ),
@@ -89,6 +91,7 @@ else:
 
 
 __all__ = [
+    "FEWEST_BEFORE_ALARM",
     "FORM_TYPES",
     "STRIP_PARTS",
     "BudgetOfU",
@@ -122,6 +125,7 @@ __all__ = [
     "TypeOneStudy",
     "address_of",
     "alarm_words",
+    "broken_words",
     "budget_of",
     "capability",
     "crossed_study",

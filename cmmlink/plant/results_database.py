@@ -151,17 +151,21 @@ class ResultsDatabase:
             found = connection.scalars(select(RunRow.section).where(RunRow.part == part).distinct())
             return sorted(found, key=lambda height: float(height or "-inf"))
 
-    def strips(self, part: str, last: int = 60, *, station: str | None = None, section: str = "") -> ProfileStrips:
+    def strips(
+        self, part: str, last: int = 60, *, station: str | None = None, section: str = "", until: datetime | None = None
+    ) -> ProfileStrips:
         """The deviations along the profile of the newest runs of a part that came to their end, oldest first.
 
         section : of a part that is measured in sections of a surface, which of them: see `sections`
+        until   : a moment, before which the runs began
         """
         columns = (
             StripRow.mean_mm, StripRow.worst_mm, StripRow.length_mm, StripRow.lower_mm, StripRow.upper_mm, self._seconds(RunRow.started),
             RunRow.verdict, RunRow.run, StationRow.name, RunRow.serial_number,
         )  # fmt: skip
         asked = select(*columns).join(RunRow, RunRow.id == StripRow.run_id).join(StationRow, StationRow.id == RunRow.station_id)
-        asked = asked.where(RunRow.part == part, RunRow.section == section, RunRow.state == "complete", *_equal((StationRow.name, station)))
+        wanted = (RunRow.part == part, RunRow.section == section, RunRow.state == "complete", *_between(RunRow.started, None, until))
+        asked = asked.where(*wanted, *_equal((StationRow.name, station)))
         with self._engine.reading() as connection:
             rows = list(connection.execute(asked.order_by(RunRow.started.desc(), RunRow.id.desc()).limit(last)))[::-1]
         columns_of: list[Any] = list(zip(*rows, strict=True)) if rows else [()] * 10

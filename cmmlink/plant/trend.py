@@ -4,6 +4,7 @@ A value of a run that is not proven is shown and counts, since to leave it out w
 without a value keeps its place in the order and is counted among the missing ones.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -97,16 +98,28 @@ def new_violations(chart: ControlChart) -> tuple[RuleViolation, ...]:
 def alarm_words(values: ArrayLike) -> tuple[str, ...]:
     """Why the newest run should be looked at: every rule that its value breaks, held against the limits of the runs before it.
 
+    A rule that was broken with the run before as well is none of these: that has been told.
+
     values : (n,) in the order of time; nan where a run gave none. With few values before there are no limits and no alarm.
     """
+    return _words_of(values, new_violations)
+
+
+def broken_words(values: ArrayLike) -> tuple[str, ...]:
+    """The same with every rule that the value of the newest run breaks, also one that was broken before."""
+    return _words_of(values, lambda chart: tuple(one for one in chart.violations if one.at == len(chart.plotted) - 1))
+
+
+def _words_of(values: ArrayLike, found: Callable[[ControlChart], Sequence[RuleViolation]]) -> tuple[str, ...]:
+    """The words of what is found of the newest run on the charts, whose limits are those of the runs before it."""
     measured = np.array(values, dtype=np.float64)
     if np.isfinite(measured[:-1]).sum() < FEWEST_BEFORE_ALARM or not np.isfinite(measured[-1]):
         return ()
     charts = _charts_of(measured, 1, len(measured) - 1)
     if charts is None or not charts.within_sigma:
         return ()
-    told = tuple(f"{one.words}, {'upwards' if one.above else 'downwards'}" for one in new_violations(charts.location))
-    return told or (_LEAP,) * bool(new_violations(charts.spread))
+    told = tuple(f"{one.words}, {'upwards' if one.above else 'downwards'}" for one in found(charts.location))
+    return told or (_LEAP,) * bool(found(charts.spread))
 
 
 def _size_of(measured: Array, subgroup: int) -> tuple[int, tuple[str, ...]]:

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from cmmlink.plant_push.following import LOOK_S, be_last_in_line, follow
     from cmmlink.plant_push.plant_settings import RESULTS_FILE, SETTINGS_FILE, address_for, keep_address, named_address
     from cmmlink.plant_push.pushing import Outbox, outbox_of, push
-    from cmmlink.plant_push.recorded_results import stored_run
+    from cmmlink.plant_push.recorded_results import characteristics_of, part_of, stored_run
     from cmmlink.plant_push.verifying import PlantVerified, Row, verify_plant
 else:
     from cmmlink.front_door import load_on_use
@@ -18,7 +18,7 @@ else:
         "cmmlink.plant_push.following": ("LOOK_S", "be_last_in_line", "follow"),
         "cmmlink.plant_push.plant_settings": ("RESULTS_FILE", "SETTINGS_FILE", "address_for", "keep_address", "named_address"),
         "cmmlink.plant_push.pushing": ("Outbox", "outbox_of", "push"),
-        "cmmlink.plant_push.recorded_results": ("stored_run",),
+        "cmmlink.plant_push.recorded_results": ("characteristics_of", "part_of", "stored_run"),
         "cmmlink.plant_push.verifying": ("PlantVerified", "Row", "verify_plant"),
     }
 
@@ -34,10 +34,12 @@ __all__ = [
     "Row",
     "address_for",
     "be_last_in_line",
+    "characteristics_of",
     "follow",
     "keep_address",
     "named_address",
     "outbox_of",
+    "part_of",
     "push",
     "stored_run",
     "verify_plant",

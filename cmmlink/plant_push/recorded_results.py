@@ -38,13 +38,12 @@ def stored_run(store: Store, run: str, nominals: Nominals) -> StoredRun:
         raise StoreError(f"{store.path}: run {run} has no end yet")
     plan = None if recorded.is_of_surface else recorded_plan(recorded)
     origin = origin_of(store, run)
-    place = header.get("stack")
-    section = f"{place['height_mm']:.3f}" if place else ""
+    section = _section_of(header)
     counts = {"received": end["received"]} | {name: (result or {}).get(name) for name in _COUNTS if result}
     return StoredRun(
         station=_clean(header.get("station") or station_name(None)),
         run=run,
-        part=_clean(header["part"]),
+        part=part_of(recorded),
         section=section,
         serial_number=_clean(header["serial_number"]),
         operator=_clean(header["operator"]),
@@ -60,6 +59,16 @@ def stored_run(store: Store, run: str, nominals: Nominals) -> StoredRun:
         values=tuple(_values(plan, result or {}, section)),
         strip=None if plan is None or result is None else _strip(store, recorded, plan, result, nominals),
     )
+
+
+def characteristics_of(recorded: RecordedRun) -> list[str]:
+    """The names of the characteristics of a run, as the database has them."""
+    return [_named(one, _section_of(recorded.header)) for one in (recorded.result or {}).get("characteristics", ())]
+
+
+def part_of(recorded: RecordedRun) -> str:
+    """The name of the part of a run, as the database has it."""
+    return _clean(recorded.header["part"])
 
 
 def station_of(store: Store, run: str) -> str:
@@ -90,11 +99,21 @@ def _values(plan: Plan | None, result: Mapping[str, Any], section: str) -> Itera
     """The characteristics of a result, with limits of the value itself."""
     asked = () if plan is None else plan.characteristics
     varying = {one.name for one in asked if one.type == "line-profile" and one.zone.stations_mm is not None}
-    at = f" at {section}" if section else ""
     for one in result.get("characteristics", ()):
         value, lower, upper, unit = _with_limits(one, one["name"] in varying)
         uncertainty = one["uncertainty"] if unit == one["unit"] else None
-        yield StoredValue(_clean(one["name"]) + at, one["type"], unit, value, lower, upper, uncertainty, one["verdict"])
+        yield StoredValue(_named(one, section), one["type"], unit, value, lower, upper, uncertainty, one["verdict"])
+
+
+def _section_of(header: Mapping[str, Any]) -> str:
+    """Of a section of a surface its height; empty for every other run."""
+    place = header.get("stack")
+    return f"{place['height_mm']:.3f}" if place else ""
+
+
+def _named(one: Mapping[str, Any], section: str) -> str:
+    """The name of a characteristic, of a section of a surface with its height."""
+    return _clean(one["name"]) + (f" at {section}" if section else "")
 
 
 def _with_limits(one: Mapping[str, Any], varying: bool) -> tuple[float | None, float | None, float | None, str]:

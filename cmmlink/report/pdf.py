@@ -19,6 +19,7 @@ from cmmlink.report.page_parts import GREY, INK, LINE, draw_sign
 from cmmlink.report.pdf_fonts import BOLD, PLAIN, register_fonts
 from cmmlink.report.report_input import ReportInput
 from cmmlink.report.speech import Speech
+from cmmlink.report.trend_pages import trend_pages
 from cmmlink.words import Headline
 
 _PAPERS = {"a4": A4, "letter": LETTER}
@@ -30,7 +31,7 @@ def write_report(report: ReportInput, path: Path) -> None:
     """Write the report of a run. Raises PlanError where its logo cannot be read, OSError where the file cannot be written."""
     register_fonts()
     say = Speech(report.settings.language)
-    build_pages(path, report, say, lambda width, height: _pages(report, say, width, height))
+    build_pages(path, report, say, lambda width, height: [*_pages(report, say, width, height), *trend_pages(report, say, width, height)])
 
 
 def build_pages(path: Path, report: ReportInput, say: Speech, pages: Callable[[float, float], Sequence[Flowable]]) -> None:

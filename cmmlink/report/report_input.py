@@ -11,6 +11,7 @@ from inspection import DecisionRule, ToleranceZone, Verdict
 
 if TYPE_CHECKING:  # a process that only draws loads nothing of what judges
     from cmmlink.run import FinishedRun
+    from cmmlink.run_trends import RunTrend
     from cmmlink.surface_run import FinishedSurface
 
 _VERDICTS = {verdict.word: verdict for verdict in Verdict}
@@ -23,12 +24,14 @@ class ReportInput:
     document : the result with the keys of result.json
     message  : what ended the run early, or why it has no result; empty where there is nothing to say
     content  : what its drawings show; None where no point was judged
+    trends   : the trends that the run ends, each with a page of its own
     """
 
     document: Mapping[str, Any]
     plan: Plan | CtPlan | SurfacePlan
     message: str = ""
     content: PictureContent | None = None
+    trends: "tuple[RunTrend, ...]" = ()
 
     @property
     def settings(self) -> ReportSettings:

@@ -38,22 +38,27 @@ _TICKS = 6
 
 def write_trend_picture(found: PartTrend, path: Path, say: Speech) -> None:
     """Draw a trend to a file: pdf, png or svg by its name. Raises OSError where it cannot be written."""
-    figure = Figure(figsize=_INCHES, dpi=_DOTS_PER_INCH)
+    figure = trend_figure(found, say, _INCHES, _DOTS_PER_INCH)
+    draw_heading(figure, short_title(f"{found.series.part}: {found.series.name}"), size=11)
+    with mpl.rc_context({"svg.hashsalt": "cmmlink", "pdf.fonttype": 42}):
+        if path.suffix.lower() == ".pdf":
+            figure.savefig(path, metadata={"CreationDate": None})
+        else:
+            save_picture(figure, path)
+
+
+def trend_figure(found: PartTrend, say: Speech, inches: tuple[float, float], dots_per_inch: int) -> Figure:
+    """The drawing of a trend, without a heading, on a page of this width and height."""
+    figure = Figure(figsize=inches, dpi=dots_per_inch)
     location, spread, heat, drift = (figure.add_axes((_LEFT, bottom, _WIDTH, height)) for bottom, height in _PLACES)
     for axes in (location, spread, heat, drift):
         prepare_axes(axes, say)
     _draw_charts(location, spread, found, say)
     _draw_strip(heat, found.strip, say)
     _draw_drift(drift, found.strip, say)
-    series = found.series
-    draw_heading(figure, short_title(f"{series.part}: {series.name}"), size=11)
     _write_lines(figure, facts(found, say), 0.945, NOMINAL)
     _write_lines(figure, [say.sentence(told) for told in (*found.drifts, *found.notes)], 0.175, NOTES)
-    with mpl.rc_context({"svg.hashsalt": "cmmlink", "pdf.fonttype": 42}):
-        if path.suffix.lower() == ".pdf":
-            figure.savefig(path, metadata={"CreationDate": None})
-        else:
-            save_picture(figure, path)
+    return figure
 
 
 def facts(found: PartTrend, say: Speech) -> list[str]:

@@ -60,9 +60,16 @@ class Remembered:
         self.runs = runs
 
     def series(
-        self, part: str, characteristic: str, *, station: str | None = None, since: datetime | None = None, last: int | None = None
+        self,
+        part: str,
+        characteristic: str,
+        *,
+        station: str | None = None,
+        since: datetime | None = None,
+        until: datetime | None = None,
+        last: int | None = None,
     ) -> ResultSeries:
-        found = [run for run in self.runs if station in (None, run.station) and (since is None or run.started >= since)][-(last or 0) :]
+        found = [run for run in self._between(since, until) if station in (None, run.station)][-(last or 0) :]
         values = [next(one for one in run.values if one.name == characteristic) for run in found]
         value, lower, upper = (numbers([getattr(one, name) for one in values]) for name in ("value", "lower", "upper"))
         verdicts = tuple(one.verdict for one in values)
@@ -72,11 +79,16 @@ class Remembered:
             part, characteristic, kind.type, kind.unit, value, lower, upper, _began(found), verdicts, runs, stations, serial_numbers
         )
 
+    def _between(self, since: datetime | None, until: datetime | None) -> list[StoredRun]:
+        return [run for run in self.runs if (since is None or run.started >= since) and (until is None or run.started < until)]
+
     def sections(self, part: str) -> list[str]:
         return sorted({run.section for run in self.runs})
 
-    def strips(self, part: str, last: int = 60, *, station: str | None = None, section: str = "") -> ProfileStrips:
-        found = [run for run in self.runs if station in (None, run.station) and run.section == section][-last:]
+    def strips(
+        self, part: str, last: int = 60, *, station: str | None = None, section: str = "", until: datetime | None = None
+    ) -> ProfileStrips:
+        found = [run for run in self._between(None, until) if station in (None, run.station) and run.section == section][-last:]
         strips = [run.strip for run in found if run.strip is not None]
         length, lower, upper = (numbers([getattr(one, name) for one in strips]) for name in ("length_mm", "lower_mm", "upper_mm"))
         mean, worst = (np.array([getattr(one, name) for one in strips]) for name in ("mean_mm", "worst_mm"))
