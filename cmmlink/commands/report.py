@@ -65,7 +65,7 @@ def report(
     with open_to_read(folder, now) as store:
         found, is_stack = _named(store, name, stack)
         if is_stack and trend is not None:
-            raise PlanError(f"{found}: a stack of sections has no trend of its own; expected --trend with one of its runs")
+            raise PlanError(f"{found}: --trend is for a run; of the characteristics of a stack `cmmlink plant trends` shows it")
         trends = () if trend is None else _trends_of(store, folder, found, trend, characteristic or ())
         file = out or Path(f"{found}.pdf")
         try:

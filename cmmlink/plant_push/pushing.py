@@ -12,7 +12,7 @@ from cmmlink.errors import PlanError, PlantAwayError, PlantError, RunError, Stor
 from cmmlink.plant import ResultsDatabase, StoredRun, words_of
 from cmmlink.plant_push.outbox import OutboxState, Waiting, due, in_these_records, keep_state, read_state, waiting
 from cmmlink.plant_push.plant_settings import address_for
-from cmmlink.plant_push.recorded_results import judged_again, stored_run
+from cmmlink.plant_push.recorded_results import judged_again, stack_ended_by, stored_run, stored_stack
 from cmmlink.record import Nominals, Record, Store, has_records
 from cmmlink.trend_alarms import trend_alarms
 from cmmlink.words import utc_words
@@ -133,6 +133,8 @@ class _Pushing:
             try:
                 if record.kind == "end":
                     runs.append(stored_run(self._store, record.run, self._nominals))
+                    if stack_ended_by(self._store, record.run) is not None:
+                        runs.append(stored_stack(self._store, record.run, self._nominals))
                 else:
                     database.add_event(judged_again(self._store, record))
             except _CANNOT_BE_READ as error:

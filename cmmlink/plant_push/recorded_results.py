@@ -1,7 +1,8 @@
 """What the record of a station says of a run, as the results database stores it."""
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from datetime import datetime
 from typing import Any
 
@@ -27,6 +28,8 @@ from cmmlink.record import (
 from inspection import NOT_JUDGED
 
 JUDGED_AGAIN = "judged again"
+_WORST_LAST = ("conform", "uncertain", "nonconform")
+_DIGITS = 9  # mm and degrees: what the same record gives on every processor
 _COUNTS = ("received", "judged", "rejected", "lost", "damaged_bytes")
 
 
@@ -59,6 +62,63 @@ def stored_run(store: Store, run: str, nominals: Nominals) -> StoredRun:
         values=tuple(_values(plan, result or {}, section)),
         strip=None if plan is None or result is None else _strip(store, recorded, plan, result, nominals),
     )
+
+
+def stack_ended_by(store: Store, run: str) -> str | None:
+    """The id of the stack that a run is the last section of; None for other runs, and where the stack is not whole or asks for nothing.
+
+    Raises StoreError where a record cannot be read.
+    """
+    place = run_header(store, run).get("stack")
+    if not place or place["section"] != place["sections"]:
+        return None
+    from cmmlink.stack_again import whole_stack  # noqa: PLC0415 - few runs are sections, and this loads what judges
+
+    found = whole_stack(store, recorded_run(store, run))
+    return None if found is None else found[0]
+
+
+def stored_stack(store: Store, last: str, nominals: Nominals) -> StoredRun:
+    """A stack of sections as a run of its own, from the last of its sections.
+
+    Its hash is that of the end of this section, which stands on all before it. Raises StoreError where a record cannot be read, and where a
+    section does not come out as it is on record: then nothing is said of the stack.
+    """
+    from cmmlink.stack_again import judge_stack_again, whole_stack  # noqa: PLC0415 - likewise
+
+    found = whole_stack(store, recorded_run(store, last))
+    assert found is not None
+    stack, sections = found
+    again = judge_stack_again(store, sections, nominals)
+    if again.lost:
+        told = f"judged again by this version, {len(again.lost)} sections are not what is on record, the first of them run {again.lost[0]}"
+        raise StoreError(f"{store.path}: stack {stack}: {told}")
+    runs = [stored_run(store, one.run, nominals) for one in sections]
+    words = [one["verdict"] for one in again.characteristics] + [run.verdict or "uncertain" for run in runs]
+    return replace(
+        runs[-1],
+        run=stack,
+        section="",
+        started=runs[0].started,
+        state=next((run.state for run in runs if run.state != "complete"), "complete"),
+        verdict=max(words, key=_WORST_LAST.index),
+        nominal_sha256=runs[0].nominal_sha256,
+        plan_sha256=hashlib.sha256(sections[0].header["stack"]["plan"].encode()).hexdigest(),
+        values=tuple(_to_last_digit(one) for one in _values(None, {"characteristics": again.characteristics}, "")),
+        strip=None,
+        **{name: _sum([getattr(run, name) for run in runs]) for name in _COUNTS},
+    )
+
+
+def _to_last_digit(one: StoredValue) -> StoredValue:
+    """A value that was worked out again, without its last bits: they are another processor's own."""
+    return replace(one, value=None if one.value is None else round(one.value, _DIGITS))
+
+
+def _sum(counts: Sequence[int | None]) -> int | None:
+    """The sum; None where one of them is not known."""
+    known = [count for count in counts if count is not None]
+    return sum(known) if len(known) == len(counts) else None
 
 
 def characteristics_of(recorded: RecordedRun) -> list[str]:

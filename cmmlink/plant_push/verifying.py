@@ -5,12 +5,13 @@ from dataclasses import dataclass, fields
 from datetime import datetime
 from pathlib import Path
 
-from cmmlink.errors import StoreError
+from cmmlink.errors import PlanError, RunError, StoreError
 from cmmlink.plant import ResultsDatabase, StoredRun, StoredValue, words_of
 from cmmlink.plant_push.outbox import due
 from cmmlink.plant_push.plant_settings import address_for
-from cmmlink.plant_push.recorded_results import JUDGED_AGAIN, judged_again, station_of, stored_run
+from cmmlink.plant_push.recorded_results import JUDGED_AGAIN, judged_again, stack_ended_by, station_of, stored_run, stored_stack
 from cmmlink.record import Nominals, Store, check_chain, open_to_read, origin_of
+from inspection import InspectionError
 
 _MOST_NOMINALS = 4
 
@@ -32,7 +33,7 @@ class Row:
 class PlantVerified:
     """What came of it.
 
-    runs    : runs of the records that have ended
+    runs    : runs of the records that have ended, and stacks of sections that have characteristics
     agree   : how many of them are in the database as the record has them, with every value and event
     missing : runs, and judgements of runs, that are not there
     altered : rows that are not as the record has them
@@ -69,31 +70,37 @@ class _Verifying:
 
     def __init__(self, store: Store, database: ResultsDatabase) -> None:
         self._store, self._database, self._nominals = store, database, Nominals(_MOST_NOMINALS)
+        self._stacks: dict[str, str] = {}  # the last section of each
         self._missing, self._altered, self._extra = list[Row](), list[Row](), list[Row]()
 
     def verify(self, address: str, tell: Callable[[float], None]) -> PlantVerified:
         ended = {begin.run: begin for begin, end in self._store.begins_and_ends() if end is not None}
+        ends = {run: stack_ended_by(self._store, run) for run in ended}
+        self._stacks = {stack: run for run, stack in ends.items() if stack is not None}
         stations = {run: station_of(self._store, run) for run in ended}
+        stations |= {stack: stations[last] for stack, last in self._stacks.items()}
         own = {stations[run] for run in ended if origin_of(self._store, run) is None}
         seen = set[str]()
         for stored in (one for station in sorted(set(stations.values())) for one in self._database.stored_runs(station)):
             if stations.get(stored.run) == stored.station:
                 seen.add(stored.run)
                 self._compare(stored)
-                tell(len(seen) / len(ended))
+                tell(len(seen) / len(stations))
             elif stored.station in own:
                 self._extra.append(Row(stored.station, stored.run, "the records have no such run"))
-        self._missing += [Row(stations[run], run, "is not in the database") for run in ended if run not in seen]
+        self._missing += [Row(stations[run], run, "is not in the database") for run in stations if run not in seen]
         self._compare_events(set(stations.values()))
         troubled = {row.run for row in (*self._missing, *self._altered)}
-        agree = sum(run not in troubled for run in ended)
-        return PlantVerified(address, len(ended), agree, tuple(self._missing), tuple(self._altered), tuple(self._extra), "")
+        agree = sum(run not in troubled for run in stations)
+        return PlantVerified(address, len(stations), agree, tuple(self._missing), tuple(self._altered), tuple(self._extra), "")
 
     def _compare(self, stored: StoredRun) -> None:
         """Note what a run has that its record has not."""
         try:
-            recorded = stored_run(self._store, stored.run, self._nominals)
-        except StoreError as error:
+            last = self._stacks.get(stored.run)
+            known = (self._store, last or stored.run, self._nominals)
+            recorded = stored_run(*known) if last is None else stored_stack(*known)
+        except (StoreError, PlanError, RunError, InspectionError) as error:
             self._altered.append(Row(stored.station, stored.run, f"its record cannot be read: {error}"))
             return
         told = [*_differences(stored, recorded), *_strip_differences(stored, recorded)]

@@ -6,14 +6,16 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from cmmlink.errors import PlanError, YamlError
-from cmmlink.plan import Plan, SurfacePlan, value_of, words_of_allowed
+from cmmlink.plan import CtPlan, Plan, SurfacePlan, value_of, words_of_allowed
 
-AnyPlan = TypeVar("AnyPlan", Plan, SurfacePlan)
+AnyPlan = TypeVar("AnyPlan", Plan, SurfacePlan, CtPlan)
 
 # Keys that have no part in judging, or stand for what is on record itself.
 _SETTLED = (
     "buffer_points",
+    "cut",
     "device",
+    "mesh",
     "nominal.file",
     "surface.file",
     "operator",
@@ -22,7 +24,9 @@ _SETTLED = (
     "records",
     "registration.datum.result",
     "report",
+    "sections",
     "serial_number",
+    "stack_fit",
 )
 
 

@@ -1,6 +1,6 @@
 """What the report of a stack on record is made of: its sections as they were recorded, and the plan of the stack.
 
-The characteristics of a stack are not on record themselves, but all that they are worked out of is: each section is judged again.
+For the characteristics of the stack each section is judged again (cmmlink.stack_again).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -10,20 +10,18 @@ from typing import Any
 
 import numpy as np
 
-from cmmlink.devices import decoder_of
-from cmmlink.errors import StoreError, YamlError
+from cmmlink.errors import StoreError
 from cmmlink.events import Counts
-from cmmlink.pipeline import Outcome
-from cmmlink.plan import CtPlan, read_model
-from cmmlink.record import Nominals, RecordedRun, Store, end_missing, recorded_plan, recorded_run, replay_run, unpack_judged
+from cmmlink.plan import CtPlan
+from cmmlink.record import Nominals, RecordedRun, Store, end_missing, recorded_plan, recorded_run, unpack_judged
 from cmmlink.report.judged_scan import JudgedScan, scan_on_record
 from cmmlink.report.picture_content import PictureContent, content_of
 from cmmlink.report.report_input import places_in, regions_in, zone_in
 from cmmlink.report.stack_input import MAP_COLUMNS, MapRow, SectionSheet, StackInput, map_row, runs_words
 from cmmlink.result_json import result_json
-from cmmlink.stack_characteristics import JudgedSection, StackQuestions, stack_characteristic_json
+from cmmlink.stack_again import judge_stack_again, plan_of_stack
 from cmmlink.words import utc_words
-from inspection import JudgedRows, RegistrationError, Verdict
+from inspection import JudgedRows, Verdict
 
 _VERDICTS = {verdict.word: verdict for verdict in Verdict}
 
@@ -39,11 +37,11 @@ def stack_on_record(store: Store, runs: Sequence[str]) -> StackInput:
             raise StoreError(f"{store.path}: {altered}; of what was altered there is no report")
     recorded, profiles = [recorded_run(store, run) for run in runs], Nominals()
     place: Mapping[str, Any] = recorded[0].header["stack"]
-    plan = _plan_of(recorded[0], place)
+    plan = plan_of_stack(recorded[0])
     shared = [note for note in recorded[0].header.get("notes", ()) if all(note in one.header.get("notes", ()) for one in recorded)]
     sheets = tuple(_sheet_of(store, one, profiles, shared) for one in recorded)
     asked = int(place["sections"])
-    of_stack, told = _characteristics(store, plan, recorded, profiles, asked)
+    of_stack, told = _characteristics(store, plan, recorded, profiles)
     complete = len(sheets) == asked and all(sheet.document["ending"] == "complete" for sheet in sheets)
     verdicts = [_VERDICTS[found["verdict"]] for found in (*(sheet.document for sheet in sheets), *of_stack)]
     verdict = max(*verdicts, Verdict.CONFORM if complete else Verdict.UNCERTAIN)
@@ -56,14 +54,6 @@ def stack_on_record(store: Store, runs: Sequence[str]) -> StackInput:
         **{key: recorded[0].header[key] for key in ("qualification",) if key in recorded[0].header},
     }
     return StackInput(plan, document, sheets, asked, (*shared, *told), of_stack)
-
-
-def _plan_of(section: RecordedRun, place: Mapping[str, Any]) -> CtPlan:
-    """The plan of a stack. Raises StoreError when this version cannot read it."""
-    try:
-        return read_model(place["plan"], CtPlan)
-    except YamlError as error:
-        raise StoreError(f"the plan of the stack of run {section.run} cannot be read by this version of cmmlink: {error}") from None
 
 
 def _sheet_of(store: Store, recorded: RecordedRun, profiles: Nominals, shared: Sequence[str]) -> SectionSheet:
@@ -94,23 +84,13 @@ def _blocks(store: Store, run: str) -> Iterator[JudgedRows]:
 
 
 def _characteristics(
-    store: Store, plan: CtPlan, recorded: Sequence[RecordedRun], profiles: Nominals, asked: int
+    store: Store, plan: CtPlan, recorded: Sequence[RecordedRun], profiles: Nominals
 ) -> tuple[tuple[Mapping[str, Any], ...], list[str]]:
     """The characteristics of the stack, and a note where its sections do not come out today as they are on record."""
     if not plan.stack_characteristics:
         return (), []
-    questions, judged, differs = StackQuestions(plan), [], []
-    for one in recorded:
-        place, end = one.header["stack"], one.end or end_missing(store, one.run)
-        if one.result is None:
-            outcome = Outcome("complete", None, Counts(), None, RegistrationError(end["message"] or "nothing of it was judged"))
-        else:
-            profile = profiles.of(recorded_plan(one), one)
-            again = replay_run(store, one, decoder_of, profile=profile, numbers=questions.numbers(profile))
-            outcome = again.outcome
-            differs += [one.run] if again.identical is False else []
-        judged.append(JudgedSection(place["asked_height_mm"], place["height_mm"], outcome))
+    again = judge_stack_again(store, recorded, profiles)
     told = ["the characteristics of the stack were judged again from the points on record"]
-    if differs:
-        told.append(f"judged again, {len(differs)} sections are not what is on record, the first of them run {differs[0]}")
-    return tuple(stack_characteristic_json(found) for found in questions.judge(judged, asked)), told
+    if again.differs:
+        told.append(f"judged again, {len(again.differs)} sections are not what is on record, the first of them run {again.differs[0]}")
+    return again.characteristics, told
