@@ -94,6 +94,7 @@ def stored_stack(store: Store, last: str, nominals: Nominals) -> StoredRun:
         told = f"judged again by this version, {len(again.lost)} sections are not what is on record, the first of them run {again.lost[0]}"
         raise StoreError(f"{store.path}: stack {stack}: {told}")
     runs = [stored_run(store, one.run, nominals) for one in sections]
+    counts: dict[str, Any] = {name: _sum([getattr(run, name) for run in runs]) for name in _COUNTS}
     words = [one["verdict"] for one in again.characteristics] + [run.verdict or "uncertain" for run in runs]
     return replace(
         runs[-1],
@@ -106,7 +107,7 @@ def stored_stack(store: Store, last: str, nominals: Nominals) -> StoredRun:
         plan_sha256=hashlib.sha256(sections[0].header["stack"]["plan"].encode()).hexdigest(),
         values=tuple(_to_last_digit(one) for one in _values(None, {"characteristics": again.characteristics}, "")),
         strip=None,
-        **{name: _sum([getattr(run, name) for run in runs]) for name in _COUNTS},
+        **counts,
     )
 
 
