@@ -21,7 +21,7 @@ from cmmlink.record import (
     with_changes,
 )
 from cmmlink.stack_characteristics import JudgedSection, StackQuestions, stack_characteristic_json
-from inspection import RegistrationError
+from inspection import RegistrationError, Verdict
 
 _OF_STACK = "stack_characteristics"
 
@@ -33,11 +33,18 @@ class StackAgain:
     characteristics : in the order of the plan, as result.json holds them
     differs         : runs of sections whose result is not to the last bit that on record; with something changed in the plan, most are
     lost            : runs of sections whose result is not that on record, even where last bits do not count
+    sections        : the verdict of the worst section
     """
 
     characteristics: tuple[Mapping[str, Any], ...]
     differs: tuple[str, ...]
     lost: tuple[str, ...]
+    sections: Verdict
+
+    @property
+    def verdict(self) -> Verdict:
+        """That of the worst section or characteristic, of a stack whose sections are all there."""
+        return max(self.sections, *(Verdict[one["verdict"].upper()] for one in self.characteristics))
 
 
 def plan_of_stack(section: RecordedRun) -> CtPlan:
@@ -61,7 +68,7 @@ def judge_stack_again(
     where_it_lies = {"registration": recorded_plan(recorded[0]).registration, "stack_fit": "each"}  # the common fit, where there was one
     placed = plan_of_stack(recorded[0]).model_copy(update=where_it_lies)
     questions = StackQuestions(with_changes(placed, None, None, settings or {}))
-    of_section = {key: text for key, text in (settings or {}).items() if not f"{key}.".startswith(f"{_OF_STACK}.")}
+    of_section = settings_of_section(settings or {})
     judged, differs, lost = [], list[str](), list[str]()
     for one in recorded:
         where, end = one.header["stack"], one.end or end_missing(store, one.run)
@@ -76,7 +83,13 @@ def judge_stack_again(
             lost += [] if again.agreement.holds else [one.run]
         judged.append(JudgedSection(where["asked_height_mm"], where["height_mm"], outcome))
     found = questions.judge(judged, int(place["sections"]))
-    return StackAgain(tuple(stack_characteristic_json(one) for one in found), tuple(differs), tuple(lost))
+    worst = max(Verdict.UNCERTAIN if one.run.result is None else one.run.result.verdict for one in judged)
+    return StackAgain(tuple(stack_characteristic_json(one) for one in found), tuple(differs), tuple(lost), worst)
+
+
+def settings_of_section(settings: Mapping[str, str]) -> dict[str, str]:
+    """What of the settings of a stack is for its sections: all but what is asked of the stack as a whole."""
+    return {key: text for key, text in settings.items() if not f"{key}.".startswith(f"{_OF_STACK}.")}
 
 
 def whole_stack(store: Store, last: RecordedRun) -> tuple[str, tuple[RecordedRun, ...]] | None:

@@ -7,6 +7,7 @@ alone: not on the worker, the task, or the order.
 import platform
 from collections.abc import Mapping, Sequence
 from functools import cache
+from typing import Any
 
 from cmmlink.archive.tasks import Failure, Outcome, RunAsked, Task
 from cmmlink.devices import decoder_of
@@ -28,6 +29,7 @@ from cmmlink.record import (
     software,
     with_changes,
 )
+from cmmlink.stack_again import StackAgain, judge_stack_again, settings_of_section
 from drivers import DeviceError, PointFileError
 from inspection import InspectionError
 
@@ -49,22 +51,44 @@ def judge_runs(task: Task) -> list[Outcome]:
 
 def _outcome(store: Store, task: Task, asked: RunAsked, node: str) -> Outcome:
     try:
-        recorded = recorded_run(store, asked.run)
+        recorded = recorded_run(store, asked.sections[-1] if asked.sections else asked.run)
         if recorded.chain_sha256 != asked.chain_sha256:
-            raise StoreError(f"{store.path}: run {asked.run} is there with another content on {node}")
-        plan = _changed_plan(recorded, task.settings)
+            raise StoreError(f"{store.path}: run {recorded.run} is there with another content on {node}")
+        if asked.sections:
+            return _stack_outcome(store, task, asked, node)
+        settings = settings_of_section(task.settings) if recorded.header.get("stack") else task.settings
+        plan = _changed_plan(recorded, settings)
         means = means_of(plan.effective_yaml(), software())
         if means in asked.known:
             return Outcome(asked.run, known=means, node=node)
         again: Replay | SurfaceReplay
         if isinstance(plan, SurfacePlan):
-            again = replay_surface(store, recorded, decoder_of, settings=task.settings)
+            again = replay_surface(store, recorded, decoder_of, settings=settings)
         else:
             profile = _nominals().of(plan, recorded)
-            again = replay_run(store, recorded, decoder_of, settings=task.settings, profile=profile)
-        return Outcome(asked.run, judgement_of(recorded, again), node=node)
+            again = replay_run(store, recorded, decoder_of, settings=settings, profile=profile)
+        return Outcome(asked.run, judgement_of(recorded, again), node=node, is_same=not settings)
     except Exception as error:  # whatever it is, the others are judged all the same
         return Outcome(asked.run, failure=_failure(error), node=node)
+
+
+def _stack_outcome(store: Store, task: Task, asked: RunAsked, node: str) -> Outcome:
+    """What a stack is by the recorded plan and by the changed one. What it is on record follows from its sections, as it did then."""
+    sections = [recorded_run(store, run) for run in asked.sections]
+    before = judge_stack_again(store, sections, _nominals())
+    if before.lost:
+        told = f"with nothing changed, {len(before.lost)} sections are not what is on record, the first of them run {before.lost[0]}"
+        raise RunError(f"stack {asked.run}: {told}; another version of cmmlink judged them")
+    after = judge_stack_again(store, sections, _nominals(), task.settings)
+    return Outcome(asked.run, node=node, stack=(_stack_words(before), _stack_words(after)))
+
+
+def _stack_words(found: StackAgain) -> dict[str, Any]:
+    """What a row tells of a stack: its sections count together as one more characteristic."""
+    of_stack = [{"name": one["name"], "verdict": one["verdict"]} for one in found.characteristics]
+    reasons = [reason for one in found.characteristics for reason in one["reasons"]]
+    sections = {"name": "sections", "verdict": found.sections.word}
+    return {"verdict": found.verdict.word, "characteristics": [sections, *of_stack], "reasons": reasons[:1]}
 
 
 def _changed_plan(recorded: RecordedRun, settings: Mapping[str, str]) -> Plan | SurfacePlan:
@@ -95,7 +119,8 @@ def require_settings(store: Store, runs: Sequence[str], settings: dict[str, str]
     refused: PlanError | None = None
     for run in runs:
         try:
-            _changed_plan(recorded_run(store, run), settings)
+            recorded = recorded_run(store, run)
+            _changed_plan(recorded, settings_of_section(settings) if recorded.header.get("stack") else settings)
         except PlanError as error:
             refused = refused or error
         except (StoreError, RunError):  # which is told of this run, when its turn comes

@@ -1,6 +1,6 @@
 """An archive judged again: which runs, by whom, what comes of each, and what is kept. The order of workers changes nothing of it."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from threading import Event
@@ -12,7 +12,8 @@ from cmmlink.archive.rows import Row
 from cmmlink.archive.scheduling import Judge, Workers, judge_all
 from cmmlink.archive.tasks import Failure, Outcome, RunAsked, tasks_of
 from cmmlink.errors import StoreError
-from cmmlink.record import RunSearch, Store, entries_of, judged_by_means, recorded_result
+from cmmlink.record import RunSearch, Store, entries_of, judged_by_means, recorded_result, recorded_run
+from cmmlink.stack_again import whole_stack
 
 Open = Callable[[int], Workers]
 
@@ -21,7 +22,7 @@ Open = Callable[[int], Workers]
 class Rejudged:
     """What came of an archive.
 
-    rows : a row for each run that is done, in the order of the archive
+    rows : a row for each run that is done, in the order of the archive, and for each stack behind its sections
     left : how many runs are not, because it was stopped
     """
 
@@ -97,7 +98,27 @@ class _Archive:
                 self._found[run] = Row(entry, failure=why)
             else:
                 asked.append((RunAsked(run, ends[run], known), entry["received"]))
-        return asked
+        return [*asked, *self._stacks({one.run: one.chain_sha256 for one, _ in asked})]
+
+    def _stacks(self, asked: Mapping[str, str]) -> Iterator[tuple[RunAsked, int | None]]:
+        """The stacks that have characteristics and whose sections are all to be judged, each behind its last section."""
+        entries, self._entries = self._entries, {}
+        for run, entry in entries.items():
+            self._entries[run] = entry
+            place = entry.get("stack")
+            if run not in asked or not place or place["section"] != place["sections"]:
+                continue
+            stack = str(place["stack"])
+            try:
+                found = whole_stack(self._store, recorded_run(self._store, run))
+            except StoreError as error:
+                self._entries[stack] = _entry_of_stack(stack, [entry])
+                self._found[stack] = Row(self._entries[stack], failure=Failure("no-record", str(error)))
+                continue
+            if found is not None and all(section.run in asked for section in found[1]):
+                sections = tuple(section.run for section in found[1])
+                self._entries[stack] = _entry_of_stack(stack, [entries[one] for one in sections])
+                yield RunAsked(stack, asked[run], sections=sections), 2 * self._entries[stack]["received"]
 
     def take(self, outcomes: Sequence[Outcome]) -> None:
         """Take what came of runs, and have it kept."""
@@ -105,7 +126,7 @@ class _Archive:
             self._found[one.run] = self._row(self._entries[one.run], one)
         self.done += len(outcomes)
         if self._keeper is not None:
-            self._keeper.take([one.judgement for one in outcomes if one.judgement is not None])
+            self._keeper.take([one.judgement for one in outcomes if one.judgement is not None and not one.is_same])
 
     def rows(self) -> list[Row]:
         """The rows of what is done, in the order of the archive."""
@@ -120,6 +141,10 @@ class _Archive:
         return frozenset(judged_by_means(self._kept_in, run)) if end == there else frozenset()
 
     def _row(self, entry: Mapping[str, Any], outcome: Outcome) -> Row:
+        if entry.get("sections"):
+            before, after = outcome.stack or (None, None)
+            told = {**entry, "verdict": None if before is None else before["verdict"]}
+            return Row(told, before, after, failure=outcome.failure)
         try:
             before = recorded_result(self._store, outcome.run) or None
             if outcome.known:
@@ -129,6 +154,19 @@ class _Archive:
             return Row(entry, failure=Failure("no-record", str(error)))
         after = None if outcome.judgement is None else outcome.judgement.result
         return Row.of(entry, before, after, failure=outcome.failure)
+
+
+def _entry_of_stack(stack: str, sections: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """The line of a stack in the list of runs, from those of its sections."""
+    first = sections[0]
+    return {
+        "run": stack,
+        **{key: first[key] for key in ("started", "part", "serial_number")},
+        "state": next((one["state"] for one in sections if one["state"] != "complete"), "complete"),
+        "received": sum(one["received"] or 0 for one in sections),
+        "verdict": None,
+        "sections": len(sections),
+    }
 
 
 def _ends(store: Store) -> dict[str, str]:

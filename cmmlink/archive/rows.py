@@ -66,7 +66,9 @@ class Row:
 
     @property
     def recorded(self) -> str:
-        """Its headline on record."""
+        """Its headline on record; of a stack it follows from its sections, and is empty where these could not be judged again."""
+        if self.entry["verdict"] is None and self.entry.get("sections"):
+            return ""
         return headline_of(_verdict(self.entry["verdict"]), self.entry["state"], self.entry.get("coverage")).words
 
     @property

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
     from cmmlink.record import Judgement
@@ -19,11 +19,13 @@ class RunAsked:
 
     chain_sha256 : the hash of its end, by which a worker knows that it reads the same records
     known        : the means by which it was judged again before, which are on record
+    sections     : of a stack of sections, which is asked for by its id, the runs of these; the hash is that of the last one
     """
 
     run: str
     chain_sha256: str
     known: frozenset[str] = frozenset()
+    sections: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +59,8 @@ class Failure:
 class Outcome:
     """What came of a run: a judgement, the means of one that is on record, or a failure.
 
+    is_same : nothing was changed for it, so that there is nothing to keep
+    stack   : of a stack of sections, what it is by the recorded plan and by the changed one, in the words of a row
     node : the name of the computer that judged
     """
 
@@ -65,6 +69,8 @@ class Outcome:
     known: str = ""
     failure: Failure | None = None
     node: str = ""
+    is_same: bool = False
+    stack: tuple[Mapping[str, Any], Mapping[str, Any]] | None = None
 
 
 def tasks_of(file: Path, settings: Mapping[str, str], asked: Sequence[tuple[RunAsked, int | None]], workers: int) -> list[Task]:

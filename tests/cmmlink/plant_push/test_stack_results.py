@@ -1,12 +1,15 @@
 """What a stack of sections is as a whole comes to the database beside its sections, and is held against its record."""
 
 import sqlite3
+from contextlib import nullcontext
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 
-from cmmlink.plant import ResultsDatabase
+from cmmlink.archive import Here
+from cmmlink.plant import ResultsDatabase, RunFound
 from cmmlink.plant_push import push, verify_plant
 from tests.cmmlink.command import cmmlink
 from tests.cmmlink.recorded import today
@@ -31,6 +34,18 @@ def blade(folder: Path) -> Path:
     return plan
 
 
+def check_stack_judged_again(records: Path, stack: RunFound) -> None:
+    """With a narrower limit of the stack its sections stay as they are, and it is another; of what nobody changed nothing is kept."""
+    narrower = ("--set", "stack_characteristics.turned.upper_deg=0.05", "--workers", 1, "--why", "a question", "--operator", "Ada")
+    with patch("cmmlink.commands.rejudge._workers", lambda *_: nullcontext(Here())):
+        ended = cmmlink("rejudge", records, *narrower, "--json")
+    first, second, whole = ended.json()["runs"]
+    assert (ended.code, first["changed"], second["changed"], whole["run"]) == (1, False, False, stack.run)
+    assert (whole["recorded"], whole["again"], whole["changed"]) == ("CONFORM", "NOT CONFORM", True)
+    assert whole["characteristics"] == ["turned: conform -> nonconform"]
+    assert [row["kept"] for row in (first, second, whole)] == [False, False, False]
+
+
 def test_the_characteristics_of_a_stack_are_pushed_and_verified(tmp_path: Path) -> None:
     found = cmmlink("ct", blade(tmp_path), "--no-pictures", "--records", tmp_path, "--json").json()
     (turned,) = found["characteristics"]
@@ -38,11 +53,13 @@ def test_the_characteristics_of_a_stack_are_pushed_and_verified(tmp_path: Path) 
     assert push(tmp_path, today).added == 3, "two sections, and the stack"
     with ResultsDatabase(tmp_path / "plant.sqlite") as results:
         series = results.series("blade", "turned")
-        (stack,) = results.search(part="blade", most=1)
+        (stack,) = (run for run in results.search(part="blade") if run.run == series.run[0])
     assert series.value.tolist() == [pytest.approx(turned["value"], abs=1e-9)]
     assert (series.lower.tolist(), series.upper.tolist(), series.unit) == ([-0.5], [0.5], "deg")
+    assert stack.run not in {section["run"] for section in found["slices"]}
     assert (stack.verdict, stack.chain_sha256) == (found["verdict"], found["slices"][1]["chain_sha256"])
     assert verify_plant(tmp_path, today).sound
+    check_stack_judged_again(tmp_path, stack)
     with sqlite3.connect(tmp_path / "plant.sqlite") as connection:
         connection.execute("UPDATE characteristic_value SET value = 0 WHERE run_id = (SELECT max(run_id) FROM characteristic_value)")
     connection.close()
