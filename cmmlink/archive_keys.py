@@ -10,15 +10,17 @@ from cmmlink.inspection_keys import JsonObject
 class RunRejudged(JsonObject):
     """A run of an archive, and what it is by the changed plan."""
 
-    run: str = Field(description="the id of the run")
+    run: str = Field(description="the id of the run; of a stack of sections that has characteristics, which is a row of its own, its id")
     measured_at: str | None = Field(description="when it began, in UTC")
     part: str | None = Field(description="the name of the part")
     serial_number: str | None = Field(description="its serial number")
     section: str = Field(description="of a section of a surface, which one it is; else empty")
-    recorded: str = Field(description="its headline on record, like CONFORM")
+    recorded: str = Field(description="its headline on record, like CONFORM; of a stack that which follows from its sections")
     again: str = Field(description="its headline by the changed plan; empty where it could not be judged")
     changed: bool = Field(description="whether its verdict is another one")
-    characteristics: list[str] = Field(description="the characteristics whose verdict is another one, each with both")
+    characteristics: list[str] = Field(
+        description="the characteristics whose verdict is another one, each with both; of a stack its sections count as one more"
+    )
     out_of_tolerance_recorded: int | None = Field(description="the points out of tolerance on record")
     out_of_tolerance: int | None = Field(description="the points out of tolerance by the changed plan")
     min_deviation_mm: float | None = Field(description="the smallest deviation by the changed plan")

@@ -26,7 +26,7 @@ class PlantOutbox(JsonObject):
     """The answer of `plant push` and `plant status`; with `plant push --stay` there is one a line, whenever something is new."""
 
     address: str = Field(description="where the results go, without options and without a password")
-    added: int = Field(description="the runs that were added to the database")
+    added: int = Field(description="the runs that were added to the database, and stacks of sections, each of which is one more")
     waiting: int = Field(description="the runs that wait to be pushed")
     since: str | None = Field(description="since when the oldest waits, at most since the first attempt; null where nothing does")
     late: bool = Field(description="whether it has waited for more than a day, at which the console raises an alarm")
@@ -59,7 +59,7 @@ class PlantAgreement(JsonObject):
 
     address: str = Field(description="the database")
     sound: bool = Field(description="whether it holds what the records hold")
-    runs: int = Field(description="the runs of the records that have ended")
+    runs: int = Field(description="the runs of the records that have ended, and the stacks of sections that have characteristics")
     agree: int = Field(description="how many of them are in the database as the records have them")
     missing: list[PlantRow] = Field(description="runs, and judgements that were made later, that are not in the database")
     altered: list[PlantRow] = Field(description="rows that are not as the records have them")
