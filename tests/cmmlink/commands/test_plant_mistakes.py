@@ -42,7 +42,6 @@ MISTAKES: list[tuple[tuple[str, ...], int, str]] = [
     (("study", "new", "none/s.json", "--kind", "crossed"), 2, "none/s.json: cannot be written: No such file or directory"),
     (("rejudge", "none", *CHANGE), 2, "none: there are no records here; expected a backup of records, or a folder of them"),
     (("rejudge", "text", *CHANGE), 2, "text: file is not a database: the file is damaged; expected a backup of records"),
-    (("rejudge", "empty", *CHANGE, "--out", "none/x.csv"), 2, "--out none/x.csv: there is no folder "),
 ]
 
 

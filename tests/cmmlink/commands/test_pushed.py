@@ -9,6 +9,7 @@ from cmmlink.commands import pushed
 from cmmlink.console import paper_process
 from cmmlink.plant import ResultsDatabase
 from cmmlink.plant_push import keep_address
+from cmmlink.record import RecordReference
 from tests.cmmlink.commands.oval_files import inspect_oval, one_off
 from tests.cmmlink.oval_part import write_nominal
 
@@ -38,29 +39,43 @@ def test_the_results_of_a_run_are_pushed_by_itself(nominal: Path, monkeypatch: p
         assert [found.run for found in results.search()] == [run]
 
 
-@pytest.mark.parametrize(
-    ("child", "why"),
-    [
-        ("import threading; threading.Event().wait()", "nothing was answered within 0.3 s"),
-        ("", "it failed"),
-        ('print(\'{"error": {"message": "db: refused"}}\')', "db: refused"),
-    ],
-)
-def test_what_cannot_be_pushed_waits_in_the_outbox(nominal: Path, monkeypatch: pytest.MonkeyPatch, child: str, why: str) -> None:
+def test_a_server_that_refuses_changes_neither_the_answer_nor_the_status(nominal: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    said = "cmmlink: kept in the outbox: db: refused; `cmmlink plant push` brings it there\n"
+    pushing_by(monkeypatch, 'print(\'{"error": {"message": "db: refused"}}\')')
+    assert inspected(nominal)[1] == said
+
+
+def pushing_by(monkeypatch: pytest.MonkeyPatch, child: str, longest_s: float = 60.0) -> None:
+    """Let this program push, in place of ours."""
     monkeypatch.setattr(paper_process, "this_program", lambda words: [sys.executable, "-c", child])
-    monkeypatch.setattr(pushed, "_LONGEST_S", 0.3 if "wait" in child else 60.0)
-    assert inspected(nominal)[1] == f"cmmlink: kept in the outbox: {why}; `cmmlink plant push` brings it there\n"
+    monkeypatch.setattr(pushed, "_LONGEST_S", longest_s)
 
 
-def test_settings_that_cannot_be_used_are_told(nominal: Path) -> None:
-    (nominal.parent / "records" / "plant.yaml").write_text("adress: x", encoding="utf-8")
-    assert "plant.yaml: line 1: adress is not a known key" in inspected(nominal)[1]
+def said_after(records: Path, capsys: pytest.CaptureFixture[str]) -> str:
+    with pushed.pushing_after(records) as recorded:
+        recorded.append(RecordReference("0001", "", "", "", {}))
+    return capsys.readouterr().err
 
 
-def test_a_station_that_names_no_database_pushes_nothing(nominal: Path) -> None:
-    (nominal.parent / "records" / "plant.yaml").unlink()
-    assert inspected(nominal)[1] == ""
-    assert not (nominal.parent / "records" / "plant.sqlite").exists()
+@pytest.mark.parametrize(
+    ("child", "longest_s", "why"),
+    [("import threading; threading.Event().wait()", 0.3, "nothing was answered within 0.3 s"), ("", 60.0, "it failed")],
+)
+def test_what_cannot_be_pushed_waits_in_the_outbox(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, child: str, longest_s: float, why: str
+) -> None:
+    keep_address(tmp_path, "results.sqlite")
+    pushing_by(monkeypatch, child, longest_s)
+    assert said_after(tmp_path, capsys) == f"cmmlink: kept in the outbox: {why}; `cmmlink plant push` brings it there\n"
+
+
+def test_settings_that_cannot_be_used_are_told_and_without_any_nothing_is_pushed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pushing_by(monkeypatch, "raise SystemExit('nobody is to be asked')")
+    assert said_after(tmp_path, capsys) == ""
+    (tmp_path / "plant.yaml").write_text("adress: x", encoding="utf-8")
+    assert "plant.yaml: line 1: adress is not a known key" in said_after(tmp_path, capsys)
 
 
 def test_a_run_that_is_not_taken_and_a_trend_that_changes_are_told(capsys: pytest.CaptureFixture[str]) -> None:
