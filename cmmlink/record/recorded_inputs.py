@@ -4,13 +4,15 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TypeVar
 
 from cmmlink.errors import RunError, StoreError, YamlError
 from cmmlink.plan import Plan, SurfacePlan, read_model
-from cmmlink.record.changed_plan import AnyPlan
 from cmmlink.record.reader import RecordedRun
 from cmmlink.record.shapes import plain_name
 from drivers import Decoder
+
+PlanOfRun = TypeVar("PlanOfRun", Plan, SurfacePlan)
 
 
 def recorded_plan(recorded: RecordedRun) -> Plan:
@@ -28,14 +30,14 @@ def recorded_surface_plan(recorded: RecordedRun) -> SurfacePlan:
     return _plan_of(recorded, SurfacePlan)
 
 
-def _plan_of(recorded: RecordedRun, kind: type[AnyPlan]) -> AnyPlan:
+def _plan_of(recorded: RecordedRun, kind: type[PlanOfRun]) -> PlanOfRun:
     try:
         return read_model(recorded.plan, kind)
     except YamlError as error:
         raise StoreError(f"the plan of run {recorded.run} cannot be read by this version of cmmlink: {error}") from None
 
 
-def recorded_decoder(plan: AnyPlan, recorded: RecordedRun, decoder_of: Callable[[AnyPlan], Decoder | None]) -> Decoder | None:
+def recorded_decoder(plan: PlanOfRun, recorded: RecordedRun, decoder_of: Callable[[PlanOfRun], Decoder | None]) -> Decoder | None:
     """The decoder of the device in a recorded plan, None for one without wire bytes. Raises StoreError."""
     try:
         return decoder_of(plan)
@@ -44,7 +46,7 @@ def recorded_decoder(plan: AnyPlan, recorded: RecordedRun, decoder_of: Callable[
 
 
 @contextmanager
-def with_recorded_file(plan: AnyPlan, recorded: RecordedRun) -> Iterator[AnyPlan]:
+def with_recorded_file(plan: PlanOfRun, recorded: RecordedRun) -> Iterator[PlanOfRun]:
     """The plan with the nominal's file as it was recorded, which is there while this is entered."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / f"nominal-{plain_name(recorded.header['nominal'])}"
