@@ -123,9 +123,11 @@ def _project_chunks(points: Any, tables: Any, feet: Any, claimed: Any) -> None:
             named = list_at(grid, blocks, cells, x, y, z)
             if named != FAR:
                 certain = named % NAMED == CERTAIN
-                is_foot, best, s, t = walk_to_foot(rows, beyond, width, row_width, named // NAMED, x, y, z, 1 if certain else WALK)
+                is_foot, best, s, t, px, py, pz = walk_to_foot(
+                    rows, beyond, width, row_width, named // NAMED, x, y, z, 1 if certain else WALK
+                )
                 if is_foot and certain:
-                    _store_foot(x, y, z, tables, best, s, t, feet, i)
+                    _store_foot(x, y, z, tables, best, s, t, px, py, pz, feet, i)
                     continue
                 least, s, t = closest_on_piece(rows, best * row_width, width, x, y, z, memory)
             waiting[0], memory[0] = 0, 0.0
@@ -140,7 +142,8 @@ def _project_chunks(points: Any, tables: Any, feet: Any, claimed: Any) -> None:
                 square, here_s, here_t = closest_on_piece(rows, piece * row_width, width, x, y, z, memory)
                 if square < least or (square == least and piece < best):
                     least, best, s, t = square, piece, here_s, here_t
-            _store_foot(x, y, z, tables, best, s, t, feet, i)
+            at_x, at_y, at_z = piece_at(rows, best * row_width, width, s, t)
+            _store_foot(x, y, z, tables, best, s, t, at_x[:3], at_y[:3], at_z[:3], feet, i)
         begin = claim_chunk(claimed) // CHUNK * AT_ONCE
 
 
@@ -163,19 +166,23 @@ def _normal(px: Any, py: Any, pz: Any, rows: Any, row: int, width: int, s: float
     nx, ny, nz = py[1] * pz[2] - pz[1] * py[2], pz[1] * px[2] - px[1] * pz[2], px[1] * py[2] - py[1] * px[2]
     length = np.sqrt(nx * nx + ny * ny + nz * nz)
     if length <= _DEGENERATE * rows[row + M10] * rows[row + M01]:
-        px, py, pz = piece_at(rows, row, width, s * (1.0 - _INWARD), t * (1.0 - _INWARD))
-        nx, ny, nz = py[1] * pz[2] - pz[1] * py[2], pz[1] * px[2] - px[1] * pz[2], px[1] * py[2] - py[1] * px[2]
+        qx, qy, qz = piece_at(rows, row, width, s * (1.0 - _INWARD), t * (1.0 - _INWARD))
+        nx, ny, nz = qy[1] * qz[2] - qz[1] * qy[2], qz[1] * qx[2] - qx[1] * qz[2], qx[1] * qy[2] - qy[1] * qx[2]
         length = np.sqrt(nx * nx + ny * ny + nz * nz)
     outward = rows[row + PIECE_OUTWARD] / length
     return nx * outward, ny * outward, nz * outward
 
 
 @uncounted_kernel
-def _store_foot(x: float, y: float, z: float, tables: Any, piece: int, s: float, t: float, feet: Any, i: int) -> None:
-    """Fill in the results for the foot at (s, t) of a piece, or for the edge or corner that holds it back."""
+def _store_foot(
+    x: float, y: float, z: float, tables: Any, piece: int, s: float, t: float, px: Any, py: Any, pz: Any, feet: Any, i: int
+) -> None:
+    """Fill in the results for the foot at (s, t) of a piece, or for the edge or corner that holds it back.
+
+    px, py, pz : x, y and z there, and their derivatives by s and t
+    """
     rows, width = tables.rows, tables.width
     row = piece * tables.row_width
-    px, py, pz = piece_at(rows, row, width, s, t)
     dx, dy, dz = x - px[0], y - py[0], z - pz[0]
     distance = np.sqrt(dx * dx + dy * dy + dz * dz)
     nx, ny, nz = _normal(px, py, pz, rows, row, width, s, t)

@@ -193,7 +193,7 @@ def _foot_of_centre(tables: Any, kept: Any, given: int, count: int, x: float, y:
         square = _square_from_middle(rows, kept[given + q] * row_width, width, x, y, z)
         if square < least:
             least, nearest = square, kept[given + q]
-    _, piece, s, t = walk_to_foot(rows, tables.beyond, width, row_width, nearest, x, y, z, _WALK)
+    _, piece, s, t, _, _, _ = walk_to_foot(rows, tables.beyond, width, row_width, nearest, x, y, z, _WALK)
     square = square_at(rows, piece * row_width, width, x, y, z, s, t)[0]
     return (piece, np.sqrt(square)) if square < least else (nearest, np.sqrt(least))
 

@@ -67,12 +67,30 @@ def piece_at(rows: Any, row: int, width: int, s: float, t: float) -> tuple[tuple
     return x, y, z
 
 
+@inlined_uncounted_kernel
+def piece_in_middle(rows: Any, row: int, width: int) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
+    """What `piece_at` gives at (0, 0), where the coefficients are the derivatives."""
+    first, size = row + COEFFICIENTS, width * width
+    return _of_middle(rows, first, width), _of_middle(rows, first + size, width), _of_middle(rows, first + 2 * size, width)
+
+
+@inlined_uncounted_kernel
+def _of_middle(rows: Any, first: int, width: int) -> tuple[float, ...]:
+    return rows[first], rows[first + width], rows[first + 1], 2.0 * rows[first + 2 * width], rows[first + width + 1], 2.0 * rows[first + 2]
+
+
 @uncounted_kernel
 def square_at(
     rows: Any, row: int, width: int, x: float, y: float, z: float, s: float, t: float
 ) -> tuple[float, float, float, float, float, float]:
     """Square of the distance, half its gradient (2), and half its Hessian (ss, st, tt)."""
     px, py, pz = piece_at(rows, row, width, s, t)
+    return square_of(px, py, pz, x, y, z)
+
+
+@inlined_uncounted_kernel
+def square_of(px: Any, py: Any, pz: Any, x: float, y: float, z: float) -> tuple[float, float, float, float, float, float]:
+    """The same from what `piece_at` gives."""
     rx, ry, rz = px[0] - x, py[0] - y, pz[0] - z
     g = rx * px[1] + ry * py[1] + rz * pz[1]
     h = rx * px[2] + ry * py[2] + rz * pz[2]
