@@ -153,12 +153,13 @@ def _registration(registration: "SurfaceRegistration | None", pose: "RigidMotion
         "rotation_deg": float(np.degrees(pose.angle_rad)),
     }
     if registration is None:
-        fitted: dict[str, Any] = {"steps": 0, "converged": True, "rms_mm": None, "rivals": 0}
+        fitted: dict[str, Any] = {"steps": 0, "converged": True, "settles_within_mm": 0.0, "rms_mm": None, "rivals": 0}
         return found | fitted | {"weakest_direction": None, "weakest_95_mm": None, "undetermined": 0}
     weakest = registration.weakest
     return found | {
         "steps": registration.steps,
         "converged": registration.converged,
+        "settles_within_mm": number(registration.settles_within_mm),
         "rms_mm": number(registration.rms_mm),
         "rivals": registration.rivals,
         "weakest_direction": weakest.words or None,

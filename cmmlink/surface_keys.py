@@ -41,6 +41,9 @@ class SurfacePlaced(JsonObject):
     rotation_deg: float = Field(description="the angle of the rotation")
     steps: int = Field(description="the steps that the fit took; 0 where nothing was fitted")
     converged: bool = Field(description="whether the fit settled")
+    settles_within_mm: float | None = Field(
+        description="how wide the circle is in which the fit goes round; it counts as uncertainty. 0: it came to rest; null: it went on"
+    )
     rms_mm: float | None = Field(description="the root mean square of the deviations that the fit made least, by area")
     rivals: int = Field(description="how many other poses fit as well, as of a symmetric part")
     weakest_direction: str | None = Field(description="the motion of the part that the points determine least; null where none is weak")

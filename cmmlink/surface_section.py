@@ -22,7 +22,7 @@ from cmmlink.nominal_files.nurbs_yaml import save_nurbs_yaml
 from cmmlink.plan import FileDevice, Plan, Section, SurfacePlan
 from cmmlink.scratch import scratch_in
 from drivers import PointArraySource, points_in
-from inspection import NurbsCurve, SectionPlane
+from inspection import NotMeasured, NurbsCurve, SectionPlane
 
 if TYPE_CHECKING:
     from inspection.surface import SectionCourse, SurfaceResult
@@ -61,6 +61,7 @@ def section_of_scan(plan: SurfacePlan, section: Section, within_mm: float | None
     read = scan_of(device, scratch_in(plan.records.folder))
     nominal, radius_mm = file.nominal, plan.probe.tip_radius_mm
     whole = judge_surface(read.points_mm, held_against(plan, file), terms)
+    within_pose_mm = _settled_within(whole)
     within = _WITHIN * nominal.size_mm if within_mm is None else within_mm
     placed = whole.nominal_from_scan.apply(read.points_mm[np.isfinite(read.points_mm).all(axis=1)])
     if radius_mm:  # where the ball touched: in the plane alone its radius would be another
@@ -73,7 +74,7 @@ def section_of_scan(plan: SurfacePlan, section: Section, within_mm: float | None
         )
     fine = max(_FINE * (plan.tolerance.upper_mm - plan.tolerance.lower_mm), _FINEST_MM)
     course = course_of_section(nominal, plane.origin_mm, plane.normal, fine)
-    error_mm = shift_mm + course.error_mm + nominal.nominal_error_mm
+    error_mm = shift_mm + course.error_mm + nominal.nominal_error_mm + within_pose_mm
     notes = (
         *notes_on_surface(plan, file),
         *(f"{device.file.name}: {note}" for note in read.notes),
@@ -122,6 +123,19 @@ def _plan_of(plan: SurfacePlan, section: Section, curve: Path, error_mm: float) 
             "records": plan.records.model_dump(),
         }
     )
+
+
+def _settled_within(whole: "SurfaceResult") -> float:
+    """How far, in mm, the fit of the whole scan leaves open where a point lies. Raises NotMeasured where it did not settle."""
+    fit = whole.registration
+    if fit is None:
+        return 0.0
+    if not fit.converged:
+        raise NotMeasured(
+            "the fit of the whole scan did not settle, so that it is not known where to cut it: bring the STEP or IGES file of the part or "
+            "a finer mesh, or give a datum"
+        )
+    return fit.settles_within_mm
 
 
 def _words_of_pose(whole: "SurfaceResult") -> str:

@@ -353,6 +353,7 @@ def _pose_in_space(registration: "SurfaceRegistration | None") -> dict[str, Any]
         "rms_mm": number(registration.rms_mm),
         "steps": registration.steps,
         "converged": registration.converged,
+        "settles_within_mm": number(registration.settles_within_mm),
     }
 
 

@@ -116,9 +116,10 @@ class _Scan:
     complete: bool
     missing: Missing
 
-    def at(self, pose: RigidMotion) -> JudgedPoints:
-        """All points judged at a pose."""
-        return judge_points(self.points, self.normals, self.nominal, pose, self.terms.zone, self.terms.farthest_on(self.nominal))
+    def at(self, pose: RigidMotion, settles_within_mm: float) -> JudgedPoints:
+        """All points judged at a pose that is known but for so much."""
+        farthest = self.terms.farthest_on(self.nominal)
+        return judge_points(self.points, self.normals, self.nominal, pose, self.terms.zone, farthest, settles_within_mm)
 
     def settle(self) -> SurfaceResult:
         """The result, its rows in the order of the points here."""
@@ -126,7 +127,7 @@ class _Scan:
         if pose is None:
             registration = self._fit()
             pose = registration.nominal_from_scan
-        found = self.at(pose)
+        found = self.at(pose, _counted(registration))
         if registration is not None and registration.outlier.any():
             found = _without_outliers(found, registration.outlier)
         self._refuse_far(found)
@@ -137,7 +138,8 @@ class _Scan:
         terms = self.terms
         gross = terms.width_mm / 2 if terms.reject_outliers else None
         farthest = terms.farthest_on(self.nominal)
-        found = register_surface(self.points, self.nominal, terms.start, terms.locked, terms.zone.middle_mm, gross, farthest)
+        aim = terms.zone.middle_mm, gross, farthest, terms.circle_mm
+        found = register_surface(self.points, self.nominal, terms.start, terms.locked, *aim)
         return replace(found, nominal_from_scan=found.nominal_from_scan.snap_to_grid())
 
     def _refuse_far(self, found: JudgedPoints) -> None:
@@ -162,7 +164,8 @@ class _Scan:
 
     def _conclude(self, found: JudgedPoints, pose: RigidMotion, registration: SurfaceRegistration | None) -> SurfaceResult:
         """What the judged points say about the surface, and the verdict on the part."""
-        nominal, terms, zone, feet = self.nominal, self.terms, self.terms.zone_on(self.nominal), found.feet
+        nominal, terms, feet, within = self.nominal, self.terms, found.feet, _counted(registration)
+        zone = terms.zone_on(nominal, within)
         limits = terms.limits_on(nominal)
         judged = np.flatnonzero(found.verdicts != NOT_JUDGED)
         places = spread_places(nominal, limits.gap_max_mm)
@@ -185,7 +188,7 @@ class _Scan:
             beyond_edge_count=int(np.count_nonzero(beyond > limits.end_allowance_mm)),
             covered=covered,
             registration=registration,
-            nominal_error_mm=_error_that_counts(found, terms.zone),
+            nominal_error_mm=_error_that_counts(found, terms.zone, within),
             sides_known=nominal.sides_known,
         )
         conclusion = conclude_surface(findings, terms.zone, self.missing, limits, self.complete)
@@ -194,7 +197,7 @@ class _Scan:
         return SurfaceResult(
             verdict=conclusion.verdict,
             reasons=conclusion.reasons,
-            notes=self._notes(),
+            notes=self._notes(within),
             points_mm=self.points,
             feet=feet,
             verdicts=found.verdicts,
@@ -230,8 +233,9 @@ class _Scan:
         By the rule "best-fit" a part is out when it is out at every best fit that the points allow, and by more than the pose is still
         free to move.
         """
+        within = _counted(registration)
         for rival in registration.rival_poses:
-            if not self.at(rival.snap_to_grid()).count_of(Verdict.NONCONFORM):
+            if not self.at(rival.snap_to_grid(), within).count_of(Verdict.NONCONFORM):
                 words = "The part fits the nominal in another pose as well, and there no point is out: only a datum can tell."
                 return Verdict.UNCERTAIN, Reason("placement", words)
         if not registration.converged or registration.weakest.slides:
@@ -244,18 +248,21 @@ class _Scan:
         out = np.flatnonzero(found.verdicts == Verdict.NONCONFORM)
         few = replace(self, points=self.points[out], normals=None if self.normals is None else self.normals[out])
         for slid in registration.slid_poses():
-            if not few.at(slid).count_of(Verdict.NONCONFORM):
+            if not few.at(slid, within).count_of(Verdict.NONCONFORM):
                 words = f"The part may lie so far off {registration.weakest.words} that no point is out: only a datum can tell."
                 return Verdict.UNCERTAIN, Reason("placement", words)
         return Verdict.NONCONFORM, why
 
-    def _notes(self) -> tuple[str, ...]:
+    def _notes(self, within_mm: float) -> tuple[str, ...]:
         """What was assumed."""
         notes, error = list(self.nominal.notes), self.nominal.nominal_error_mm
         if error:
             notes.append(f"the nominal may lie {error:.4g} mm off the part that it stands for: that was added to U")
             if self.terms.zone.rule == "simple":
                 notes.append("by simple acceptance U does not count, but the error of the nominal does")
+        if within_mm:
+            told = np.format_float_positional(within_mm, precision=2, fractional=False)
+            notes.append(f"the fit settles within {told} mm, which counts as uncertainty: that was added to U")
         return tuple(notes)
 
 
@@ -266,9 +273,14 @@ def _without_outliers(found: JudgedPoints, outlier: NDArray[np.bool_]) -> Judged
     return JudgedPoints(found.feet, np.where(which, np.int8(NOT_JUDGED), found.verdicts), rejection)
 
 
-def _error_that_counts(found: JudgedPoints, zone: ToleranceZone) -> float:
+def _counted(registration: SurfaceRegistration | None) -> float:
+    """What a fit that goes round in circles settles within, in mm: it counts like U. One that did not settle proves nothing anyway."""
+    return registration.settles_within_mm if registration is not None and registration.converged else 0.0
+
+
+def _error_that_counts(found: JudgedPoints, zone: ToleranceZone, within_mm: float) -> float:
     """The largest error of the nominal at a point that is uncertain because of it alone; 0 where there is none."""
-    because = (found.verdicts == Verdict.UNCERTAIN) & (zone.verdicts(found.feet.distance_mm) == Verdict.CONFORM)
+    because = (found.verdicts == Verdict.UNCERTAIN) & (zone.verdicts(found.feet.distance_mm, within_mm) == Verdict.CONFORM)
     return float(found.feet.error_mm[because].max(initial=0.0))
 
 

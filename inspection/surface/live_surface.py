@@ -187,7 +187,8 @@ class LiveSurface:
         start = terms.start if self._registration is None else self._registration.nominal_from_scan
         gross = terms.width_mm / 2 if terms.reject_outliers else None
         try:
-            found = register_surface(few, self._nominal, start, terms.locked, terms.zone.middle_mm, gross, self._farthest_mm)
+            aim = terms.zone.middle_mm, gross, self._farthest_mm, terms.circle_mm
+            found = register_surface(few, self._nominal, start, terms.locked, *aim)
         except RegistrationError:
             found = None
         if found is not None and (self._registration is not None or start is not None or self._is_clear(found)):
@@ -208,7 +209,7 @@ class LiveSurface:
             return np.inf
         poses = self._registration.nominal_from_scan, found.nominal_from_scan
         before, after = (self._nominal.project(pose.apply(points)).distance_mm for pose in poses)
-        return float(np.abs(after - before)[found.used].max(initial=0.0))
+        return float(np.abs(after - before)[found.used].max(initial=0.0)) + found.settles_within_mm
 
     def _is_clear(self, found: SurfaceRegistration) -> bool:
         """Whether one pose fits the points so far clearly better than any other, and they fix it."""

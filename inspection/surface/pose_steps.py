@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inspection.errors import RegistrationError
+from inspection.surface.circling import PoseOnTheWay, best_of, find_circle, width_mm
 from inspection.surface.feet import FootKind, NominalSurface
 from inspection.surface.rigid_motion import RigidMotion
 
@@ -74,12 +75,18 @@ class Linearised:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SettledPose:
-    """Where the steps ended, how many they were, and how the squares bend there besides: a guess (6, 6) for a weight of 1 in all."""
+    """Where the steps ended, and what a fit that goes on from there may know.
+
+    steps     : how many they were
+    within_mm : how far apart the poses bring a point at most where the steps go round in circles; 0 where the pose was found to round-off,
+                infinite where they went on
+    bend      : how the squares bend there besides: a guess (6, 6) for a weight of 1 in all
+    """
 
     motion: RigidMotion
     state: Linearised
     steps: int
-    converged: bool
+    within_mm: float
     bend: Array
 
 
@@ -114,12 +121,15 @@ def linearise(problem: FitProblem, motion: RigidMotion, left_out: Truth) -> Line
 def settle_pose(problem: FitProblem, start: RigidMotion, left_out: Truth, bend: Array | None = None) -> SettledPose:
     """Steps until the pose of least squares is found. One after which the deviations grow is taken back, and the next is damped.
 
+    Where the steps go round in circles, it is the best pose of the circle.
+
     left_out : (m,) points that take no part
     bend     : as an earlier `SettledPose` knows it
     """
     motion, damping, steps, last, shrinks = start, 0.0, 0, np.inf, 1.0
     state = linearise(problem, motion, left_out)
     bends = _STRAIGHT if bend is None else bend * state.weights.sum()
+    way: list[PoseOnTheWay] = []
     while steps < _STEPS:
         change = step_of(state, problem.free, damping, bends)
         following = RigidMotion.about(state.centre, change[3:], change[:3]).after(motion)
@@ -134,8 +144,12 @@ def settle_pose(problem: FitProblem, start: RigidMotion, left_out: Truth, bend: 
         motion, state, shrinks, last = following, there, rim / last if last < np.inf else 1.0, rim
         damping = damping / 10 if damping > 1e-6 else 0.0
         if converged:
-            return SettledPose(motion, state, steps, True, bends / state.weights.sum())
-    return SettledPose(motion, state, steps, False, bends / state.weights.sum())
+            return SettledPose(motion, state, steps, 0.0, bends / state.weights.sum())
+        way.append(PoseOnTheWay(motion, state.mean_square))
+        if circle := find_circle(way, state.centre, state.radius):
+            motion, within = best_of(circle), width_mm(circle, problem.points[~left_out])
+            return SettledPose(motion, linearise(problem, motion, left_out), steps, within, bends / state.weights.sum())
+    return SettledPose(motion, state, steps, np.inf, bends / state.weights.sum())
 
 
 def _is_settled(rim: float, last: float, shrinks: float) -> bool:

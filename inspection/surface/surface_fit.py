@@ -37,7 +37,9 @@ class SurfaceRegistration:
     nominal_from_scan : the motion that brings points of the scan onto the nominal
     rms_mm            : root of the mean square of the deviations from the target, weighted by area, of the points that took part
     steps             : of Gauss and Newton's method, those of a choice of the points included
-    converged         : whether those to come are below round-off
+    converged         : whether those to come are below round-off, or go round in a circle that is no wider than was allowed
+    settles_within_mm : how far apart two poses of that circle bring a point at most; 0 where the pose was found to round-off, infinite
+                        where the steps went on
     used              : (m,) points that took part: those with a foot inside the surface that are no outliers
     outlier           : (m,) points left out as outliers, by six median deviations; none unless that was asked for
     weakest           : the direction that the points determine least; directions that they do not determine at all were held
@@ -50,6 +52,7 @@ class SurfaceRegistration:
     rms_mm: float
     steps: int
     converged: bool
+    settles_within_mm: float
     used: Truth
     outlier: Truth
     weakest: Weakness
@@ -74,6 +77,7 @@ def register_surface(
     target_mm: float = 0.0,
     gross_mm: float | None = None,
     farthest_mm: float = np.inf,
+    circle_mm: float = 0.0,
 ) -> SurfaceRegistration:
     """Bring points (m, 3) onto a nominal.
 
@@ -83,6 +87,7 @@ def register_surface(
     target_mm : the deviation that points are brought to, the middle of the zone
     gross_mm  : leave out what deviates more than six times the median and more than this; None leaves nothing out
     farthest_mm : leave out in any case what lies farther off the surface
+    circle_mm : how wide a circle may be in which the steps go round for the fit to count as settled
 
     Raises RegistrationError where the pose is not found, or too few points lie on the surface.
     """
@@ -105,6 +110,7 @@ def register_surface(
     free = np.array([name not in locked for name in _FREEDOMS])
     problem = FitProblem(given, weights, nominal, free, target_mm)
     found = _fit(problem, start, gross_mm, farthest_mm)
+    settled = found.settles_within_mm <= circle_mm
     rivals: list[RigidMotion] = []
     for other in others:
         rival = _fit(problem, other, gross_mm, farthest_mm).nominal_from_scan
@@ -113,7 +119,7 @@ def register_surface(
     used, outlier = (np.zeros(len(points), dtype=bool) for _ in range(2))
     same = np.cumsum(is_new) - 1
     used[order], outlier[order] = found.used[same], found.outlier[same]
-    return replace(found, used=used, outlier=outlier, rivals=len(rivals), rival_poses=tuple(rivals))
+    return replace(found, converged=settled, used=used, outlier=outlier, rivals=len(rivals), rival_poses=tuple(rivals))
 
 
 def _weights(points: Array, cell_mm: float) -> Array:
@@ -166,4 +172,5 @@ def _registration(problem: FitProblem, found: SettledPose, outlier: Truth) -> Su
     places, normals = problem.nominal.sample(_PLACES)
     whole = np.column_stack([normals, np.cross(places - state.centre, normals)])
     weakest = weakness_of(state.rows, state.weights, state.arms, problem.free, rms, whole)
-    return SurfaceRegistration(found.motion, rms, found.steps, found.converged, state.used, outlier, weakest, state.centre)
+    within = found.within_mm
+    return SurfaceRegistration(found.motion, rms, found.steps, not within, within, state.used, outlier, weakest, state.centre)

@@ -75,7 +75,7 @@ class SurfaceResult:
     area_mm2     : of the whole nominal
     unmeasured   : parts of the surface that were not measured, the largest first
     gap_mm       : the diameter of the widest place without points; gap_max_mm : up to which it counted as measured
-    zone         : with the error of the nominal in its U
+    zone         : with the error of the nominal, and what the fit settles within, in its U
     nominal_error_mm : bound of how far the nominal may lie off what it stands for
     registration : how the pose was fitted; None where it was known
     nominal_from_scan : the pose at which every point was judged

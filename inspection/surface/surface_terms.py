@@ -14,6 +14,7 @@ from inspection.tolerance import ToleranceZone
 SurfaceFitName = Literal["best-fit", "none"]
 
 _GAP = 0.04  # of the size: the widest place without points that counts as measured where nobody says otherwise: two cells of 2 %
+_CIRCLE = 0.01  # of the zone's width: how wide a circle may be in which a fit goes round; wider than that it has not settled
 _OFF_SURFACE = 0.02  # of the size: a point farther off is dust, a fixture, or what is not nominal
 
 
@@ -76,9 +77,17 @@ class SurfaceTerms:
         """The width of the zone."""
         return self.zone.upper_mm - self.zone.lower_mm
 
-    def zone_on(self, nominal: NominalSurface) -> ToleranceZone:
-        """The zone with the error of the nominal in its U, as results state it: that counts even where by its rule U itself does not."""
-        error = nominal.nominal_error_mm
+    @property
+    def circle_mm(self) -> float:
+        """How wide a circle may be in which a fit goes round for it to count as settled. What it is wide is added to U."""
+        return _CIRCLE * self.width_mm
+
+    def zone_on(self, nominal: NominalSurface, settles_within_mm: float = 0.0) -> ToleranceZone:
+        """The zone with the error of the nominal, and what the fit settles within, in its U, as results state it.
+
+        Both count even where by its rule U itself does not.
+        """
+        error = nominal.nominal_error_mm + settles_within_mm
         if not error:
             return self.zone
         if self.zone.rule == "simple":

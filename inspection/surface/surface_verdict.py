@@ -106,7 +106,7 @@ def _pose(registration: SurfaceRegistration | None, zone: ToleranceZone) -> list
         return []
     reasons, weakest = [], registration.weakest
     if not registration.converged:
-        reasons.append(Reason("fit", "The fit did not settle: the pose is not the best one."))
+        reasons.append(Reason("fit", _unsettled(registration.settles_within_mm)))
     mend = "Give a datum, scan another side as well, or start at a known pose with that freedom locked"
     if weakest.slides:
         reasons.append(Reason("pose", f"The points do not determine where the part lies {weakest.words}: it slides there. {mend}."))
@@ -114,3 +114,11 @@ def _pose(registration: SurfaceRegistration | None, zone: ToleranceZone) -> list
         told = f"The part may lie {weakest.shift_95_mm:.3g} mm off (95 %) {weakest.words}, more than a quarter of the zone."
         reasons.append(Reason("pose", f"{told} {mend}."))
     return reasons
+
+
+def _unsettled(within_mm: float) -> str:
+    """Why a pose is not the best one: the fit goes round in a circle so wide, or on."""
+    if within_mm == float("inf"):
+        return "The fit did not settle: the pose is not the best one."
+    told = f"The fit did not settle: it goes round in circles {within_mm:.2g} mm wide, more than a hundredth of the zone."
+    return f"{told} Bring the STEP or IGES file of the part, or a finer mesh."
