@@ -18,6 +18,7 @@ from drivers import (
     RegisterDecoder,
     RegisterSurvey,
     ScanSource,
+    axes_in,
     decoder,
     unseen_in,
 )
@@ -94,12 +95,17 @@ def words_of(device: Device) -> str:
 
 def source_of(plan: Plan | SurfacePlan, scratch: Scratch | None = None) -> ScanSource:
     """The source of a plan's device; a file of points is read here. Raises PlanError, PointFileError, or StoreError for want of room."""
-    device = plan.device
+    device, in_space = plan.device, isinstance(plan, SurfacePlan)
     if isinstance(device, FileDevice):
         room = scratch or scratch_in(plan.records.folder)
-        if isinstance(plan, SurfacePlan):
+        if in_space:
             return PointArraySource(words_of(device), scan_of(device, room))
         return PointFileSource(device.file, device.scale, unit=device.unit, columns=device.columns, invalid=device.invalid, room=room)
+    if in_space and len(axes := _axes_of(device)) < 3:
+        raise PlanError(
+            f"device: it tells {' and '.join(axes)} alone, and points on a whole surface need x, y and z; expected a device or a format "
+            "that tells all three, or an axis for a sensor of distances"
+        )
     try:
         if isinstance(device, LinesDevice):
             return _machine_tool(plan, device)
@@ -113,6 +119,15 @@ def scan_of(device: FileDevice, room: Scratch) -> PointFile:
     from drivers.scan_file import read_scan  # noqa: PLC0415 - it loads what cuts surfaces
 
     return read_scan(device.file, device.scale, unit=device.unit, columns=device.columns, invalid=device.invalid, room=room)
+
+
+def _axes_of(device: Device) -> tuple[str, ...]:
+    """Which of x, y and z a device tells. What an axis carries is placed in space by the plan."""
+    if isinstance(device, FileDevice | DmeDevice) or getattr(device, "axis", None) is not None:
+        return ("x", "y", "z")
+    if isinstance(device, LinesDevice):
+        return axes_in(device.format.name, device.format.options)
+    return axes_in(device.format, device.options) if isinstance(device, SerialDevice) else map_of(device.map).axes
 
 
 def decoder_of(plan: Plan | SurfacePlan) -> Decoder | None:

@@ -8,7 +8,7 @@ files of points. What opens a link stays in `drivers.links`, what cuts surfaces 
 TYPE_CHECKING = False  # as type checkers read it; `typing` itself takes longer to load than all of this
 
 if TYPE_CHECKING:
-    from drivers.codecs import decoder, decoders, unseen_in
+    from drivers.codecs import axes_in, decoder, decoders, unseen_in
     from drivers.codecs.dme_commands import (
         curve_density,
         move_to,
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     )
 else:
     _PLACES = {
-        "drivers.codecs": ("decoder", "decoders", "unseen_in"),
+        "drivers.codecs": ("axes_in", "decoder", "decoders", "unseen_in"),
         "drivers.codecs.dme_commands": (
             "curve_density",
             "move_to",
@@ -159,6 +159,7 @@ __all__ = [
     "UnitName",
     "WireBytes",
     "WordOrder",
+    "axes_in",
     "convert_to_mm",
     "count_of",
     "curve_density",

@@ -44,7 +44,7 @@ def read_scan(
     Raises PointFileError, which says what to do.
     """
     if path.suffix.lower() not in MESHES:
-        table = read_points(path, scale, unit=unit, columns=columns, invalid=invalid, room=room, normals=True)
+        table = read_points(path, scale, unit=unit, columns=columns, invalid=invalid, room=room, normals=True, in_space=True)
         return replace(table, notes=(*table.notes, _NONE if table.normals is None else _FROM_FILE))
     if columns or invalid:
         what = "columns" if columns else "values that mean no point"

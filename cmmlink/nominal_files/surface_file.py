@@ -90,7 +90,7 @@ def load_surface(
 
 def _of_points(path: Path, scale: float) -> SurfaceFile:
     try:
-        found = read_points(path, scale, normals=True)
+        found = read_points(path, scale, normals=True, in_space=True)
         return _of_cloud(path, found.points_mm, found.normals, "points", found.notes)
     except PointFileError as error:
         raise NominalError(str(error)) from None

@@ -1,6 +1,7 @@
 """Which wire formats there are: every `*_frames.py` of this package that says `DECODERS`. A new one needs no entry here.
 
-A format that cannot show every loss or every damage says so in `UNSEEN`, by its name.
+A format that cannot show every loss or every damage says so in `UNSEEN`, by its name, and one that measures not all of x, y and z which of
+them it does, in `AXES`.
 """
 
 import importlib
@@ -12,6 +13,8 @@ from types import ModuleType
 from typing import get_args
 
 from drivers.source import Decoder
+
+_AXES = ("x", "y", "z")
 
 
 def decoders() -> Mapping[str, Callable[..., Decoder]]:
@@ -25,6 +28,16 @@ def decoders() -> Mapping[str, Callable[..., Decoder]]:
 def unseen_in(name: str) -> tuple[str, ...]:
     """Return what the format of this name cannot show, in sentences that belong beside a verdict; none where all shows."""
     return tuple(getattr(module, "UNSEEN", {})[name] for module in _modules() if name in getattr(module, "UNSEEN", {}))
+
+
+def axes_in(name: str, options: Mapping[str, object]) -> tuple[str, ...]:
+    """Return which of x, y and z the format of this name tells, by its options; what it does not tell is taken as 0."""
+    if "pattern" in options:
+        from drivers.codecs.pattern_frames import point_pattern  # noqa: PLC0415 - for those who have one
+
+        groups = point_pattern(str(options["pattern"])).groupindex
+        return tuple(axis for axis in _AXES if axis in groups)
+    return next((getattr(module, "AXES", {}).get(name, _AXES) for module in _modules() if name in module.DECODERS), _AXES)
 
 
 def _modules() -> Iterator[ModuleType]:

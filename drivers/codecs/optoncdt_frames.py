@@ -297,4 +297,5 @@ class OptoncdtDecoder:
 
 
 UNSEEN = {"optoncdt": "values carry no checksum: a flipped bit shows only as a jump (largest_step_mm)"}
+AXES = {"optoncdt": ("z",)}  # a distance
 DECODERS = {"optoncdt": OptoncdtDecoder}

@@ -217,10 +217,16 @@ class RegisterMap(_Part):
         """Whether the points carry a counter, without which a loss does not show."""
         return "sequence" in self.points.fields or (self.pop is not None and "sequence" in self.pop.fields)
 
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Which of x, y and z the registers tell; what they do not tell is taken as 0."""
+        named = set(self.points.fields) | (set(self.pop.fields) if self.pop else set())
+        return tuple(axis for axis in ("x", "y", "z") if axis in named)
+
     @model_validator(mode="after")
     def _refuse_what_is_missing(self) -> "RegisterMap":
         named = set(self.points.fields) | (set(self.pop.fields) if self.pop else set())
-        if not named & {"x", "y", "z"}:
+        if not self.axes:
             raise ValueError("at least one of x, y and z among the fields of points")
         if self.pattern == "ring" and (self.status is None or "written" not in self.status.fields):
             raise ValueError("the field written in status, which a ring needs")

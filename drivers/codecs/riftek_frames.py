@@ -173,4 +173,5 @@ UNSEEN = {
     "riftek-ascii": "values carry neither counter nor checksum: one that is lost whole does not show, a flipped digit only as a jump "
     "(largest_step_mm)",
 }
+AXES = {"riftek": ("z",), "riftek-ascii": ("z",)}  # a distance
 DECODERS = {"riftek": RiftekDecoder, "riftek-ascii": RiftekAsciiDecoder}

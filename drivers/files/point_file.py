@@ -127,8 +127,9 @@ def read_points(
     invalid: Collection[float] = (),
     room: Room = np.empty,
     normals: bool = False,
+    in_space: bool = False,
 ) -> PointFile:
-    """Read measured points (m, 3) in mm from csv, txt, asc, xyz or npy. Two columns are x and y, at z = 0.
+    """Read measured points (m, 3) in mm from csv, txt, asc, xyz or npy. Two columns are x and y, at z = 0, unless they must lie in space.
 
     scale   : how many mm a unit of the file is
     unit    : the same in words, above whatever the file states; not beside a scale
@@ -136,10 +137,11 @@ def read_points(
     invalid : values that mean no point, as they stand in the file; a row with one of them as a coordinate has no numbers
     room    : gives the arrays that are as long as the file, like numpy.empty; those of a long one may lie on a disk
     normals : read the normals as well, where the file has any: in columns nx, ny, nz, or the last three of six without names
+    in_space : refuse a file without all of x, y and z
 
     Raises PointFileError: file, line, what was found, what is expected.
     """
-    asked = _Asked(scale, unit, columns, tuple(invalid), room, normals)
+    asked = _Asked(scale, unit, columns, tuple(invalid), room, normals, in_space)
     npy = path.suffix.lower() == ".npy"
     if path.suffix.lower() in _IN_SPACE and path.is_file():
         told = f"{path.suffix.upper()[1:]} is the format of a scan of a whole surface, and no table of points"
@@ -175,6 +177,7 @@ class _Asked:
     invalid: tuple[float, ...]
     room: Room
     normals: bool = False
+    in_space: bool = False
 
     @property
     def notes(self) -> list[str]:
@@ -247,6 +250,11 @@ def _points(
     line_numbers : (m,) where the rows stand; None for an array, whose rows are counted from 0
     """
     _refuse_fewer_than_two(values)
+    if asked.in_space and len(chosen) < 3:
+        raise PointFileError(
+            f"the points have {' and '.join(chosen)} alone, and points in space need x, y and z; expected three columns of coordinates, or "
+            "say which they are (columns x=1,y=2,z=3)"
+        )
     points = asked.room((len(values), 3), np.float64)
     rows_with, gaps, usable = dict.fromkeys(asked.invalid, 0), 0, 0
     for first in range(0, len(values), _ROWS_AT_ONCE):

@@ -7,6 +7,7 @@ import pytest
 
 from cmmlink.devices import connect, decoder_of, notes_on, source_of, words_of
 from cmmlink.errors import PlanError
+from cmmlink.plan import LinesDevice, SurfacePlan
 from cmmlink.plan.scan import Plan
 from drivers import PointFileError, PointFileSource, RegisterDecoder
 from drivers.codecs.ascii_frames import AsciiDecoder
@@ -81,3 +82,36 @@ def test_a_device_that_cannot_be_is_a_wrong_plan() -> None:
         plan_with(POSITION | {"address": "spy://x?file=y"})
     with pytest.raises(PointFileError, match=r"none\.csv: no such file"):
         source_of(plan_with({"type": "file", "file": "none.csv"}))
+
+
+@pytest.mark.parametrize(
+    ("device", "told"),
+    [
+        (SENSOR, "tells z alone"),
+        (POSITION | {"format": "riftek", "options": {"range_mm": 50, "rate_hz": 1000}}, "tells z alone"),
+        (REGISTERS, "tells x and z alone"),
+        (POSITION | {"format": "pattern", "options": {"pattern": "(?P<x>.*),(?P<y>.*)", "unit": "mm", "points": 9}}, "tells x and y alone"),
+        ({"type": "lines", "address": "COM9", "unit": "mm", "format": {"pattern": "(?P<y>.*),(?P<z>.*)", "points": 9}}, "tells y and z"),
+        ({"type": "file", "file": "p.csv"}, r"p\.csv: the points have x and y alone"),
+        ({"type": "file", "file": "p.csv", "columns": {"x": 1, "z": 2}}, r"p\.csv: the points have x and z alone"),
+    ],
+)
+def test_a_coordinate_that_a_device_does_not_tell_is_not_made_up_on_a_surface(
+    device: dict[str, Any], told: str, points: dict[str, Any]
+) -> None:
+    asked = points | {key: value for key, value in device.items() if key != "file"} if device["type"] == "file" else device
+    mapping = {"part": {"name": "p"}, "surface": {"file": "n.stl"}, "tolerance": {"lower_mm": -0.1, "upper_mm": 0.1}, "device": asked}
+    with pytest.raises((PlanError, PointFileError), match=told):
+        source_of(SurfacePlan.model_validate(mapping))
+    assert source_of(plan_with(asked)) is not None
+
+
+def test_devices_that_tell_a_place_in_space_are_taken_for_a_surface() -> None:
+    plan = SurfacePlan.model_validate(
+        {"part": {"name": "p"}, "surface": {"file": "n.stl"}, "tolerance": {"lower_mm": -0.1, "upper_mm": 0.1}, "device": POSITION}
+    )
+    ring = REGISTERS | {"map": "generic-ring"}
+    touches = LinesDevice(type="lines", address="COM9", unit="mm")
+    for device in (POSITION, ring, SENSOR | {"axis": {"feed_mm_s": 10}}):
+        assert source_of(plan.model_copy(update={"device": plan_with(device).device})) is not None
+    assert source_of(plan.model_copy(update={"device": touches})) is not None

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 from scipy.optimize import minimize
 
 from inspection import ToleranceZone, Verdict
@@ -17,10 +18,11 @@ POINTS = MOTION.inverse().apply(scan(COARSE, 600, seed=5, noise_mm=0.002)[2])
 AIM_MM, U_MM = -0.05, 0.002  # the middle of every zone here, so that all have the same fit
 
 
-def way(shifts_mm: Array, squares: Array) -> list[PoseOnTheWay]:
+def way(shifts_mm: ArrayLike, squares: ArrayLike) -> list[PoseOnTheWay]:
     """Steps that shift the points along x to these places (n,), with these mean squares (n,)."""
     return [
-        PoseOnTheWay(RigidMotion.about(AT, (0, 0, 0.1), (x, 0, 0)), float(square)) for x, square in zip(shifts_mm, squares, strict=True)
+        PoseOnTheWay(RigidMotion.about(AT, (0, 0, 0.1), (x, 0, 0)), float(square))
+        for x, square in zip(np.asarray(shifts_mm), np.asarray(squares), strict=True)
     ]
 
 
