@@ -127,6 +127,13 @@ def live_surface_of(plan: SurfacePlan, file: SurfaceFile, *, provisional: bool =
     return LiveSurface(held_against(plan, file), terms_of(plan), provisional=provisional)
 
 
+def rehearse_on(file: SurfaceFile) -> None:
+    """Compile what the points of a scan need on a nominal, before the first one comes."""
+    from inspection.surface import rehearse_surface  # noqa: PLC0415 - likewise
+
+    rehearse_surface(file.nominal)
+
+
 def held_against(plan: SurfacePlan, file: SurfaceFile) -> "NominalSurface":
     """What the points of a plan are held against: the nominal, or the surface of ball centres around it."""
     if not plan.probe.tip_radius_mm:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from cmmlink.conduct import conduct, refusal_of, results_folder, title_of
 from cmmlink.devices import Connected
 from cmmlink.events import RunStarted, Sink
-from cmmlink.from_surface_plan import document_of_surface, live_surface_of, notes_of_result, notes_on_surface, words_of_nominal
+from cmmlink.from_surface_plan import document_of_surface, live_surface_of, notes_of_result, notes_on_surface, rehearse_on, words_of_nominal
 from cmmlink.nominal_files.surface_file import SurfaceFile
 from cmmlink.pipeline import Outcome
 from cmmlink.plan import FileDevice, SurfacePlan
@@ -97,6 +97,8 @@ def carry_out_surface(
     """
     _log.info("nominal %s, %s, %s", plan.surface.file, plan.zone, plan.registration)
     followed = bool(sinks) or not isinstance(plan.device, FileDevice)
+    if followed:  # the points of a file can wait for what has to be compiled
+        rehearse_on(file)
     live = live_surface_of(plan, file, provisional=followed)
     notes = (*notes_on_surface(plan, file), *device.notes)
     on_ready()

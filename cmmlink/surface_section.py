@@ -82,7 +82,8 @@ def section_of_scan(plan: SurfacePlan, section: Section, within_mm: float | None
         _words_of_pose(whole),
         f"{len(moved)} of {len(read.points_mm)} points lie within {within:.3g} mm of the section; they were moved "
         "along the surface into it, each with its deviation",
-        f"U holds {error_mm:.2g} mm for that, for the lines that the nominal is cut into, and for the error of the nominal",
+        f"U holds {error_mm:.2g} mm for that, for what the fit leaves open, for the lines that the nominal is cut into, and for the error "
+        "of the nominal",
     )
     source = PointArraySource(device.file.name, replace(points_in(moved), notes=()))
     with tempfile.TemporaryDirectory() as folder:

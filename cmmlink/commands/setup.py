@@ -118,11 +118,13 @@ def prepare() -> int:
     from cmmlink.from_plan import profile_of
     from cmmlink.plan import load_plan
     from inspection import Outline, compiled_code_folder, find_airfoil, rehearse
+    from inspection.surface import rehearse_surfaces
 
     profile = profile_of(load_plan(demo_plan_file()))
     rehearse(profile, "veaw", reject_outliers=True)  # the method and the fit that need the most
     rehearse(profile)
     _ = Outline(find_airfoil(profile)).camber  # by what it takes, characteristics look for places on a section
+    rehearse_surfaces()
     folder = compiled_code_folder()
     if folder is None:
         return fail("no folder for compiled code can be written, so that every command compiles anew", UNUSABLE)

@@ -15,6 +15,7 @@ from cmmlink.plan import LanguageName
 _FOLDER = Path(__file__).parent
 _PLACE = re.compile(r"\\{(\w+)\\}")
 _NAMED = re.compile(r"\{\w+\}")
+_OF_FILE = re.compile(r"([^:]*\.\w+): (.+)")  # a note that begins with the name of the file that it is about
 _NO_NUMBER = "\u2013"
 
 
@@ -38,9 +39,14 @@ class Speech:
             return self._catalogue[told]
         for pattern, said in self._patterns:
             if found := pattern.fullmatch(told):
-                known = {name: self._catalogue.get(value) or self.figures(value) for name, value in found.groupdict().items()}
-                return said.format(**known)
-        return told
+                return said.format(**{name: self._part(name, value) for name, value in found.groupdict().items()})
+        of_file = _OF_FILE.fullmatch(told)
+        return told if of_file is None else f"{of_file[1]}: {self.sentence(of_file[2])}"
+
+    def _part(self, name: str, told: str) -> str:
+        """What stood in a place of a sentence. A direction is words with numbers in them; else it is one text, or a name and numbers."""
+        said = self.sentence(told) if name == "direction" else self._catalogue.get(told)
+        return self.figures(told) if said is None or said == told else said
 
     def number(self, value: float | None, form: str = ".4f") -> str:
         """A number as people of this language read it; a dash where there is none."""

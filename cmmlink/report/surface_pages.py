@@ -85,6 +85,7 @@ def weakest_words(registration: Mapping[str, Any], say: Speech) -> str:
     direction = registration["weakest_direction"]
     if direction is None:
         return say("the pose was known, nothing was fitted")
+    direction = say.sentence(direction)
     if registration["undetermined"]:
         return say("{direction}: the points leave it free", direction=direction)
     return say("{direction}: known to {shift} mm (95 %)", direction=direction, shift=say.number(registration["weakest_95_mm"], ".2g"))

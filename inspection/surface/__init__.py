@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from inspection.surface.live_surface import LiveSurface, SurfaceUpdate
     from inspection.surface.odd_faces import SingleFace, words_on_odd_faces, words_on_odd_triangles
     from inspection.surface.patches import PatchSurface
+    from inspection.surface.rehearsal import rehearse_surface, rehearse_surfaces
     from inspection.surface.rigid_motion import RigidMotion
     from inspection.surface.section_course import SectionCourse, course_of_section, into_plane
     from inspection.surface.spline_face import SplineFace
@@ -37,6 +38,7 @@ else:
         "inspection.surface.surface_fit": ("SurfaceFreedom", "SurfaceRegistration", "register_surface"),
         "inspection.surface.surface_result": ("Defect", "SurfaceResult", "Unmeasured"),
         "inspection.surface.surface_terms": ("SurfaceTerms",),
+        "inspection.surface.rehearsal": ("rehearse_surface", "rehearse_surfaces"),
         "inspection.surface.rigid_motion": ("RigidMotion",),
         "inspection.surface.section_course": ("SectionCourse", "course_of_section", "into_plane"),
         "inspection.surface.spline_face": ("SplineFace",),
@@ -77,6 +79,8 @@ __all__ = [
     "into_plane",
     "judge_surface",
     "register_surface",
+    "rehearse_surface",
+    "rehearse_surfaces",
     "rejections",
     "words_on_odd_faces",
     "words_on_odd_triangles",

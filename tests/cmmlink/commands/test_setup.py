@@ -112,7 +112,9 @@ import contextlib, io, sys
 from typing import get_args
 from cmmlink.commands.setup import prepare
 from inspection import Method, Outline, discretize, find_airfoil, rehearse
+from inspection.surface import PatchSurface, RigidMotion, TriangleSurface, register_surface
 from tests.inspection import profiles
+from tests.inspection.surface import faces, meshes
 
 def compiled():
     files = [file for name, file in sys.modules.items() if name.startswith("inspection.kernels.")]
@@ -126,6 +128,8 @@ for method in get_args(Method):
     rehearse(nominal, method, reject_outliers=True)
     rehearse(nominal, method)
 assert len(Outline(find_airfoil(nominal)).camber.points_mm)  # asked by characteristics
+for surface in (PatchSurface([faces.box()[0]]), TriangleSurface(meshes.sphere(8))):
+    register_surface(surface.sample(200)[0], surface, RigidMotion.identity())
 after = compiled()
 print(sum(after.values()), *(name for name in after if after[name] != before.get(name)))
 """

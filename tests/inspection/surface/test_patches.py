@@ -185,3 +185,19 @@ def test_what_is_no_face_is_refused(change: dict[str, object], words: str) -> No
         SplineFace(**(given | change))
     with pytest.raises(NominalError, match="no face"):
         PatchSurface([])
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("along_mm", [(0.0, 1.0, 5.0, 100.0), (0.0, 100.0)])
+def test_places_are_even_by_area_on_long_thin_pieces(along_mm: tuple[float, ...], turned: bool) -> None:
+    """Of a strip of 100 by 1 mm that may run slowly at first: in each of its parts as many as chance allows."""
+    n, ends = len(along_mm), np.array([0.0, 0.0, 1.0, 1.0])
+    knots = np.concatenate([np.zeros(n), np.ones(n)])
+    grid = np.stack([*np.meshgrid(along_mm, [0.0, 1.0], indexing="ij"), np.zeros((n, 2))], axis=2)
+    whole = SplineFace((n - 1, 1), grid, knots, ends)
+    other = SplineFace((1, n - 1), np.ascontiguousarray(grid.transpose(1, 0, 2)), ends, knots)
+    places, _ = PatchSurface([other if turned else whole]).sample(4000)
+    for axis, longest in ((0, 100.0), (1, 1.0)):
+        counts, _ = np.histogram(places[:, axis], bins=20, range=(0.0, longest))
+        assert counts.sum() == len(places) == 4000
+        assert ((counts - 200.0) ** 2 / 200.0).sum() < 36.2  # chi-squared of 19 freedoms, 99 %
