@@ -142,9 +142,10 @@ mutants: .venv/test-installed
 	$(BIN)/python -m tests.benchmarks.qualified_mutants
 
 # An archive judged again by one process, two, and a Dask cluster of eight on this computer; 2,000 runs of 50,000 points need 10 GB of disk.
+# ARCHIVE_IN=FOLDER keeps them and what was measured, and goes on from there; WAYS chooses among "here 1 2 killed dask".
 ARCHIVE ?= 2000
 rejudge: .venv/test-installed
-	$(BIN)/python -m tests.benchmarks.rejudge_benchmark $(ARCHIVE)
+	$(BIN)/python -m tests.benchmarks.rejudge_benchmark $(ARCHIVE) $(if $(ARCHIVE_IN),--folder $(ARCHIVE_IN)) $(if $(WAYS),--ways $(WAYS))
 
 # How long the view of trends waits for a PostgreSQL server with 100,000 runs of ten characteristics, which takes a minute to be filled.
 trends: .venv/test-installed
@@ -203,8 +204,8 @@ slower: .venv/test-installed
 
 # The published paper's tables and the registration's figures; MH42=FILE gives the coordinates that may not be shipped.
 paper: .venv/bench-installed
-	$(BIN)/python -m tests.benchmarks.paper_tables $(if $(MH42),--mh42 $(MH42))
-	$(BIN)/python -m tests.benchmarks.registration_benchmark $(if $(MH42),--mh42 $(MH42))
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.paper_tables $(if $(MH42),--mh42 $(MH42))
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.registration_benchmark $(if $(MH42),--mh42 $(MH42))
 
 # One clear line for the two things newcomers meet: an old Python, and Debian's Python without its venv package.
 .venv/bin/python:

@@ -1,31 +1,32 @@
 """How fast and how exact the closest point of a surface is, next to other ways to measure points against faces and meshes.
 
-    python -m tests.benchmarks.surface_benchmark [--points N] [--rounds N] [--million]
+    python -m tests.benchmarks.surface_benchmark [--points N] [--rounds N] [--million] [--signs N]
 
 One process and one thread, processor time. The ways are timed in turn, round after round, and the median counts, so that a busy machine
 slows all of them alike: compare figures of one table only. Points lie beside a twisted blade, in the order of a scan, up to 1 mm off on
 either side. The error of a way is against our splines for faces, and against our triangles for meshes; that those are right is proven by
-tests. Rivals that are not installed are left out: pip install 'cmmlink[bench]'.
+tests, and a distance that is farther cannot be the least. Signs are held against the winding number. Rivals that are not installed are
+left out, each with a line that says why: pip install 'cmmlink[bench,open3d]'.
 """
 
 import argparse
-import importlib
 import importlib.metadata
-import importlib.util
+import os
 import time
-from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inspection.surface import PatchSurface, RigidMotion, SplineFace, TriangleSurface, register_surface
 from tests.benchmarks.machine import machine
+from tests.benchmarks.surface_rivals import LeftOut, Way, ways_on_face, ways_on_mesh
+from tests.benchmarks.surface_signs import wrong_signs
 from tests.inspection.surface import faces
 from tests.inspection.surface.meshes import triangles_of_grid
 
 Array = NDArray[np.float64]
-Distances = Callable[[Array], Array]
-_FEW = 200  # points of a way that takes milliseconds for each
+_READ = 2_000  # points of a way whose answer is read one by one
+_APART_MM = 2e-5  # single precision tells a part of 150 mm to 8e-6
 
 
 def mesh_of(face: SplineFace, count: int) -> Array:
@@ -35,71 +36,42 @@ def mesh_of(face: SplineFace, count: int) -> Array:
     return triangles_of_grid(face.on_grid(u, v, 0)[0, 0])[:, ::-1]
 
 
-def on_faces(face: SplineFace, ours: PatchSurface) -> Iterator[tuple[str, Distances, int]]:
-    yield "cmmlink, splines", lambda points: ours.project(points, threads=1).distance_mm, 10**9
-    if importlib.util.find_spec("OCP") is None:
-        return
-    peer = importlib.import_module("tests.inspection.surface.occt_surfaces")
-    weights = np.ones(face.control_points_mm.shape[:2])
-    surface = peer.surface_of(
-        {
-            "degree": np.array(face.degree),
-            "knots_u": face.knots_u,
-            "knots_v": face.knots_v,
-            "control_points": face.control_points_mm,
-            "weights": weights,
-        }
-    )
-    inside = peer.GeomAPI_ProjectPointOnSurf()
-    inside.Init(surface, *surface.Bounds(), peer.Extrema_ExtAlgo.Extrema_ExtAlgo_Tree)
-
-    def by_tree(points: Array) -> Array:
-        result = np.empty(len(points))
-        for i, point in enumerate(points):
-            inside.Perform(peer.gp_Pnt(*point.tolist()))
-            result[i] = inside.LowerDistance() if inside.NbPoints() else np.nan
-        return result
-
-    yield "Open CASCADE, one object kept, tree", by_tree, _FEW
+def ours(kind: str, surface: PatchSurface | TriangleSurface) -> Way:
+    return Way(f"cmmlink, {kind}", lambda points: surface.project(points, threads=1).distance_mm)
 
 
-def on_meshes(triangles: Array, ours: TriangleSurface) -> Iterator[tuple[str, Distances, int]]:
-    yield "cmmlink, triangles", lambda points: ours.project(points, threads=1).distance_mm, 10**9
-    if importlib.util.find_spec("open3d") is not None:
-        o3d = importlib.import_module("open3d")
-        scene = o3d.t.geometry.RaycastingScene(nthreads=1)
-        scene.add_triangles(triangles.reshape(-1, 3).astype(np.float32), np.arange(3 * len(triangles), dtype=np.uint32).reshape(-1, 3))
-        yield "Open3D, float32, no sign", lambda points: scene.compute_distance(points.astype(np.float32), nthreads=1).numpy(), 10**9
-    if importlib.util.find_spec("igl") is not None:
-        igl = importlib.import_module("igl")
-        corners, numbers = triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3)
-        yield "libigl, no sign", lambda points: np.sqrt(igl.point_mesh_squared_distance(points, corners, numbers)[0]), 10**9
-    if importlib.util.find_spec("engeom") is not None:
-        made = importlib.import_module("engeom.geom3").Mesh3(
-            triangles.reshape(-1, 3), np.arange(3 * len(triangles), dtype=np.uint32).reshape(-1, 3), merge_duplicates=True
-        )
-        yield "engeom", lambda points: made.measure_deviations(points, "point"), 10**9
-    if importlib.util.find_spec("trimesh") is not None and importlib.util.find_spec("rtree") is not None:
-        trimesh = importlib.import_module("trimesh")
-        mesh = trimesh.Trimesh(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3))
-        yield "trimesh, no sign", lambda points: trimesh.proximity.closest_point(mesh, points)[1], 5_000
+def given(way: Way, points: Array, most: int) -> Array:
+    """So many points as a way is given, spread over all of them in their order."""
+    return points[:: max(1, -(-len(points) // min(way.most, most)))]
 
 
-def table(title: str, ways: list[tuple[str, Distances, int]], points: Array, rounds: int) -> None:
-    """Print the median of each way, and how far its distances lie from those of the first."""
-    spent: dict[str, list[float]] = {name: [] for name, _, _ in ways}
-    found = {name: way(points[:most]) for name, way, most in ways}  # compiles and fills the caches
+def table(title: str, ways: list[Way], left: list[LeftOut], points: Array, rounds: int) -> None:
+    """Print the median of each way, and how far its distances lie from those of the first; then what was left out."""
+    spent: dict[str, list[float]] = {way.name: [] for way in ways}
+    apart = {way.name: _apart(way, ways[0], given(way, points, _READ if way.is_one_by_one else len(points))) for way in ways}
     for _ in range(rounds):
-        for name, way, most in ways:
+        for way in ways:
+            few = given(way, points, len(points))
             begin = time.process_time()
-            way(points[:most])
-            spent[name].append((time.process_time() - begin) / len(points[:most]))
-    print(f"\n### {title}\n\n| | ns a point | times ours | largest difference of distances, mm |\n|---|---|---|---|")
-    first = ways[0][0]
-    own = float(np.median(spent[first]))
-    for name, each in spent.items():
-        apart = np.nanmax(np.abs(np.abs(found[name]) - np.abs(found[first][: len(found[name])])))
-        print(f"| {name} | {np.median(each) * 1e9:,.0f} | {np.median(each) / own:.1f} | {apart:.2g} |")
+            way.ask(few)
+            spent[way.name].append((time.process_time() - begin) / len(few))
+    print(f"\n### {title}\n\n| | ns a point | times ours | largest difference of distances, mm | farther, nearer | sign |")
+    print("|---|---|---|---|---|---|")
+    own = float(np.median(spent[ways[0].name]))
+    for way in ways:
+        each = float(np.median(spent[way.name]))
+        print(f"| {way.name} | {each * 1e9:,.0f} | {each / own:.1f} | {apart[way.name]} | {'yes' if way.is_signed else 'no'} |")
+    for way in ways:
+        if way.is_one_by_one:
+            print(f"\n{way.name}: to find them; its answers are read one by one, which takes longer and is not counted.")
+    for one in left:
+        print(f"\n{one.words}")
+
+
+def _apart(way: Way, first: Way, points: Array) -> str:
+    """The largest difference of distances, and of how many points a way finds one farther or nearer; what takes part is warm afterwards."""
+    more = np.abs(way.distances(points)) - np.abs(first.distances(points))
+    return f"{np.nanmax(np.abs(more)):.2g} | {(more > _APART_MM).sum():,}, {(more < -_APART_MM).sum():,} of {len(points):,}"
 
 
 def registration(surface: PatchSurface, points: Array) -> None:
@@ -114,9 +86,10 @@ def registration(surface: PatchSurface, points: Array) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--points", type=int, default=50_000)
+    parser.add_argument("--points", type=int, default=100_000)
     parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--million", action="store_true", help="a mesh of a million triangles as well")
+    parser.add_argument("--signs", type=int, default=100_000, metavar="N", help="points of which the signs are checked")
     asked = parser.parse_args()
     face = faces.blade(95, 10)
     begin = time.process_time()
@@ -126,21 +99,27 @@ def main() -> None:
     off = np.random.default_rng(1).uniform(-1, 1, len(places))
     points = places + off[:, None] * normals
     brought_by = importlib.metadata.packages_distributions().get("open3d", ["open3d"])  # it has another name without a graphics processor
-    print(machine("numba", "cadquery-ocp-novtk", brought_by[0], "libigl", "trimesh", "rtree", "engeom"))
-    table(f"A spline blade, {len(points):,} points; built in {built:.1f} s", list(on_faces(face, surface)), points, asked.rounds)
+    print(machine("numba", "cadquery-ocp-novtk", brought_by[0], "libigl", "fcpw", "engeom", "trimesh", "rtree"))
+    print(f"Load of the machine {', '.join(f'{load:.1f}' for load in getattr(os, 'getloadavg', tuple)())}.")
+    rivals, left = ways_on_face(face)
+    title = f"A spline blade, {len(points):,} points; built in {built:.1f} s"
+    table(title, [ours("splines", surface), *rivals], left, points, asked.rounds)
     for count in (100_000, 1_000_000) if asked.million else (100_000,):
-        triangles = mesh_of(face, count)
-        begin = time.process_time()
-        mesh = TriangleSurface(triangles)
-        built = time.process_time() - begin
-        held = sum(values.nbytes for values in mesh._tables if isinstance(values, np.ndarray)) / 1e6
-        table(
-            f"A mesh of {len(mesh):,} triangles; built in {built:.1f} s, held in {held:.0f} MB",
-            list(on_meshes(triangles, mesh)),
-            points,
-            asked.rounds,
-        )
+        on_mesh(mesh_of(face, count), points, asked.rounds)
     registration(surface, places)
+    print("\n### Wrong signs\n")
+    for line in wrong_signs(face, asked.signs):
+        print(line)
+
+
+def on_mesh(triangles: Array, points: Array, rounds: int) -> None:
+    begin = time.process_time()
+    mesh = TriangleSurface(triangles)
+    built = time.process_time() - begin
+    held = sum(values.nbytes for values in mesh._tables if isinstance(values, np.ndarray)) / 1e6
+    rivals, left = ways_on_mesh(triangles)
+    title = f"A mesh of {len(mesh):,} triangles; built in {built:.1f} s, held in {held:.0f} MB"
+    table(title, [ours("triangles", mesh), *rivals], left, points, rounds)
 
 
 if __name__ == "__main__":
