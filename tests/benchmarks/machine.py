@@ -25,3 +25,8 @@ def processor() -> str:
     lines = info.read_text(encoding="utf-8").splitlines() if info.is_file() else []
     named = next((line.split(":")[1].strip() for line in lines if line.startswith("model name")), platform.processor())
     return named or platform.machine()
+
+
+def load() -> str:
+    """How much else the machine has to do, the means of 1, 5 and 15 minutes, as far as the system tells."""
+    return f"Load {', '.join(f'{each:.1f}' for each in getattr(os, 'getloadavg', tuple)()) or 'not known'}."

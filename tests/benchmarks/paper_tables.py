@@ -8,7 +8,6 @@ itself. The reference values were measured once with an earlier prototype on oth
 """
 
 import argparse
-import os
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -28,7 +27,7 @@ from inspection.rigid import best_motion
 from inspection.signed_deviations import feet_on
 from inspection.synthetic import even_stations
 from tests.benchmarks import published_method
-from tests.benchmarks.machine import machine
+from tests.benchmarks.machine import load, machine
 from tests.benchmarks.parts import Missing, best_place, cross_section, curves, farthest_mm, nominal
 from tests.benchmarks.warm_up import compile_kernels
 from tests.inspection import profiles
@@ -446,8 +445,7 @@ def main() -> None:
     effort = (3, 1) if options.quick else (25, 20)
     shown = track(sets.items(), "twelve sets", console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty())
     found: Found = {name: one if isinstance(one, Missing) else measure(one, *effort) for name, one in shown}
-    loads = ", ".join(f"{load:.1f}" for load in getattr(os, "getloadavg", tuple)())
-    text = f"# The paper's tables\n\n{machine('numpy', 'scipy', 'numba')} Load {loads}.\n\n{CONDITIONS}\n"
+    text = f"# The paper's tables\n\n{machine('numpy', 'scipy', 'numba')} {load()}\n\n{CONDITIONS}\n"
     for title, (explained, table) in SECTIONS.items():
         lines = "\n".join(table(found))
         if lines:

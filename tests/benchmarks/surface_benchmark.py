@@ -11,14 +11,13 @@ left out, each with a line that says why: pip install 'cmmlink[bench,open3d]'.
 
 import argparse
 import importlib.metadata
-import os
 import time
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inspection.surface import PatchSurface, RigidMotion, SplineFace, TriangleSurface, register_surface
-from tests.benchmarks.machine import machine
+from tests.benchmarks.machine import load, machine
 from tests.benchmarks.surface_rivals import LeftOut, Way, ways_on_face, ways_on_mesh
 from tests.benchmarks.surface_signs import wrong_signs
 from tests.inspection.surface import faces
@@ -100,7 +99,7 @@ def main() -> None:
     points = places + off[:, None] * normals
     brought_by = importlib.metadata.packages_distributions().get("open3d", ["open3d"])  # it has another name without a graphics processor
     print(machine("numba", "cadquery-ocp-novtk", brought_by[0], "libigl", "fcpw", "engeom", "trimesh", "rtree"))
-    print(f"Load of the machine {', '.join(f'{load:.1f}' for load in getattr(os, 'getloadavg', tuple)())}.")
+    print(load())
     rivals, left = ways_on_face(face)
     title = f"A spline blade, {len(points):,} points; built in {built:.1f} s"
     table(title, [ours("splines", surface), *rivals], left, points, asked.rounds)

@@ -8,7 +8,6 @@ machine's load stands beside them, for a busy machine is slower.
 """
 
 import argparse
-import os
 import time
 
 import numpy as np
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 
 from inspection import ToleranceZone
 from inspection.surface import NominalSurface, PatchSurface, RigidMotion, SurfaceTerms, TriangleSurface, judge_surface
-from tests.benchmarks.machine import machine
+from tests.benchmarks.machine import load, machine
 from tests.benchmarks.surface_benchmark import mesh_of
 from tests.inspection.surface import faces
 
@@ -46,7 +45,7 @@ def main() -> None:
     count = parser.parse_args().points
     face = faces.blade(60, 8)
     print(machine("numpy", "scipy", "numba"))
-    print(f"{count:,} points; load of the machine {', '.join(f'{load:.1f}' for load in getattr(os, 'getloadavg', tuple)())}")
+    print(f"{count:,} points. {load()}")
     for kind, surface in (("splines", PatchSurface([face])), ("100,000 triangles", TriangleSurface(mesh_of(face, 100_000)))):
         surface.project(surface.sample(5000)[0])  # the first use compiles
         for name, points in scans(surface, count):

@@ -178,9 +178,13 @@ def change_code(data: bytes, rng: Random) -> bytes:
 def change_tree(data: bytes, rng: Random) -> bytes:
     """Read YAML, put another value in the place of one, leave one out or nest it, and write it again."""
     try:
-        tree = yaml.safe_load(data)
-    except (yaml.YAMLError, ValueError):
+        return _changed_tree(data, rng)
+    except (yaml.YAMLError, ValueError, RecursionError):  # nested deeper than PyYAML can follow, as some that are changed again are
         return change_lines(data, rng)
+
+
+def _changed_tree(data: bytes, rng: Random) -> bytes:
+    tree = yaml.safe_load(data)
     for _ in range(rng.choice([1, 1, 2, 4])):
         _change_value(tree, rng)
     return yaml.safe_dump(tree, default_flow_style=rng.random() < 0.3, allow_unicode=True, width=10_000).encode("utf-8", "surrogateescape")
