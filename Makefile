@@ -7,7 +7,7 @@ INSTALL := $(PIP) --no-build-isolation --editable
 # The tests start a hundred processes; where Python may keep no compiled files, each of them compiles every file anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo install test checks compiled lowest lowest-compiled lowest-drivers platforms upgrade bench slower paper faults powercuts kills fuzz soak damage memory elsewhere proofs mutants stops machines plant rejudge trends laws audit surfaces reference uncertainty supply-chain docs bundle page-tools screenshots
+.PHONY: demo install test checks compiled lowest lowest-compiled lowest-drivers platforms upgrade bench slower paper faults powercuts kills fuzz soak damage memory elsewhere proofs mutants stops machines plant rejudge trends laws audit surfaces rivals reference uncertainty supply-chain docs bundle page-tools screenshots
 demo: .venv/installed
 	$(BIN)/cmmlink demo --out demo-result
 
@@ -183,6 +183,11 @@ audit: .venv/test-installed
 surfaces: .venv/test-installed
 	$(BIN)/python -m tests.benchmarks.surface_poses
 	$(BIN)/python -m tests.benchmarks.surface_verdicts
+
+# The closest point of a surface beside what Open CASCADE, Open3D, libigl, FCPW, engeom and trimesh take for it, and whose signs are wrong;
+# takes a quarter of an hour.
+rivals: .venv/bench-installed
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.surface_benchmark --million
 
 # Every point of every case of the reference set, and every number that is stated of it, found anew by mpmath; takes some minutes.
 reference: .venv/test-installed

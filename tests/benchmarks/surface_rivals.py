@@ -15,7 +15,8 @@ from inspection.surface import SplineFace
 
 Array = NDArray[np.float64]
 _FEW = 500  # points of a way that takes milliseconds for each
-_SOME = 5_000  # of one that takes some hundredths of a millisecond
+_SOME = 2_000  # of one that takes up to seven tenths of a millisecond
+_MOST_OF_RTREE = 300_000  # triangles; of a million its tree takes minutes and 8 GB
 
 
 def _as_it_is(answer: Any, _: Array) -> Array:
@@ -75,7 +76,7 @@ def ways_on_mesh(triangles: Array, wanted: Callable[[Way], bool] = lambda _: Tru
     for library, make in _OF_MESHES.items():
         try:
             ways += [way for way in make(importlib.import_module(library), corners, numbers) if wanted(way)]
-        except (ImportError, OSError) as error:  # not installed, or without a library of the system that it needs
+        except (ImportError, OSError, MemoryError) as error:  # not installed, or without what it needs
             left.append(LeftOut(library, str(error).splitlines()[0]))
     return ways, left
 
@@ -160,6 +161,8 @@ def _of_engeom(_: Any, corners: Corners, triangles: Triangles) -> Iterator[Way]:
 
 def _of_trimesh(trimesh: Any, corners: Corners, triangles: Triangles) -> Iterator[Way]:
     importlib.import_module("rtree")
+    if len(triangles) > _MOST_OF_RTREE:
+        raise MemoryError(f"its tree of {len(triangles):,} triangles takes minutes and gigabytes")
     mesh = trimesh.Trimesh(corners, triangles, process=False)
     yield Way("trimesh", lambda points: trimesh.proximity.closest_point(mesh, points)[1], is_signed=False, most=_SOME)
     yield Way("trimesh, signed", lambda points: -trimesh.proximity.signed_distance(mesh, points), most=_SOME)
