@@ -59,7 +59,8 @@ class LeftOut:
         return f"{self.library} is left out: {self.reason}"
 
 
-Corners, Triangles = Array, NDArray[np.int64]
+Corners = Array
+Triangles = NDArray[np.int64]
 OfMesh = Callable[[Any, Corners, Triangles], Iterator[Way]]
 
 
