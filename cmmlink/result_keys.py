@@ -334,6 +334,7 @@ class Reported(JsonObject):
 
     run: str = Field(description="the id of the run, or that of the stack")
     file: str = Field(description="the PDF file that was written")
+    trends: list[str] = Field(description="the characteristics that have a page with their trend, as --trend asks for it")
 
 
 class ZoneVerified(JsonObject):
