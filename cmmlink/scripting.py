@@ -29,6 +29,7 @@ from cmmlink.from_plan import (
     with_section,
 )
 from cmmlink.inspected import Inspected, inspected_on_record, inspected_run
+from cmmlink.inspected_surface import InspectedSurface, surface_from_record
 from cmmlink.nominal_files import NominalFile, nominal_of_curve, nominal_of_points
 from cmmlink.pipeline import run_inspection
 from cmmlink.plan import Discretisation, FileDevice, Plan, plan_given_by
@@ -105,7 +106,7 @@ def inspect(
         curve, of_file = _nominal_in(nominal, closed, {"scale": scale, "closed": closed, "material": material})
         name = part or (file.stem.strip() if file is not None else "") or "part"
         settings = {"part": {"name": name}, "nominal": of_file, "device": device, **plan_keys}
-        plan = plan_given_by(Plan, settings | _tolerance_in(tolerance), _NAME_OF)
+        plan = plan_given_by(Plan, settings | tolerance_in(tolerance), _NAME_OF)
     if file is None:
         read, place = points_in(points, unit=unit, columns=columns, invalid=invalid), f"{_POINTS}: "
     else:
@@ -113,8 +114,8 @@ def inspect(
     return inspected_run(_judge(plan, curve, PointArraySource(_words(plan), read), tuple(place + note for note in read.notes)))
 
 
-def open_run(name: str = "last", *, records: AnyPath | None = None) -> Inspected:
-    """Open a recorded run with its result: what was found of every point, and everything that result.json says of it.
+def open_run(name: str = "last", *, records: AnyPath | None = None) -> Inspected | InspectedSurface:
+    """Open a recorded run with its result, of a section or of a whole surface: every point, and everything that result.json says of it.
 
     name    : an id or the beginning of one, a counter, a serial number, "last", or "last~1" for the one before it
     records : the folder of the records; None: the user's own
@@ -129,6 +130,9 @@ def open_run(name: str = "last", *, records: AnyPath | None = None) -> Inspected
             end = recorded.end or end_missing(store, run)
             told = f": {end['message']}" if end["message"] else ""
             raise RunError(f"run {run} has no result ({end['state']}{told}); `cmmlink export {run} --out DIR` writes what is on record")
+        if recorded.is_of_surface:
+            named = " ".join(filter(None, [recorded.header["part"], recorded.header["serial_number"], f"(run {run})"]))
+            return surface_from_record(named, store, recorded)
         profile = recorded_profile(recorded_plan(recorded), recorded)
         document = document_on_record(store, recorded, profile)
         title = " ".join(filter(None, [document["part"], document["serial_number"], f"(run {run})"]))
@@ -205,7 +209,8 @@ def _nominal_in(
     return nominal_of_points(nominal, closed), material
 
 
-def _tolerance_in(tolerance: Iterable[float] | Mapping[str, Any] | None) -> dict[str, Any]:
+def tolerance_in(tolerance: Iterable[float] | Mapping[str, Any] | None) -> dict[str, Any]:
+    """What a plan says of a tolerance that was handed over as two limits, or as a plan has it. Raises PlanError for one that is neither."""
     if tolerance is None:
         return {}
     if isinstance(tolerance, Mapping):

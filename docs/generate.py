@@ -159,7 +159,9 @@ print(found.points.deviation_mm.shape)  # (800,)
 ```
 
 `found` shows itself in a notebook; `found.plot()` is a matplotlib figure, `found.to_columns()` and `found.to_dataframe()` are the points
-with the columns of deviations.csv, and `found.document` has the keys of result.json. `cmmlink.open_run("last")` gives the same of a
+with the columns of deviations.csv, and `found.document` has the keys of result.json.
+`cmmlink.inspect_surface("scan.csv", nominal="part.stp", tolerance=(-0.05, 0.05))` does so for points in
+space against a whole [surface](surfaces.md). `cmmlink.open_run("last")` gives the same of a
 recorded run, and `plan=cmmlink.load_plan("plan.yaml")` stands in place of the other arguments.
 [Example 06](examples/06_one_call.py) walks through it, and the [gallery](gallery.md) shows all examples. `make docs` writes what stands
 below, with every docstring, as pages for a browser.

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from cmmlink.report.study_text import study_document, study_lines
     from cmmlink.report.surface_folder import write_surface, write_surface_run
     from cmmlink.report.surface_pdf import write_surface_report
+    from cmmlink.report.surface_picture import draw_surface
+    from cmmlink.report.surface_report import content_of_surface
     from cmmlink.report.surface_terminal import print_surface_summary
     from cmmlink.report.terminal import STYLE_OF, STYLES, print_characteristics, print_summary
     from cmmlink.report.trend_picture import write_trend_picture
@@ -59,6 +61,8 @@ else:
         "cmmlink.report.speech": ("Speech",),
         "cmmlink.report.study_pdf": ("write_study",),
         "cmmlink.report.study_text": ("study_document", "study_lines"),
+        "cmmlink.report.surface_picture": ("draw_surface",),
+        "cmmlink.report.surface_report": ("content_of_surface",),
         "cmmlink.report.surface_folder": ("write_surface", "write_surface_run"),
         "cmmlink.report.surface_pdf": ("write_surface_report",),
         "cmmlink.report.surface_terminal": ("print_surface_summary",),
@@ -80,6 +84,8 @@ __all__ = [
     "SectionPictures",
     "Speech",
     "content_of",
+    "content_of_surface",
+    "draw_surface",
     "input_of_replay",
     "input_of_surface",
     "input_on_record",
