@@ -42,7 +42,7 @@ discretisation: {{samples: 400}}
 OLD_PASS = b"O9100 (CMMLINK ANSWER)\r\n(RUN 20250101-000000-0001)\r\n#150=1.\r\n#151=0.\r\n#152=%d.\r\nM99\r\n"
 
 
-def planned(folder: Path, address: str, *, silence_s: float = 5.0, more: str = "", answer: str = "O9100.nc") -> Path:
+def planned(folder: Path, address: str, *, silence_s: float = 60.0, more: str = "", answer: str = "O9100.nc") -> Path:
     write_nominal(folder / "oval.yaml")
     told = PLAN.format(address=address, silence_s=silence_s, more=more, answer=answer)
     (folder / "plan.yaml").write_text(told, encoding="utf-8")
@@ -50,7 +50,7 @@ def planned(folder: Path, address: str, *, silence_s: float = 5.0, more: str = "
 
 
 @contextmanager
-def asking(folder: Path, *options: object, within_s: float = 20.0, address: str = "127.0.0.1:0") -> Iterator[Simulated]:
+def asking(folder: Path, *options: object, within_s: float = 60.0, address: str = "127.0.0.1:0") -> Iterator[Simulated]:
     """A machine tool that touches the oval, asks for the verdict, and waits for its answer."""
     file = folder / "O9100.nc"
     words = ["--unpaced", "--tip-radius-mm", "1.5", "--answer", file, "--request", REQUEST, "--answer-within", within_s, *options]
@@ -141,7 +141,7 @@ def test_a_machine_whose_link_was_cut_is_told_that_nothing_is_proven(tmp_path: P
 
 def test_an_emergency_stop_ends_the_run_after_the_silence_that_the_plan_allows(tmp_path: Path) -> None:
     with asking(tmp_path, "--fault=emergency-stop@60") as machine:
-        found = carried_out(planned(tmp_path, machine.address, silence_s=0.5))
+        found = carried_out(planned(tmp_path, machine.address, silence_s=2.0))
         assert (found[0], found[1]["verdict"]) == (4, "uncertain"), found[2]
         assert "silent for" in found[2]
         assert end_of(machine) == f"request {REQUEST}: emergency stop: the machine stops"

@@ -11,7 +11,7 @@ from drivers.codecs.ascii_frames import AsciiDecoder
 from drivers.errors import LinkError, ProtocolError
 from drivers.links.link_settings import LinkSettings
 from drivers.links.serial_scanner import SerialScanner
-from drivers.source import Arrival, LinkDown, LinkUp, PointBatch, ScanClosed, ScanOpened
+from drivers.source import Arrival, Heartbeat, LinkDown, LinkUp, PointBatch, ScanClosed, ScanOpened
 from tests.drivers.codecs.streams import Account, account, only_sent_points
 from tests.integration.simulated import Simulated, simulated
 
@@ -71,7 +71,7 @@ def test_a_device_that_dies_ends_with_a_clear_error_and_what_was_received(line: 
 
 @pytest.mark.parametrize("line", LINES)
 def test_a_killed_device_ends_with_a_clear_error(line: str, tmp_path: Path) -> None:
-    with simulated("serial", line, tmp_path) as device:
+    with simulated("serial", line, tmp_path, "--fault=stall:60@500") as device:
         arrivals = SerialScanner(device.address, AsciiDecoder()).arrivals()
         first = next(len(arrival) for arrival in arrivals if isinstance(arrival, PointBatch))
         device.process.kill()
@@ -92,8 +92,15 @@ def test_an_unplugged_line_comes_back_and_the_run_goes_on(line: str, tmp_path: P
 
 
 def test_a_silent_device_is_told_from_a_slow_one(tmp_path: Path) -> None:
+    """Here time passes with heartbeats alone, two of which are longer than the silence that is borne."""
+    now_s, arrivals = [0.0], list[Arrival]()
     with simulated("serial", "127.0.0.1:0", tmp_path, "--fault=stall:1.2@200") as device:
-        assert scanned(device, silence_s=0.7).sequence == list(range(COUNT))  # heartbeats came meanwhile
+        settings = LinkSettings(115_200, "N", silence_s=10.0)
+        for arrival in SerialScanner(device.address, AsciiDecoder(), settings, clock=lambda: now_s[0]).arrivals():
+            arrivals.append(arrival)
+            now_s[0] += 6.0 * isinstance(arrival, Heartbeat)
+    assert account(arrivals).sequence == list(range(COUNT))
+    assert now_s[0] >= 12.0
     with (
         simulated("serial", "127.0.0.1:0", tmp_path, "--fault=silence@200") as device,
         pytest.raises(LinkError, match=r"silent for 0\.3 s"),

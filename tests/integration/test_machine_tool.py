@@ -119,7 +119,7 @@ def test_seven_data_bits_of_a_serial_port_carry_their_parity(tmp_path: Path) -> 
     ],
 )
 def test_what_is_missing_never_proves_a_part(fault: str, code: int, verdict: str, words: str, tmp_path: Path) -> None:
-    device = LINES.replace("unit", "silence_s: 0.5, unit")
+    device = LINES.replace("unit", "silence_s: 2, unit") if fault == "no-end" else LINES
     found = measured(tmp_path, device, f"--fault={fault}")
     assert (found[0], found[1]["verdict"]) == (code, verdict), found[2]
     assert words in found[2] + str(found[1])

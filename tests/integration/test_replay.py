@@ -81,7 +81,8 @@ def recorded_scan(folder: Path, *faults: str, stop: threading.Event | None = Non
     options = ["--tip-radius-mm", "1", "--rotation-deg", "30", *(f"--fault={fault}" for fault in faults)]
     folder.mkdir(exist_ok=True)
     with simulated("serial", "127.0.0.1:0", folder, *options, count=COUNT, path_mm=path) as device:
-        settings = LinkSettings(115_200, "N", silence_s=0.5, reconnect_s=2.0 if "unplug" in str(faults) else 0.0)
+        silence_s = 2.0 if "silence" in str(faults) else 60.0  # what else goes wrong ends by itself, on a busy machine late
+        settings = LinkSettings(115_200, "N", silence_s, reconnect_s=30.0 if "unplug" in str(faults) else 0.0)
         source = SerialScanner(device.address, AsciiDecoder(), settings)
         outcome, recorder = record(folder, source, stop=stop, before=[abort])
     ending = (
