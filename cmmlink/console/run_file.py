@@ -2,6 +2,7 @@
 
 import tempfile
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import get_args
 
@@ -56,42 +57,29 @@ class RunFiles:
         """The answer to a page that asks for a file; `make` writes it into a folder."""
         if self._under_way >= _MOST:
             return PlainTextResponse("other runs are being exported; try again when they are done", 503)
-        self._under_way += 1
-        try:
-            file, folder = await anyio.to_thread.run_sync(_make, make)
-        except BaseException as error:
-            self._under_way -= 1
-            if isinstance(error, Refused):
-                return PlainTextResponse(str(error), 404)
-            if isinstance(error, OSError):
+        with ExitStack() as ending:
+            self._under_way += 1
+            ending.callback(self._end)
+            try:
+                folder = ending.enter_context(tempfile.TemporaryDirectory())
+                file = await anyio.to_thread.run_sync(make, Path(folder))  # a station that ends meanwhile cancels it here
+            except Refused as refusal:
+                return PlainTextResponse(str(refusal), 404)
+            except OSError as error:
                 return PlainTextResponse(words_of(error), 500)
-            raise
-        return _RunFile(file, media_type, folder, self._end)
+            return _RunFile(file, media_type, ending.pop_all())
 
     def _end(self) -> None:
         self._under_way -= 1
 
 
-def _make(make: Callable[[Path], Path]) -> tuple[Path, tempfile.TemporaryDirectory[str]]:
-    """Make a file in a folder that is to be cleaned up. Raises Refused, OSError."""
-    folder = tempfile.TemporaryDirectory()
-    try:
-        return make(Path(folder.name)), folder
-    except BaseException:
-        folder.cleanup()
-        raise
-
-
 class _RunFile(FileResponse):
-    """A file that is being sent."""
+    """A file that is being sent; `ending` is closed behind it."""
 
-    def __init__(self, file: Path, media_type: str, folder: tempfile.TemporaryDirectory[str], on_end: Callable[[], None]) -> None:
+    def __init__(self, file: Path, media_type: str, ending: ExitStack) -> None:
         super().__init__(file, media_type=media_type)
-        self._folder, self._on_end = folder, on_end
+        self._ending = ending
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        try:
+        with self._ending:
             await super().__call__(scope, receive, send)
-        finally:
-            self._folder.cleanup()
-            self._on_end()

@@ -97,6 +97,7 @@ def test_characteristics_are_told_so_far_and_at_the_end_and_in_the_history(vanes
     assert overflowing(page) == []
     shown = [cells(page, column) for column in range(1, 8)]
     page.keyboard.press("3")
+    expect(page.locator("#runs tbody tr")).to_contain_text(["complete"])
     page.keyboard.press("o")
     expect(page.locator("#banners")).to_contain_text("Recorded run")
     expect(page.locator("#verdict-of")).to_have_text("contour and 1 more")

@@ -75,6 +75,7 @@ def station(make_bench: MakeBench, tmp_path: Path) -> Bench:
 def started(bench: Bench, page: Page) -> Page:
     page.locator("#plans div", has_text="block.yaml").click()
     expect(page.locator("#check-word")).to_contain_text("can be run")
+    expect(page.locator("#serial")).to_be_focused()
     page.keyboard.press("Enter")
     expect(page.locator("#said")).to_contain_text("started")
     return page
@@ -164,11 +165,13 @@ def test_a_recorded_surface_is_opened_and_measured_again(station: Bench) -> None
     expect(page.locator("#verdict[data-final=true] .word")).to_have_text("NOT CONFORM")
     page.keyboard.press("3")
     expect(page.locator("#worst-where")).to_contain_text("z 12.")
+    expect(page.locator("#runs tbody tr")).to_contain_text(["complete"])
     page.keyboard.press("o")
     expect(page.locator("#banners")).to_contain_text("Recorded run")
     expect(page.locator("#surface-regions tbody tr")).to_have_count(1)
     assert coloured(page, Kind.ABOVE)[0] > 20
     page.keyboard.press("3")
+    expect(page.locator("#start")).to_be_enabled()
     page.keyboard.press("r")
     expect(page.locator("#banners")).to_contain_text("identical to the recorded result")
     assert coloured(page, Kind.ABOVE)[0] > 20

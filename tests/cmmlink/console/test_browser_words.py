@@ -28,6 +28,7 @@ def test_the_page_speaks_the_language_of_the_browser(bench: Bench) -> None:
     expect(page.locator("#check-word")).to_have_text("✓ blade.yaml kann gemessen werden.")
     expect(page.locator("#verdict-word")).to_have_text("BEREIT")
     expect(page.locator("html")).to_have_attribute("lang", "de")
+    expect(page.locator("#serial")).to_be_focused()
     page.keyboard.press("Enter")
     bench.device.source.put(opened(2000), *batches(measured(bench.profile, 2000, seed=2, defect_mm=0.12, at_mm=60.0), 50), CLOSED)
     expect(page.locator("#verdict[data-final=true] .word")).to_have_text("NICHT KONFORM")
