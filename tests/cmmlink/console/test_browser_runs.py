@@ -209,7 +209,7 @@ def test_full_disk_stops_the_run_and_says_so(make_bench: MakeBench, tmp_path: Pa
     expect(page.locator("#verdict-why")).to_contain_text("Record not kept: the record of this run cannot be kept, so it has no result")
     expect(page.locator("#lamp-faults")).to_contain_text("FAULT")
     assert number(page, "received") == number(page, "judged") + number(page, "rejected") == 1100
-    assert bench.station.wait(5.0)
+    assert bench.station.wait(20.0)
     keep(page, "disk-full")
     page.keyboard.press("3")
     expect(page.locator("#runs tbody tr")).to_have_text([re.compile("^INTERRUPTED.*interrupted")])

