@@ -23,7 +23,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--parity", default="N", choices=["N", "E", "O"])
     group.addoption("--dme-sessions", metavar="FOLDER", help="logs of I++ DME clients of the NIST test suite, for test_dme_recorded.py")
     group = parser.getgroup("damage", "tests/cmmlink/record/test_damage.py")
-    group.addoption("--damages", type=int, default=8, metavar="N", help="kinds of damage to the records to try (default 8)")
+    group.addoption("--damages", type=int, default=5, metavar="N", help="kinds of damage to the records to try (default 5)")
     group = parser.getgroup("browser", "tests/cmmlink/console in Chromium")
     group.addoption("--require-browser", action="store_true", help="fail where the tests in a browser would be skipped")
     group.addoption("--require-open3d", action="store_true", help="fail where the tests with Open3D would be skipped")

@@ -24,7 +24,7 @@ from inspection.cloud import row_blocks
 from inspection.kernels import PoseFit, judge_rows
 from tests.cmmlink.recorded import small_plan, small_profile, today
 
-COUNTS = (600, 6_000, 60_000)
+COUNTS = (300, 3_000, 30_000)
 PACKAGE = Path(inspection.__file__).parent
 IN_PIECES = [
     ".".join(["inspection", *file.relative_to(PACKAGE).with_suffix("").parts])

@@ -17,6 +17,7 @@ from cmmlink.plan.whole_surface import SurfacePlan
 from drivers.errors import DeviceError
 from drivers.source import Arrival, PointBatch, ScanClosed, ScanOpened
 from inspection import NominalProfile, RigidTransform, synthetic
+from tests.cmmlink.command import cmmlink
 
 Array = NDArray[np.float64]
 
@@ -67,6 +68,11 @@ def opened(expected: int) -> ScanOpened:
 
 
 CLOSED = ScanClosed(None)
+
+
+def made_here(command: list[str], records: Path, file: Path, options: list[str]) -> None:
+    """What another process makes of records for the station, made in this one."""
+    assert cmmlink(*command, "--records", records, "--out", file, "--json", *options).code == 0
 
 
 class PlayedSource:

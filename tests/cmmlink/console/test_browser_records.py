@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from datetime import datetime
 from pathlib import Path
 from time import monotonic
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from playwright.sync_api import Page, expect
 from pypdf import PdfReader
 
 from cmmlink.commands.console import inspect_surface
+from cmmlink.console import paper_process
 from cmmlink.console.ct_import import Section
 from cmmlink.console.past_runs import PastRuns
 from drivers.source import Damaged
@@ -21,7 +23,7 @@ from inspection import NominalProfile, RigidTransform, synthetic
 from tests.drivers.surface.meshes import binary_stl, tube, write
 
 from .conftest import Bench, MakeBench
-from .played import CLOSED, PLAN, batches, measured, opened
+from .played import CLOSED, PLAN, batches, made_here, measured, opened
 from .seen import focus, millimetres, overflowing
 
 Keep = Callable[[Page, str], None]
@@ -155,7 +157,7 @@ def check_report_while_measuring(bench: Bench, page: Page, folder: Path) -> None
     expect(page.locator("#said")).to_contain_text("is the first one")
     page.locator("#runs").focus()
     page.keyboard.press("ArrowUp")
-    with page.expect_download(timeout=LONG_MS) as download:
+    with patch.object(paper_process, "_make", made_here), page.expect_download() as download:
         page.keyboard.press("c")
     assert re.search(r"-0002-.*-0003\.pdf$", download.value.suggested_filename)
     download.value.save_as(folder / "both.pdf")

@@ -12,11 +12,10 @@ from cmmlink.console.server import ConsoleServer
 from cmmlink.console.station import Station
 from cmmlink.console.trend_look import TrendLook
 from cmmlink.plant import ResultsDatabase
-from tests.cmmlink.command import cmmlink
 from tests.cmmlink.plant.trending import drifting_runs
 
 from .conftest import Bench, MakeBench
-from .played import setup_of, write_plan
+from .played import made_here, setup_of, write_plan
 from .seen import drawn, focus, hindrances
 
 Keep = Callable[[Page, str], None]
@@ -72,11 +71,6 @@ def test_another_part_characteristic_and_subgroup_are_chosen_in_german(trends: B
     page.locator("#trend-spread").focus()
     page.keyboard.press("Home")
     expect(page.locator("#trend-place")).to_contain_text("SN-0004")
-
-
-def made_here(command: list[str], records: Path, file: Path, options: list[str]) -> None:
-    """What another process does for the station, done in this one."""
-    assert cmmlink(*command, "--records", records, "--out", file, "--json", *options).code == 0
 
 
 def test_a_trend_is_taken_away_as_a_workbook(trends: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
