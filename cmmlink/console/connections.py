@@ -12,6 +12,7 @@ import logging
 import socket
 import sys
 from collections.abc import Iterable
+from functools import partial
 from typing import Any
 
 import h11
@@ -161,10 +162,11 @@ class BoundedServer(uvicorn.Server):
         self._strangers.turn_out_all()
         await super().shutdown(sockets)
 
-    def _begin(self, work: Any) -> None:
+    def _begin(self, work: Any) -> "asyncio.Task[None]":
         task = asyncio.get_running_loop().create_task(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
+        return task
 
     async def _take_connections(self) -> None:
         loop = asyncio.get_running_loop()
@@ -180,7 +182,8 @@ class BoundedServer(uvicorn.Server):
             except asyncio.CancelledError:
                 connected.close()
                 raise
-            self._begin(self._welcome(connected, Visitor(connected, self._strangers, loop)))
+            visitor = Visitor(connected, self._strangers, loop)
+            self._begin(self._welcome(connected, visitor)).add_done_callback(partial(_close_unwelcomed, connected, visitor))
 
     async def _welcome(self, connected: socket.socket, visitor: Visitor) -> None:
         loop = asyncio.get_running_loop()
@@ -196,6 +199,13 @@ class BoundedServer(uvicorn.Server):
         except OSError:
             visitor.leave()
             connected.close()
+
+
+def _close_unwelcomed(connected: socket.socket, visitor: Visitor, welcome: "asyncio.Task[None]") -> None:
+    """Close a connection whose welcome was broken off, be it before it began: nobody else would."""
+    if welcome.cancelled():
+        visitor.leave()
+        connected.close()
 
 
 class _RequestProtocol(H11Protocol):

@@ -1,5 +1,6 @@
 """Strangers cannot take the station away from its page: counter-parties on real sockets, with time limits made short."""
 
+import asyncio
 import http.client
 import json
 import os
@@ -15,6 +16,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 import pytest
+import uvicorn
 from websockets import Origin
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
@@ -311,6 +313,23 @@ def test_encrypted_station_is_reached_with_its_certificate_alone(tmp_path: Path,
             monkeypatch.setattr(connections, "_HEAD_WITHIN_S", 0.4)  # not before: a busy machine takes long to agree on an encryption
             with silence(server.port) as last:
                 assert ends(last, 10.0)
+
+
+def test_a_station_that_ends_closes_whom_it_has_not_welcomed_yet() -> None:
+    async def end_at_the_door(listening: socket.socket) -> None:
+        server = connections.BoundedServer(uvicorn.Config(lambda _: None), listening, None)
+        await server.startup()
+        while len(server._tasks) == 1:  # looked at in every turn of the loop: the second task has not begun
+            await asyncio.sleep(0)
+        for task in tuple(server._tasks):
+            task.cancel()
+        while server._tasks:
+            await asyncio.sleep(0)
+
+    with socket.create_server(("127.0.0.1", 0)) as listening, silence(listening.getsockname()[1]) as caller:
+        listening.setblocking(False)
+        asyncio.run(end_at_the_door(listening))
+        assert ends(caller, 10.0)
 
 
 def test_the_station_ends_with_strangers_at_its_door(tmp_path: Path) -> None:
