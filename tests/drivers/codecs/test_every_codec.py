@@ -147,14 +147,19 @@ def calls_to_feed(made: Decoder, pieces: list[bytes]) -> int:
 
     sys.setprofile(note)
     try:
-        for piece in pieces:
-            try:
-                made.feed(piece)
-            except DeviceError:
-                made.break_off()
+        feed(made, pieces)
     finally:
         sys.setprofile(None)
     return count
+
+
+def feed(made: Decoder, pieces: list[bytes]) -> None:
+    """Feed the pieces one after the other, with a new link after each that is refused."""
+    for piece in pieces:
+        try:
+            made.feed(piece)
+        except DeviceError:
+            made.break_off()
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -163,7 +168,7 @@ def test_no_bytes_cost_memory_or_time(name: str, kind: str) -> None:
     """What is held stays small, with every feed copied at most once, and as many bytes again cost as many calls again."""
     piece, (make, _) = endless(name, kind, Random(2)), wire_of(name, Random(1))
     made = make()
-    calls_to_feed(made, 8 * [piece])  # until a block that never ends is longer than any
+    feed(made, 8 * [piece])  # until a block that never ends is longer than any
     calls = [calls_to_feed(made, 8 * [piece]) for _ in range(2)]
     assert held(made, set()) < MOST_BYTES
     assert calls[1] <= 1.5 * calls[0] + 200
