@@ -126,15 +126,13 @@ def test_a_device_that_never_opened_gives_no_run_and_no_result(tmp_path: Path) -
 
 def test_a_run_ends_with_a_result_when_the_disk_has_no_room_for_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cmmlink.pipeline._ROOM_EVERY", 100)
-    told = threading.Event()
 
     def refuse(_: object, received: int, announced: int | None) -> str:
-        if received > 300:
-            told.set()
         return "the disk is full" if received > 300 else ""
 
     monkeypatch.setattr("cmmlink.scratch.Scratch.refusal", refuse)
-    finished = run(Script(*scan_arrivals(2000)[:20], lambda: told.wait(30), *scan_arrivals(2000)), tmp_path)
+    source: Script = Script(*scan_arrivals(2000)[:20], lambda: source._stopped.wait(30), *scan_arrivals(2000))
+    finished = run(source, tmp_path)
     assert finished.outcome.ending == "interrupted"
     assert isinstance(finished.outcome.failure, StoreError)
     assert str(finished.outcome.failure) == "the disk is full"

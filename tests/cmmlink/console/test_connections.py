@@ -242,7 +242,7 @@ def test_a_second_request_over_the_same_connection_has_its_time_too(tmp_path: Pa
 def test_a_page_is_no_stranger_and_stays(tmp_path: Path) -> None:
     with served(tmp_path) as server, silence(server.port), page(server):
         (visitor,) = [page.visitor for page in server._pages]
-        assert visitor not in server._server._strangers
+        assert visitor not in server._server._strangers._staying
         assert visitor._end is None, "no time runs against it"
 
 
