@@ -44,6 +44,8 @@ _SCOUTS = 400  # points of the walk along the contour that rank coarse poses
 _CLOSE_RMS = 3.0  # poses within this factor of the best rms are compared on all points: the trimmed score of 400 points can miss an edge
 _SCOUT_STEPS = 12  # a pose from which more are needed is not the one sought
 _EQUAL_RMS = 1.1  # other poses within this factor of the best rms are rivals
+_SYMMETRIC = 1.001  # times the least rms: only symmetry makes fits to all points so much alike
+_ROUNDING = 1e-9  # of the length: more than the rms of points without any deviation
 _SAME_POSE = 0.01  # of the size of the part; two poses that are closer than this are one
 
 
@@ -61,17 +63,22 @@ def register(
     """Coarse then fine registration of section points (m, 2).
 
     Every coarse pose is refined on a few points; those near the best of them are refined on all points. Poses of symmetric parts
-    that fit equally well are reported as `rivals`. `robust` finds gross outliers first and leaves them out; `target_mm` and `weights`
-    say what the fit aims at and how points count in it: see register_fine. Raises RegistrationError for too few points.
+    that fit equally well are reported as `rivals`; of poses that differ by a symmetry that one is taken which turns the scan least, as
+    the part lies in its own coordinates. `robust` finds gross outliers first and leaves them out; `target_mm` and `weights` say what
+    the fit aims at and how points count in it: see register_fine. Raises RegistrationError for too few points.
     """
     points = check_cloud(points_mm)
     ranked = ranked_poses(points, nominal, tip_radius_mm + target_mm)
     close = [pose for rms, pose in ranked if rms <= _CLOSE_RMS * ranked[0][0]]
     settings = (method, scheme, tip_radius_mm, robust, gross_mm, target_mm, weights)
     refined = [register_fine(points, nominal, pose, *settings) for pose in close]
-    best = min(refined, key=lambda fit: fit.rms_mm)
-    others = _drop_equal_poses([(fit.rms_mm, fit.nominal_from_section) for fit in refined], points)[1:]
-    return replace(best, rivals=tuple(pose for rms, pose in others if rms <= _EQUAL_RMS * best.rms_mm))
+    fit_at = {fit.nominal_from_section: fit for fit in refined}
+    distinct = _drop_equal_poses([(fit.rms_mm, pose) for pose, fit in fit_at.items()], points)
+    least_mm = distinct[0][0]
+    rounding_mm = _ROUNDING * nominal.length_mm
+    best = max((pose for rms, pose in distinct if rms <= _SYMMETRIC * least_mm + rounding_mm), key=lambda pose: math.cos(pose.rotation_rad))
+    rivals = tuple(pose for rms, pose in distinct if pose is not best and rms <= _EQUAL_RMS * least_mm + rounding_mm)
+    return replace(fit_at[best], rivals=rivals)
 
 
 def ranked_poses(points_mm: ArrayLike | Cloud, nominal: NominalProfile, tip_radius_mm: float = 0.0) -> list[tuple[float, RigidTransform]]:

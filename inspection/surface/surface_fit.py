@@ -27,6 +27,8 @@ _FEWEST = 6
 _MADS = 6.0  # median absolute deviations beyond which a point is an outlier, as for profiles
 _MANY, _AHEAD = 1 << 17, 1 << 14  # points from which on a choice of so many goes ahead
 _ROUNDS = 20  # in which outliers are found anew
+_EQUAL = 1.001  # times the rms and the points that take part: only symmetry makes fits so much alike
+_ROUNDING = 1e-9  # of the size: more than the rms of points without any deviation
 _PLACES = 4000  # of the nominal that tell how much of it would hold the part
 
 
@@ -109,17 +111,25 @@ def register_surface(
         start, others = seek_pose(given, weights, nominal, target_mm)
     free = np.array([name not in locked for name in _FREEDOMS])
     problem = FitProblem(given, weights, nominal, free, target_mm)
-    found = _fit(problem, start, gross_mm, farthest_mm)
+    fits = [_fit(problem, each, gross_mm, farthest_mm) for each in (start, *others)]
+    found = _least_turned(fits, _ROUNDING * nominal.size_mm)
     settled = found.settles_within_mm <= circle_mm
     rivals: list[RigidMotion] = []
-    for other in others:
-        rival = _fit(problem, other, gross_mm, farthest_mm).nominal_from_scan
+    for rival in (each.nominal_from_scan for each in fits if each is not found):
         if all(are_apart(rival, known, given, nominal) for known in [found.nominal_from_scan, *rivals]):
             rivals.append(rival)
     used, outlier = (np.zeros(len(points), dtype=bool) for _ in range(2))
     same = np.cumsum(is_new) - 1
     used[order], outlier[order] = found.used[same], found.outlier[same]
     return replace(found, converged=settled, used=used, outlier=outlier, rivals=len(rivals), rival_poses=tuple(rivals))
+
+
+def _least_turned(fits: Sequence[SurfaceRegistration], rounding_mm: float) -> SurfaceRegistration:
+    """Of the fits as good as the first that which turns the scan least: of a symmetric part, as it lies in its own coordinates."""
+    first = fits[0]
+    most_mm, fewest = _EQUAL * first.rms_mm + rounding_mm, np.count_nonzero(first.used) / _EQUAL
+    as_good = [each for each in fits if each.rms_mm <= most_mm and np.count_nonzero(each.used) >= fewest]
+    return max(as_good, key=lambda each: float(np.trace(each.nominal_from_scan.rotation)))
 
 
 def _weights(points: Array, cell_mm: float) -> Array:

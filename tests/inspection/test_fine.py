@@ -1,5 +1,6 @@
 """Fine poses against known motions, the independent least-squares optimum, and the conditions of the published experiment."""
 
+import math
 from functools import cache
 
 import numpy as np
@@ -185,6 +186,19 @@ def test_deviations_after_registration_do_not_depend_on_where_the_part_lay(
 
 
 # ---- parts whose pose is not unique, ball centres, partial scans
+
+
+@pytest.mark.parametrize("noise_mm", [0.0, 0.01])
+def test_of_the_poses_of_a_symmetric_part_that_of_its_own_coordinates_is_taken(noise_mm: float) -> None:
+    """Whatever the noise and the order are: or a defect would be told at the opposite place, and no two runs could be compared."""
+    nominal = nominal_of("ellipse")
+    for seed in range(6):
+        points = profiles.rotated(measured("ellipse", 300, seed, noise_mm=noise_mm), 5.0 * seed - 12.0, (3.0, 4.0))
+        found = register(points, nominal)
+        assert len(found.rivals) == 1
+        assert math.cos(found.nominal_from_section.rotation_rad) > math.cos(math.radians(14.0))
+        turned = register(profiles.rotated(points[::-1], 180.0 - 2 * (5.0 * seed - 12.0), (0.0, 0.0)), nominal)
+        assert math.cos(turned.nominal_from_section.rotation_rad) > math.cos(math.radians(14.0))
 
 
 def test_the_pose_of_an_ellipse_is_ambiguous_and_both_are_reported() -> None:

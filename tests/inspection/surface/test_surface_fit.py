@@ -92,6 +92,17 @@ def test_a_symmetric_part_has_rivals() -> None:
     assert found.rivals == 3
 
 
+@pytest.mark.parametrize("noise_mm", [0.0, 0.01])
+def test_of_the_poses_of_a_symmetric_part_that_of_its_own_coordinates_is_taken(noise_mm: float) -> None:
+    surface, rng = PatchSurface(faces.box((4.0, 3.0, 2.0))), np.random.default_rng(3)
+    for turn in ((0.2, -0.3, 0.1), (-0.1, 0.1, 0.4), (0.3, 0.2, -0.3)):
+        motion = RigidMotion.about((0, 0, 0), turn, (5, 0, 0))
+        points = scan_of(surface, 900, motion)
+        found = register_surface(points + rng.normal(0, noise_mm, points.shape), surface)
+        assert found.rivals == 3
+        assert apart(found.nominal_from_scan, motion, points) < 10 * noise_mm + 1e-9
+
+
 def test_no_bit_of_the_pose_depends_on_the_order_and_density_hardly_moves_it() -> None:
     rng = np.random.default_rng(2)
     motion = RigidMotion.about((2, 1, 1), (0.02, -0.01, 0.03), (0.1, 0.05, -0.1))
