@@ -21,6 +21,7 @@ from inspection.registration import Registration, no_outliers
 from inspection.scan_rows import ScanRows
 from inspection.signed_deviations import deviations
 from inspection.terms import Terms
+from inspection.unit_factors import UNIT_FACTORS
 
 Array = NDArray[np.float64]
 
@@ -41,15 +42,6 @@ _SHIFT_HINT = 3.0  # scatters at a fit about 0, which spoils a shift
 _NINE_OF_TEN = 3.29  # standard deviations of a normal distribution between its quantiles of 5 % and 95 %
 _RADIUS_NEAR = 0.05
 _FITS_INSTEAD = 0.2  # of the rms at the known pose
-
-_FACTORS = (
-    (25.4, "are the points in inches? Say so: unit inch (--unit inch), a factor of 25.4"),
-    (1 / 25.4, "is the nominal in inches? Say so: unit inch (--nominal-unit inch), a factor of 25.4"),
-    (1000.0, "are the points in metres? Give their scale: a factor of 1000"),
-    (0.001, "are the points in micrometres? Say so: unit um (--unit um), a factor of 0.001"),
-    (10.0, "are the points in centimetres? Give their scale: a factor of 10"),
-    (0.1, "is the nominal in centimetres? Give its scale: a factor of 10"),
-)
 
 
 def check_points(rows: ScanRows, points: Cloud, terms: Terms) -> NDArray[np.bool_]:
@@ -101,7 +93,7 @@ def check_fit(points: Cloud, registration: Registration, terms: Terms) -> None:
 
 def _check_unit_of_part(points_mm: Array, direct: Registration, terms: Terms) -> None:
     """Raise NotMeasured where points (m, 2), a scan of a part of the profile, fit far better in a larger unit."""
-    for factor, mend in _FACTORS:
+    for factor, mend in UNIT_FACTORS:
         if factor <= 1.0 or factor * _across(points_mm) > _SIZES_APART * _across(terms.nominal.points_mm):
             continue
         fitted = _fit(points_mm * factor, terms)
@@ -156,7 +148,7 @@ def _check_size(points_mm: Array, terms: Terms) -> None:
     if not scan > 0 or 1 / _SIZES_APART < want / scan < _SIZES_APART:
         return
     factor = want / scan
-    known = next((each for each in _FACTORS if 1 / _FACTOR_NEAR < factor / each[0] < _FACTOR_NEAR), None)
+    known = next((each for each in UNIT_FACTORS if 1 / _FACTOR_NEAR < factor / each[0] < _FACTOR_NEAR), None)
     closed = nominal.curve.closed and (factor < 1 or _goes_round(points_mm))
     if not closed and not (known and _fits_whole(points_mm * known[0], terms)):
         return

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inspection.conclusion import Missing, Reason, word_points
-from inspection.errors import NotMeasured
+from inspection.errors import NotMeasured, RegistrationError
 from inspection.surface.covered_area import measure_area
 from inspection.surface.defect_regions import find_defects
 from inspection.surface.feet import NominalSurface, SurfaceFeet, points_in_space, rejections
+from inspection.surface.likely_mend import refuse_mirrored, refuse_other_unit
 from inspection.surface.nominal_places import nearest_of, spread_places
 from inspection.surface.own_face import feet_on_own_face
 from inspection.surface.rigid_motion import RigidMotion
@@ -139,7 +140,14 @@ class _Scan:
         gross = terms.width_mm / 2 if terms.reject_outliers else None
         farthest = terms.farthest_on(self.nominal)
         aim = terms.zone.middle_mm, gross, farthest, terms.circle_mm
-        found = register_surface(self.points, self.nominal, terms.start, terms.locked, *aim)
+        refuse_other_unit(self.points, self.nominal, terms.zone.middle_mm)
+        try:
+            found = register_surface(self.points, self.nominal, terms.start, terms.locked, *aim)
+        except RegistrationError:
+            refuse_mirrored(self.points, self.nominal, terms.zone.middle_mm)
+            raise
+        if found.rms_mm > terms.width_mm / 2:
+            refuse_mirrored(self.points, self.nominal, terms.zone.middle_mm)
         return replace(found, nominal_from_scan=found.nominal_from_scan.snap_to_grid())
 
     def _refuse_far(self, found: JudgedPoints) -> None:
@@ -150,6 +158,7 @@ class _Scan:
         beyond = np.count_nonzero((found.rejection == Rejection.BEYOND_EDGE) & far)
         off = np.count_nonzero(found.rejection == Rejection.OFF_SURFACE) + beyond
         if off > _FAR_OFF * there:
+            refuse_other_unit(self.points, self.nominal, self.terms.zone.middle_mm)
             raise NotMeasured(
                 f"{off} of {there} points lie more than {away:.4g} mm off the surface: is it the right part, the right unit, and do the "
                 "points lie in the coordinates of the nominal? Else let the pose be fitted, or give a start nearer to it"

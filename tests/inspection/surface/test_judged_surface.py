@@ -221,7 +221,7 @@ def test_what_is_known_to_be_missing_is_named_in_the_order_of_its_weight() -> No
 
 def test_a_set_up_that_contradicts_the_points_is_no_verdict() -> None:
     _, _, points = scan(NOTCHED, 2000)
-    with pytest.raises(NotMeasured, match="right unit"):
+    with pytest.raises(NotMeasured, match="--nominal-unit inch"):
         judge_surface(25.4 * points, NOTCHED, WHERE_IT_IS)
     with pytest.raises(InspectionError, match="too few"):
         judge_surface(points[:3], NOTCHED, NEAR)
