@@ -23,7 +23,8 @@ from inspection.registration import Registration, datum_registration
 from inspection.result import InspectionResult, extent_of, stretches
 from inspection.rigid import RigidTransform
 from inspection.scan_rows import ScanRows
-from inspection.setup_check import check_fit, check_points, shift_reservation
+from inspection.setup_check import check_fit, check_points
+from inspection.shift_words import shift_reservation
 from inspection.telling_points import telling_rows
 from inspection.terms import Terms
 from inspection.uncertainty import largest_by_noise_mm
@@ -281,7 +282,7 @@ def _result(rows: ScanRows, settled: _Settled, terms: Terms, complete: bool, mis
     )
     conclusion = conclude(findings, missing, limits, complete)
     reasons = conclusion.reasons
-    if conclusion.verdict is Verdict.NONCONFORM and (reservation := shift_reservation(_few_judged(rows), terms)):
+    if conclusion.verdict is Verdict.NONCONFORM and (reservation := shift_reservation(_few_judged(rows), terms.zone, terms.tip_radius_mm)):
         reasons = (*reasons, Reason("shift", reservation))
     extent = extent_of(deviation, terms.zone.middle_mm, room)
     out = rows.count_of(Verdict.NONCONFORM)

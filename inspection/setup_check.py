@@ -19,6 +19,7 @@ from inspection.fine import MISFIT, register
 from inspection.plane_check import STRAIGHT, check_plane, check_section
 from inspection.registration import Registration, no_outliers
 from inspection.scan_rows import ScanRows
+from inspection.shift_words import SHIFT_SCATTERS, away_mm, is_a_radius, shift_of, words_of_shift
 from inspection.signed_deviations import deviations
 from inspection.terms import Terms
 from inspection.unit_factors import UNIT_FACTORS
@@ -37,10 +38,8 @@ _WAY_ROUND = (0.8, 3.0)  # times the length round the points: a shorter line doe
 _MOST_STEPS = 2000  # of that line
 _MIRROR_FAR_BETTER = 0.35  # of the rms: no defect makes the mirror image fit so much better
 _MIRROR_BETTER = 0.5  # and this with every point inside the zone
-_SHIFT_ZONES, _SHIFT_MM, _SHIFT_SCATTERS = 3.0, 0.2, 10.0  # widths of the zone, mm, and scatters by which all points are out
+_SHIFT_ZONES, _SHIFT_MM = 3.0, 0.2  # widths of the zone, and mm, by which all points are out
 _SHIFT_HINT = 3.0  # scatters at a fit about 0, which spoils a shift
-_NINE_OF_TEN = 3.29  # standard deviations of a normal distribution between its quantiles of 5 % and 95 %
-_RADIUS_NEAR = 0.05
 _FITS_INSTEAD = 0.2  # of the rms at the known pose
 
 
@@ -249,67 +248,25 @@ def _fit(points_mm: Array, terms: Terms) -> Registration | None:
 def _check_ball(points_mm: Array, found: _Found, terms: Terms) -> None:
     """Raise NotMeasured where all points (m, 2) are out by the same, far above their scatter, as ball centres are."""
     width, radius = terms.zone.upper_mm - terms.zone.lower_mm, terms.tip_radius_mm
-    shift, scatter = _shift(found.deviation_mm)
-    away = _away(shift, terms)
+    shift, scatter = shift_of(found.deviation_mm)
+    away = away_mm(shift, terms.zone)
     if away <= width or away <= _SHIFT_HINT * scatter:
         return
     if terms.known_pose is None:  # fitted about the shift, for a fit about 0 shares a part of it out among the points
         shift, scatter = _fitted_shift(points_mm, shift, terms)
-        away = _away(shift, terms)
-    if away <= width or away <= _SHIFT_SCATTERS * scatter:
+        away = away_mm(shift, terms.zone)
+    if away <= width or away <= SHIFT_SCATTERS * scatter:
         return
-    if not _is_a_radius(shift, radius) and away < max(_SHIFT_ZONES * width, _SHIFT_MM):
+    if not is_a_radius(shift, radius) and away < max(_SHIFT_ZONES * width, _SHIFT_MM):
         return
-    raise NotMeasured(f"all points are {_words_of_shift(shift, scatter, radius)}")
-
-
-def _away(shift_mm: float, terms: Terms) -> float:
-    """How far from what was to be expected: a part as its nominal is nothing shifted, whatever zone lies beside it."""
-    return min(abs(shift_mm), abs(shift_mm - terms.zone.middle_mm))
-
-
-def shift_reservation(deviation_mm: Array, terms: Terms) -> str:
-    """What is to be said of a part that does not conform where all deviations (k,) are out by the same, as ball centres are; or nothing.
-
-    The part itself may be too large, so this is no reason to refuse it.
-    """
-    shift, scatter = _shift(deviation_mm)
-    if _away(shift, terms) <= max((terms.zone.upper_mm - terms.zone.lower_mm) / 2, _SHIFT_SCATTERS * scatter):
-        return ""
-    return f"All points are {_words_of_shift(shift, scatter, terms.tip_radius_mm)}"
-
-
-def _is_a_radius(shift_mm: float, radius_mm: float) -> bool:
-    """Tell whether points are inside by what is known of the ball: its radius, its diameter, or half of what was given."""
-    return radius_mm > 0 and any(abs(shift_mm + times * radius_mm) < _RADIUS_NEAR * radius_mm for times in (0.5, 1, 2))
-
-
-def _words_of_shift(shift_mm: float, scatter_mm: float, radius_mm: float) -> str:
-    side = "or is the material on the other side (--material)?"
-    if radius_mm > 0 and abs(shift_mm + radius_mm) < _RADIUS_NEAR * radius_mm:
-        mend = f"was the radius of the ball taken off twice? Leave out the tip radius of {radius_mm:g} mm (--tip-radius)"
-    elif radius_mm > 0 and abs(shift_mm + 2 * radius_mm) < _RADIUS_NEAR * radius_mm:
-        mend = "is the ball on the other side of the material (--material)?"
-    elif radius_mm > 0 and radius_mm + shift_mm > 0:
-        mend = f"is {radius_mm:g} mm the radius of the tip? With {radius_mm + shift_mm:.3g} mm the points would fit (--tip-radius), {side}"
-    elif shift_mm > 0:
-        mend = f"ball centres? Give the radius of the tip (--tip-radius {shift_mm:.3g}), {side}"
-    else:
-        mend = f"was the radius of a ball taken off twice, {side}"
-    return f"{abs(shift_mm):.3f} mm {'out' if shift_mm > 0 else 'inside'} (scatter {scatter_mm:.3f} mm): {mend}"
-
-
-def _shift(deviation_mm: Array) -> tuple[float, float]:
-    """By how much all deviations (k,) are out, and their scatter: the standard deviation that nine of ten of them suggest."""
-    low, middle, high = np.quantile(deviation_mm, [0.05, 0.5, 0.95])
-    return float(middle), float(high - low) / _NINE_OF_TEN
+    raise NotMeasured(f"all points are {words_of_shift(shift, scatter, radius)}")
 
 
 def _fitted_shift(points_mm: Array, shift_mm: float, terms: Terms) -> tuple[float, float]:
     """The same of points (m, 2) at the best fit to the profile that lies so far out."""
     fitted = register(points_mm, terms.nominal, tip_radius_mm=terms.tip_radius_mm + shift_mm)
     found = _Found.at(points_mm, fitted, terms)
-    return _shift(found.deviation_mm) if found is not None else (0.0, 0.0)
+    return shift_of(found.deviation_mm) if found is not None else (0.0, 0.0)
 
 
 def _words_of_pose(rms_mm: float, fitted: Registration, known: Registration) -> str:

@@ -13,12 +13,15 @@ from inspection.surface.feet import Array, NominalSurface, SurfaceFeet
 
 
 class BallCentres:
-    """A nominal for points that are centres of a ball. Raises NominalError where the side that the ball comes from is not known."""
+    """A nominal for points that are centres of a ball. Raises NominalError where the side that the ball comes from is not known.
+
+    tip_radius_mm : that of the ball
+    """
 
     def __init__(self, nominal: NominalSurface, tip_radius_mm: float) -> None:
         if not nominal.sides_known:
             raise NominalError("centres of a ball need a nominal whose sides are known; give points on the part")
-        self._nominal, self._radius_mm = nominal, tip_radius_mm
+        self._nominal, self.tip_radius_mm = nominal, tip_radius_mm
 
     @property
     def nominal_error_mm(self) -> float:
@@ -48,7 +51,7 @@ class BallCentres:
     def project(self, points_mm: ArrayLike) -> SurfaceFeet:
         """Feet on the nominal of centres (m, 3); their distance is that of what the ball touched."""
         feet = self._nominal.project(points_mm)
-        return replace(feet, distance_mm=feet.distance_mm - self._radius_mm)
+        return replace(feet, distance_mm=feet.distance_mm - self.tip_radius_mm)
 
     def sample(self, count: int) -> tuple[Array, Array]:
         """Places of the nominal, as its own `sample` gives them."""

@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from inspection.conclusion import Missing, Reason, word_points
 from inspection.errors import NotMeasured, RegistrationError
+from inspection.shift_words import shift_reservation
+from inspection.surface.ball_centres import BallCentres
 from inspection.surface.covered_area import measure_area
 from inspection.surface.defect_regions import find_defects
 from inspection.surface.feet import NominalSurface, SurfaceFeet, points_in_space, rejections
@@ -201,11 +203,15 @@ class _Scan:
             sides_known=nominal.sides_known,
         )
         conclusion = conclude_surface(findings, terms.zone, self.missing, limits, self.complete)
-        deviation = feet.distance_mm[judged]
+        deviation, reasons = feet.distance_mm[judged], conclusion.reasons
+        if conclusion.verdict is Verdict.NONCONFORM and nominal.sides_known:
+            radius = nominal.tip_radius_mm if isinstance(nominal, BallCentres) else 0.0
+            shift = shift_reservation(deviation, terms.zone, radius, option="")
+            reasons = (*reasons, Reason("shift", shift)) if shift else reasons
         away = np.abs(deviation - zone.middle_mm)
         return SurfaceResult(
             verdict=conclusion.verdict,
-            reasons=conclusion.reasons,
+            reasons=reasons,
             notes=self._notes(within),
             points_mm=self.points,
             feet=feet,

@@ -17,6 +17,7 @@ ROOT = Path(__file__).resolve().parents[3]
 WHOLE = (
     ROOT / "drivers/scan_file.py",
     *sorted((ROOT / "inspection" / "surface").glob("*.py")),
+    ROOT / "inspection/shift_words.py",
     ROOT / "cmmlink/nominal_files/surface_file.py",
     ROOT / "cmmlink/surface_section.py",
 )

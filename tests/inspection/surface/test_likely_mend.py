@@ -1,5 +1,7 @@
 """Scans in a wrong unit or of the other hand are refused by name; a part that merely fails is judged."""
 
+import re
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -55,3 +57,13 @@ def test_a_tiny_scan_of_a_flat_place_is_no_scan_of_the_whole_in_another_unit() -
     places, normals = PART.sample(20_000)
     patch = places[np.linalg.norm(places - places[normals[:, 0] > 0.9][0], axis=1) < 2.0]
     assert judge_surface(patch, PART, ZONE).verdict is Verdict.UNCERTAIN
+
+
+@pytest.mark.parametrize(("shift_mm", "told"), [(1.5, r"1\.500 mm out .*--tip-radius 1\.5"), (-0.7, "0.700 mm inside .*taken off twice")])
+def test_points_that_are_all_out_by_the_same_are_told_to_be_perhaps_those_of_a_ball(shift_mm: float, told: str) -> None:
+    ball = TriangleSurface(meshes.sphere(8, radius=20.0))
+    places, normals = ball.sample(4000)
+    found = judge_surface(places + shift_mm * normals, ball, SurfaceTerms(ToleranceZone(-0.05, 0.05), fit="none", gross_mm=3.0))
+    assert found.verdict is Verdict.NONCONFORM
+    assert re.search(told, found.reasons[-1].words)
+    assert "material" in found.reasons[-1].words
