@@ -111,7 +111,7 @@ def test_a_ring_that_is_faster_than_its_reader_loses_and_counts(tmp_path: Path) 
 @pytest.mark.parametrize("line", [TCP, RTU])
 def test_an_unplugged_device_comes_back_and_the_run_goes_on(line: str, tmp_path: Path) -> None:
     with simulated("modbus-ring", line, tmp_path, "--unpaced", "--fault=unplug:0.1@400") as device:
-        book = account(source(device, "generic-ring", timeout_s=0.2, reconnect_s=20.0).arrivals())
+        book = account(source(device, "generic-ring", reconnect_s=20.0).arrivals())
     assert kinds(book) == [ScanOpened, LinkDown, LinkUp, ScanClosed]
     assert (book.sequence, book.lost) == (list(range(COUNT)), 0)
     only_sent_points(book, device.sent_mm, HALF_UNIT_MM)
@@ -120,7 +120,7 @@ def test_an_unplugged_device_comes_back_and_the_run_goes_on(line: str, tmp_path:
 @pytest.mark.parametrize("line", [TCP, RTU])
 def test_a_restarted_device_begins_a_new_scan(line: str, tmp_path: Path) -> None:
     with simulated("modbus-ring", line, tmp_path, "--unpaced", "--fault=restart:0.1@400") as device:
-        arrivals = list(source(device, "generic-ring", timeout_s=0.2, reconnect_s=20.0).arrivals())
+        arrivals = list(source(device, "generic-ring", reconnect_s=20.0).arrivals())
     book = account(arrivals)
     assert kinds(book) == [ScanOpened, LinkDown, LinkUp, ScanOpened, ScanClosed]
     second = max(place for place, arrival in enumerate(arrivals) if isinstance(arrival, ScanOpened))
