@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Sequence
 from datetime import datetime
 from pathlib import Path
@@ -189,11 +190,12 @@ def test_no_part_found_is_said(bench: Bench, keep: Keep) -> None:
 
 
 def test_full_disk_stops_the_run_and_says_so(make_bench: MakeBench, tmp_path: Path, keep: Keep, monkeypatch: pytest.MonkeyPatch) -> None:
-    append, left = Store.append, [1000]
+    append, left, judged = Store.append, [1000], threading.Event()
 
     def append_until_full(store: Store, drafts: Sequence[Draft], *behind: Any) -> list[Record]:
         left[0] -= sum(draft.count for draft in drafts if draft.kind == "points")
         if left[0] < 0:
+            assert judged.wait(60.0)
             raise StoreError("station.sqlite: no space left on the device")
         return append(store, drafts, *behind)
 
@@ -204,6 +206,8 @@ def test_full_disk_stops_the_run_and_says_so(make_bench: MakeBench, tmp_path: Pa
     bench.device.source.put(opened(2000), *points[:10])
     expect(page.locator("#received")).to_have_text("500")
     bench.device.source.put(*points[10:22])  # and now the device pauses: no further event tells the run of the disk
+    expect(page.locator("#received")).to_have_text("1,100")
+    judged.set()
     expect(page.locator("#alarm-text")).to_have_text(re.compile("Record not kept: .*no space left on the device"))
     expect(page.locator("#verdict-word")).to_have_text(re.compile(r"INTERRUPTED AT [45]\d %"))
     expect(page.locator("#verdict-why")).to_contain_text("Record not kept: the record of this run cannot be kept, so it has no result")
