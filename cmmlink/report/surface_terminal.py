@@ -90,7 +90,8 @@ def _nominal(nominal: Mapping[str, Any]) -> str:
 def _pose(found: Mapping[str, Any]) -> list[str]:
     pose = found["registration"]
     moved = ", ".join(f"{value:.4f}" for value in pose["translation_mm"])
-    lines = [f"fit {found['fit']}, rule {found['rule']}: turned {pose['rotation_deg']:.4f} deg, moved ({moved}) mm, {pose['steps']} steps"]
+    steps = "1 step" if pose["steps"] == 1 else f"{pose['steps']} steps"
+    lines = [f"fit {found['fit']}, rule {found['rule']}: turned {pose['rotation_deg']:.4f} deg, moved ({moved}) mm, {steps}"]
     if pose["rivals"]:
         lines.append(f"  the part fits as well in {pose['rivals']} other poses: its pose is ambiguous")
     if pose["undetermined"]:
