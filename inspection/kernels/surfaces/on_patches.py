@@ -135,7 +135,10 @@ def _project_chunks(points: Any, tables: Any, feet: Any, claimed: Any) -> None:
             while True:
                 leaf, depth = next_leaf(nodes, links, x, y, z, least, depth, waiting, memory)
                 if leaf < 0:
-                    break
+                    if best >= 0 or least == np.inf:
+                        break
+                    least, depth, waiting[0], memory[0] = np.inf, _ROOT_ALONE, 0, 0.0  # the last foot seemed nearer than any, by round-off
+                    continue
                 piece = np.int64(members[leaf])
                 if piece == best or square_from_box(rows, piece * row_width, x, y, z) > least * _ROUND_OFF:
                     continue

@@ -89,6 +89,18 @@ def test_a_certificate_for_what_is_only_guessed_is_noticed(name: str) -> None:
     assert not agree(false, project_on_patches(points, by_search(surface._tables), 1))
 
 
+def test_places_above_each_other_far_from_zero_have_their_feet_though_these_are_rounded_differently() -> None:
+    x = np.linspace(0, 10, 5)
+    u, v = np.meshgrid(x, x, indexing="ij")
+    surface = PatchSurface([faces.through(np.stack([u, v, u * v / 90], axis=-1) + 1e4)])
+    places, normals = surface.sample(1000)
+    off = np.resize([0.01, 1e-5], (len(places), 2))
+    points = (places[:, None] + off[..., None] * normals[:, None]).reshape(-1, 3)
+    found = project_on_patches(points, by_search(surface._tables), 1)
+    assert (found.item >= 0).all()
+    assert np.abs(found.distance_mm - off.ravel()).max() < 1e-10
+
+
 def test_no_bit_depends_on_batch_order_or_threads_where_cells_and_search_take_turns() -> None:
     surface = made("blade")
     points = beside(surface, 4000, 8)
