@@ -45,7 +45,7 @@ from inspection.kernels.surfaces.layout import (
     STACK,
 )
 from inspection.kernels.surfaces.patch_walk import WALK, walk_to_foot
-from inspection.kernels.surfaces.piece_minimum import closest_on_piece, piece_at
+from inspection.kernels.surfaces.piece_minimum import closest_on_piece, may_have_foot, piece_at
 from inspection.kernels.surfaces.space_feet import (
     AT_ONCE,
     SpaceFeet,
@@ -111,7 +111,7 @@ def _project_chunks(points: Any, tables: Any, feet: Any, claimed: Any) -> None:
     waiting, memory = array_at(stack_integers(), STACK), array_at(stack_reals(), PIECE_SCRATCH)
     nodes, links, members, rows, foot_mm = tables.nodes, tables.links, tables.members, tables.rows, feet.foot_mm
     width, row_width, beyond = tables.width, tables.row_width, tables.beyond
-    grid, blocks, cells = tables.grid, tables.blocks, tables.cells
+    grid, blocks, cells, grain = tables.grid, tables.blocks, tables.cells, tables.grain_mm
     begin = claim_chunk(claimed) // CHUNK * AT_ONCE
     while begin < m:
         for i in range(begin, min(begin + AT_ONCE, m)):
@@ -142,12 +142,23 @@ def _project_chunks(points: Any, tables: Any, feet: Any, claimed: Any) -> None:
                 piece = np.int64(members[leaf])
                 if piece == best or square_from_box(rows, piece * row_width, x, y, z) > least * _ROUND_OFF:
                     continue
+                if (  # found by the place alone, so that it has no part in the answer what the point before was close to
+                    named != FAR and is_inner(beyond, piece) and not may_have_foot(rows, piece * row_width, width, x, y, z, 0.0, grain)
+                ):
+                    continue
                 square, here_s, here_t = closest_on_piece(rows, piece * row_width, width, x, y, z, memory)
                 if square < least or (square == least and piece < best):
                     least, best, s, t = square, piece, here_s, here_t
             at_x, at_y, at_z = piece_at(rows, best * row_width, width, s, t)
             _store_foot(x, y, z, tables, best, s, t, at_x[:3], at_y[:3], at_z[:3], feet, i)
         begin = claim_chunk(claimed) // CHUNK * AT_ONCE
+
+
+@inlined_uncounted_kernel
+def is_inner(beyond: Any, piece: Any) -> bool:
+    """Whether a piece goes on in others beyond all its sides: what is closest on them and on it is no end of the face."""
+    at = LINKS * piece
+    return bool(beyond[at] == INNER and beyond[at + 1] == INNER and beyond[at + 2] == INNER and beyond[at + 3] == INNER)
 
 
 @inlined_uncounted_kernel

@@ -33,17 +33,14 @@ from inspection.kernels.surfaces.layout import (
     INNER,
     LINKS,
     LISTED,
-    M02,
-    M11,
-    M20,
     NAMED,
     PIECE_STRIDE,
     SCRATCH,
     STACK,
 )
-from inspection.kernels.surfaces.on_patches import PatchTables, square_from_box
+from inspection.kernels.surfaces.on_patches import PatchTables, is_inner, square_from_box
 from inspection.kernels.surfaces.patch_walk import walk_to_foot
-from inspection.kernels.surfaces.piece_minimum import bent_at, beyond_first_order, dot, piece_at, square_at
+from inspection.kernels.surfaces.piece_minimum import bent_at, may_have_foot, square_at
 from inspection.kernels.surfaces.space_feet import next_leaf
 
 Index = NDArray[np.int32]
@@ -207,34 +204,11 @@ def _keep(tables: Any, kept: Any, given: int, count: int, own: int, x: float, y:
         row = piece * tables.row_width
         if square_from_box(rows, row, x, y, z) > within * within:
             continue
-        at = LINKS * piece
-        is_inner = beyond[at] == INNER and beyond[at + 1] == INNER and beyond[at + 2] == INNER and beyond[at + 3] == INNER
-        if is_inner and not _may_have_foot(rows, row, tables.width, x, y, z, radius):
+        if is_inner(beyond, piece) and not may_have_foot(rows, row, tables.width, x, y, z, radius, tables.grain_mm):
             continue
         kept[own + found] = piece
         found += 1
     return found
-
-
-@uncounted_kernel
-def _may_have_foot(rows: Any, row: int, width: int, x: float, y: float, z: float, radius: float) -> bool:
-    """Whether the gradient may vanish on a piece for a place within a radius: no part of it keeps its sign."""
-    px, py, pz = piece_at(rows, row, width, 0.0, 0.0)
-    rx, ry, rz = px[0] - x, py[0] - y, pz[0] - z
-    g, h = rx * px[1] + ry * py[1] + rz * pz[1], rx * px[2] + ry * py[2] + rz * pz[2]
-    a = dot(px, py, pz, 1, 1) + rx * px[3] + ry * py[3] + rz * pz[3]
-    b = dot(px, py, pz, 1, 2) + rx * px[4] + ry * py[4] + rz * pz[4]
-    c = dot(px, py, pz, 2, 2) + rx * px[5] + ry * py[5] + rz * pz[5]
-    su, sv, distance = np.sqrt(dot(px, py, pz, 1, 1)), np.sqrt(dot(px, py, pz, 2, 2)), np.sqrt(rx * rx + ry * ry + rz * rz)
-    far, far_u, far_v = beyond_first_order(rows, row, HALF, HALF)
-    far, reach = far + radius, distance + (su + sv) * HALF
-    du, dv = (rows[row + M20] + rows[row + M11]) * HALF, (rows[row + M11] + rows[row + M02]) * HALF
-    st_s, st_t = abs(dot(px, py, pz, 1, 4)), abs(dot(px, py, pz, 2, 4))
-    twice_s = abs(dot(px, py, pz, 1, 3)) + st_s + abs(dot(px, py, pz, 2, 3)) + st_t
-    twice_t = abs(dot(px, py, pz, 2, 5)) + st_t + abs(dot(px, py, pz, 1, 5)) + st_s
-    along_s = (abs(a) + abs(b)) * HALF + twice_s * HALF * HALF + reach * far_u + far * (su + du)
-    along_t = (abs(b) + abs(c)) * HALF + twice_t * HALF * HALF + reach * far_v + far * (sv + dv)
-    return bool(abs(g) <= along_s * _ROOM and abs(h) <= along_t * _ROOM)
 
 
 @uncounted_kernel

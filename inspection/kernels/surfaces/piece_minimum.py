@@ -34,6 +34,10 @@ _CONVEX = 0.02  # part of the metric that curvature must leave over
 _DETERMINANT = 0.9
 _AS_NEAR = 2e-10  # times the distance: what a square must be less by to be looked for; 1e-10 mm of distance
 _MANY, _MORE = 4096, 128  # rectangles after which what is ten times less near will do, and again: at the middle of a sphere
+_ROOM = 1.0 + 1e-9  # for the round-off of bounds
+# By how much a derivative of a piece may differ from that of its face: a quintic may miss it by 0.2 grains, and its derivative, by Markov's
+# inequality, by 50 times that; and of the coordinates, which are rounded, the fit makes some hundred times their round-off.
+_MISSED_GRAINS, _ROUNDED = 100.0, 1e-12
 _STILL_MM = 1e-12  # a step after which nothing changes; in mm, since the round-off of s and t grows as a piece gets narrower
 _UPHILL, _UPHILL_MM2 = 1.0 + 1e-12, 1e-24  # by less a square of a distance grows through round-off alone
 
@@ -114,6 +118,28 @@ def beyond_first_order(rows: Any, row: int, hs: float, ht: float) -> tuple[float
     far_u = rows[row + M30] * ss + rows[row + M21] * st + rows[row + M12] * tt
     far_v = rows[row + M21] * ss + rows[row + M12] * st + rows[row + M03] * tt
     return far, far_u, far_v
+
+
+@uncounted_kernel
+def may_have_foot(rows: Any, row: int, width: int, x: float, y: float, z: float, radius: float, grain_mm: float) -> bool:
+    """Whether the gradient of the distance may vanish on a piece for a place within a radius: no part of it keeps its sign.
+
+    It vanishes at the closest point of the face, from which the piece differs by round-off and by what it misses: room is left for more
+    than their derivatives can come to, so that the piece with the closest point of a smooth net is never told to have none.
+    """
+    px, py, pz = piece_in_middle(rows, row, width)
+    square, g, h, a, b, c = square_of(px, py, pz, x, y, z)
+    su, sv, distance = np.sqrt(dot(px, py, pz, 1, 1)), np.sqrt(dot(px, py, pz, 2, 2)), np.sqrt(square)
+    far, far_u, far_v = beyond_first_order(rows, row, HALF, HALF)
+    far, reach = far + radius, distance + (su + sv) * HALF
+    du, dv = (rows[row + M20] + rows[row + M11]) * HALF, (rows[row + M11] + rows[row + M02]) * HALF
+    st_s, st_t = abs(dot(px, py, pz, 1, 4)), abs(dot(px, py, pz, 2, 4))
+    twice_s = abs(dot(px, py, pz, 1, 3)) + st_s + abs(dot(px, py, pz, 2, 3)) + st_t
+    twice_t = abs(dot(px, py, pz, 2, 5)) + st_t + abs(dot(px, py, pz, 1, 5)) + st_s
+    along_s = (abs(a) + abs(b)) * HALF + twice_s * HALF * HALF + reach * far_u + far * (su + du)
+    along_t = (abs(b) + abs(c)) * HALF + twice_t * HALF * HALF + reach * far_v + far * (sv + dv)
+    room = (reach + radius) * (_MISSED_GRAINS * grain_mm + _ROUNDED * (abs(px[0]) + abs(py[0]) + abs(pz[0])))
+    return bool(abs(g) <= along_s * _ROOM + room and abs(h) <= along_t * _ROOM + room)
 
 
 @uncounted_kernel

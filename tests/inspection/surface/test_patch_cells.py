@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from inspection.kernels.surfaces import PatchTables, project_on_patches
-from inspection.kernels.surfaces.layout import CERTAIN, FAR, GRID_LOW, GRID_PER_MM, LISTED, NAMED
+from inspection.kernels.surfaces.layout import CERTAIN, FAR, GRID_LOW, GRID_PER_MM, GUESSED, LISTED, NAMED
 from inspection.surface import PatchSurface, SplineFace
 from tests.inspection.surface import faces
 
@@ -65,6 +65,23 @@ def with_guesses_taken_for_certain(tables: PatchTables) -> PatchTables:
     return tables._replace(cells=np.where(tables.cells < FAR, LISTED - (held - held % NAMED + CERTAIN), tables.cells))
 
 
+def with_wrong_guesses(tables: PatchTables) -> PatchTables:
+    """The same tables where each cell that holds a piece names any other one, of which nothing is certain."""
+    anything = np.random.default_rng(3).integers(0, len(tables.members), len(tables.cells))
+    return tables._replace(cells=np.where(tables.cells < FAR, LISTED - (NAMED * anything + GUESSED), tables.cells).astype(np.int32))
+
+
+def above_corners(surface: PatchSurface, count: int) -> Array:
+    """Places above corners of pieces, where up to four of them are equally near, up to the end of the band of cells."""
+    random = np.random.default_rng(4)
+    piece, (s, t) = random.integers(0, len(surface._pieces.face), count), random.choice([-0.5, 0.5], (2, count))
+    place, along_s, along_t = surface._pieces.at(piece, s, t)
+    normal = np.cross(along_s, along_t)
+    off = random.choice(_SIZES, count) * random.choice([-1, 1], count) * 0.008 * surface.size_mm
+    above: Array = place + (off / np.linalg.norm(normal, axis=1))[:, None] * normal
+    return above
+
+
 def agree(one: Any, other: Any) -> bool:
     """Whether distances are the same but for round-off, and signs and kinds are the same."""
     near = np.isclose(one.distance_mm, other.distance_mm, rtol=1e-12, atol=1e-10)
@@ -87,6 +104,15 @@ def test_a_certificate_for_what_is_only_guessed_is_noticed(name: str) -> None:
     points = beside(surface, 4000, 5)
     false = project_on_patches(points, with_guesses_taken_for_certain(surface._tables), 1)
     assert not agree(false, project_on_patches(points, by_search(surface._tables), 1))
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_the_search_passes_over_no_piece_with_the_closest_point_wherever_it_begins(name: str) -> None:
+    surface = made(name)
+    points = np.concatenate([above_corners(surface, 2000), beside(surface, 1000, 6)])
+    found, searched = (project_on_patches(points, change(surface._tables), 1) for change in (with_wrong_guesses, by_search))
+    near = np.isclose(found.distance_mm, searched.distance_mm, rtol=1e-12, atol=1e-10)
+    assert near.all()
 
 
 def test_places_above_each_other_far_from_zero_have_their_feet_though_these_are_rounded_differently() -> None:
