@@ -1,6 +1,8 @@
 """Recorded runs on their way to a page, as an archive or a report in a temporary folder that is gone afterwards, however it ends."""
 
 import tempfile
+import threading
+from asyncio import CancelledError
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
@@ -61,8 +63,9 @@ class RunFiles:
             self._under_way += 1
             ending.callback(self._end)
             try:
-                folder = ending.enter_context(tempfile.TemporaryDirectory())
-                file = await anyio.to_thread.run_sync(make, Path(folder))  # a station that ends meanwhile cancels it here
+                folder = _Folder()
+                ending.callback(folder.let_go)
+                file = await anyio.to_thread.run_sync(folder.fill, make)  # a station that ends meanwhile cancels it here, not in the thread
             except Refused as refusal:
                 return PlainTextResponse(str(refusal), 404)
             except OSError as error:
@@ -71,6 +74,32 @@ class RunFiles:
 
     def _end(self) -> None:
         self._under_way -= 1
+
+
+class _Folder:
+    """A temporary folder held by who answers the page and, while it makes the file, by a thread; the last to let go removes it."""
+
+    def __init__(self) -> None:
+        self._folder = tempfile.TemporaryDirectory()
+        self._lock, self._holders = threading.Lock(), 1
+
+    def fill(self, make: Callable[[Path], Path]) -> Path:
+        """Let a file be made in it, in the calling thread. Raises CancelledError where nobody waits for it any more."""
+        with self._lock:
+            if not self._holders:
+                raise CancelledError
+            self._holders += 1
+        try:
+            return make(Path(self._folder.name))
+        finally:
+            self.let_go()
+
+    def let_go(self) -> None:
+        """Hold it no longer."""
+        with self._lock:
+            self._holders -= 1
+            if not self._holders:
+                self._folder.cleanup()
 
 
 class _RunFile(FileResponse):
