@@ -24,16 +24,14 @@ ZONE = SurfaceTerms(ToleranceZone(-0.05, 0.05))
 
 
 def scan(form_mm: float = 0.0) -> Array:
-    """Points (2000, 3) of the part, turned, with a bulge of so much."""
-    places, normals = PART.sample(2000)
+    """Points (1000, 3) of the part, turned, with a bulge of so much."""
+    places, normals = PART.sample(1000)
     away = np.linalg.norm(places - places[700], axis=1)
     bulged = places + form_mm * np.exp(-((away / 4.0) ** 2))[:, None] * normals
     return RigidMotion.about((0, 0, 0), (0.3, -0.4, 1.0), (40, 5, -9)).apply(bulged)
 
 
-@pytest.mark.parametrize(
-    ("factor", "told"), [(1 / 25.4, "25.4 times as large.*--unit inch"), (1000.0, "0.001 times.*--unit um"), (1e-3, "in metres")]
-)
+@pytest.mark.parametrize(("factor", "told"), [(1 / 25.4, "25.4 times as large.*--unit inch"), (1e-3, "in metres")])
 def test_a_scan_in_another_unit_is_refused_with_the_unit(factor: float, told: str) -> None:
     with pytest.raises(NotMeasured, match=told):
         judge_surface(scan() * factor, PART, ZONE)
