@@ -50,13 +50,13 @@ class Way:
 class LeftOut:
     """A library that is not measured, and why."""
 
-    library: str
+    rival: str
     reason: str
 
     @property
     def words(self) -> str:
         """One line."""
-        return f"{self.library} is left out: {self.reason}"
+        return f"{self.rival} is left out: {self.reason}"
 
 
 Corners = Array
